@@ -1,0 +1,1 @@
+"""Learners: vision, models, imitation. Torch lives here and only here."""

@@ -1,0 +1,109 @@
+"""The asset records: what a thing is, how it looks, where it may stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+ROOM_KINDS = (
+    "living_room", "kitchen", "dining_room", "main_bedroom", "bedroom", "kids_room",
+    "guest_room", "bathroom", "toilet", "hall", "corridor", "study", "laundry_room",
+    "pantry", "closet", "library", "playroom", "gym", "garage", "family_room",
+    "sun_room", "workshop", "stairwell",
+)
+"""Every room kind a house may hold; catalogue weights and generators use these keys only."""
+
+SUPPORTS = ("floor", "against_wall", "corner", "surface", "wall", "ceiling")
+"""How an asset is held up: free on the floor, on the floor with its back to a wall, on the
+floor in a corner, on another object's support surface, hung on a wall, hung from the ceiling."""
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How one part of a mesh looks. Colours are sRGB in [0, 1]; maps are PNG paths."""
+
+    color: tuple[float, float, float, float] = (0.8, 0.8, 0.8, 1.0)
+    texture: str | None = None
+    """sRGB colour map; multiplies nothing: where present it replaces `color` (alpha apart)."""
+    normal_map: str | None = None
+    roughness_map: str | None = None
+    roughness: float = 0.8
+    metallic: float = 0.0
+    specular: float = 0.5
+    """Dielectric reflectance scale as in the principled BSDF: 0.5 is F0 = 0.04, 0 for cloth."""
+    emission: tuple[float, float, float] | None = None
+    """Linear relative radiance when the lamp is on; None for things that do not glow."""
+    mirror: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPart:
+    """One mesh of one finish, in the asset's own frame.
+
+    The frame: metres, z up, x to the right of somebody who faces the thing's front, the
+    front looks along -y, origin at the centre of the base of the bounding box.
+    """
+
+    vertices: np.ndarray
+    """(n, 3) float32, metres."""
+    faces: np.ndarray
+    """(m, 3) int32, counter-clockwise seen from outside."""
+    normals: np.ndarray
+    """(n, 3) float32, unit."""
+    uv: np.ndarray
+    """(n, 2) float32, u right and v up as in OBJ; may leave [0, 1] where the texture repeats."""
+    finish: Finish
+
+
+@dataclass(frozen=True)
+class SupportSurface:
+    """A horizontal rectangle of an asset that small things may stand on, in its own frame."""
+
+    name: str
+    """'top', 'seat', 'shelf_1' (from below), 'basin_rim', ..."""
+    z: float
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    headroom: float
+    """Free height above it in metres; large (9.0) where open."""
+
+
+@dataclass(frozen=True)
+class Asset:
+    """One model of the catalogue."""
+
+    key: str
+    """'<pack>/<model>', e.g. 'scopia/bed1', or 'built/<maker>' for things made in code."""
+    object_class: str
+    """Singular English noun phrase, lower case: 'armchair', 'dining table'."""
+    name: str
+    """Natural name with what sets it apart: 'grey armchair', 'round wooden table'."""
+    size: tuple[float, float, float]
+    """Width (x), depth (y), height (z) in metres."""
+    support: str
+    """One of SUPPORTS."""
+    rooms: Mapping[str, float] = field(default_factory=dict)
+    """Room kind to weight; empty for assets that only functional groups place."""
+    synonyms: tuple[str, ...] = ()
+    """Other nouns people use for it ('couch' for 'sofa')."""
+    colours: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    """Material words: 'wood', 'glass', 'metal', 'fabric', 'leather', 'ceramic', ..."""
+    on: tuple[str, ...] = ()
+    """For support 'surface': object classes whose surfaces it naturally rests on."""
+    elevation: float = 0.0
+    """Base height above the floor for support 'wall'; drop below the ceiling for 'ceiling'."""
+    clearance: float = 0.0
+    """Free depth needed before its front, metres."""
+    surfaces: tuple[SupportSurface, ...] = ()
+    tags: tuple[str, ...] = ()
+    """Functional tags the generator asks for: 'double', 'single', 'round', 'floor_lamp', ..."""
+    emits: tuple[float, float, float] | None = None
+    """Linear relative radiance of its lamp when on; None for things that give no light."""
+    pack: str = ""
+    creator: str = ""
+    licence: str = ""

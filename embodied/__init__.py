@@ -1,0 +1,1 @@
+"""embodied: generated houses in MuJoCo, panoramas, and agents that ask people for help."""

@@ -1,0 +1,365 @@
+"""The House: rooms, openings, placements and lights as plain data, with a JSON round trip.
+
+World frame: metres, right-handed, z up, the ground floor's floor at z = 0. Rooms tile the
+footprint: a room's polygon runs along the centre lines of its walls, and what one can walk on
+is `room.floor(house)`, the polygon shrunk by half an inner wall. Outer walls grow outwards.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import math
+import types
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from assets.cache import write_bytes
+
+SCHEMA = 1
+"""Version of house.json; a file of another version is refused."""
+
+OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french_window", "garage_door")
+DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
+"""Opening kinds that a person can walk through."""
+
+
+class HouseError(ValueError):
+    """A house that cannot be: says what was expected, what came and what to do."""
+
+
+@dataclass(frozen=True)
+class Sky:
+    """The outdoors seen and felt through the windows."""
+
+    hour: float = 11.0
+    """Local solar time, hours in [0, 24)."""
+    weather: str = "clear"
+    """'clear', 'hazy' or 'overcast'."""
+    north: float = math.pi / 2
+    """World direction of north, radians counter-clockwise from +x."""
+
+
+@dataclass(frozen=True)
+class Storey:
+    elevation: float
+    """z of its floor, metres."""
+    height: float
+    """Clear height from floor to ceiling, metres."""
+
+
+@dataclass(frozen=True)
+class Room:
+    id: str
+    """'<kind>_<number>', unique in the house: 'bedroom_2'."""
+    kind: str
+    """One of assets.records.ROOM_KINDS."""
+    polygon: tuple[tuple[float, float], ...]
+    """Corners counter-clockwise along wall centre lines, metres."""
+    floor_finish: str
+    """Material key of the catalogue, e.g. 'oak_planks/1'; the same for the next three."""
+    wall_finish: str
+    ceiling_finish: str
+    skirting_finish: str
+    accent_wall: int | None = None
+    """Index of the polygon edge (corner i to i+1) that wears `accent_finish`."""
+    accent_finish: str | None = None
+    storey: int = 0
+
+
+@dataclass(frozen=True)
+class Opening:
+    id: str
+    kind: str
+    """One of OPENING_KINDS."""
+    rooms: tuple[str, str | None]
+    """The room a door leaf swings into first; None stands for the outdoors."""
+    a: tuple[float, float]
+    b: tuple[float, float]
+    """The two jambs on the wall's centre line, metres."""
+    sill: float
+    head: float
+    """Bottom and top of the hole above the storey's floor, metres."""
+    leaf_finish: str | None = None
+    """Material key of leaf and frame; None for a bare passage."""
+    hinge: str = "a"
+    """The jamb, 'a' or 'b', that carries the hinges."""
+    angle: float = 0.0
+    """How far a leaf stands open, radians; 0 is closed."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """One object in the house."""
+
+    id: str
+    """'<object class with underscores>_<number>', unique in the house: 'coffee_table_1'."""
+    asset: str
+    """Key into the catalogue."""
+    object_class: str
+    room: str
+    position: tuple[float, float, float]
+    """World position of the asset's origin (centre of its base), metres."""
+    yaw: float
+    """Radians counter-clockwise; the front looks along yaw - pi/2 (geometry.facing_of)."""
+    size: tuple[float, float, float]
+    """Width, depth, height in metres; a uniform or modest rescale of the asset's own size, or
+    what a maker of built things is asked for."""
+    parent: str | None = None
+    """Id of the placement it rests on; None for floor, wall or ceiling."""
+    surface: str | None = None
+    """Name of the parent's SupportSurface it rests on."""
+    params: tuple[tuple[str, str | float], ...] = ()
+    """Arguments for built assets, sorted by name: finishes, patterns, seeds."""
+    group: str | None = None
+    """The functional group that placed it: 'seating_1'."""
+
+
+@dataclass(frozen=True)
+class Light:
+    id: str
+    room: str
+    placement: str | None
+    """The lamp it belongs to; None for a bare point light."""
+    position: tuple[float, float, float]
+    color: tuple[float, float, float]
+    """Linear RGB, largest component 1."""
+    power: float
+    """Lumens."""
+    on: bool = True
+
+
+@dataclass(frozen=True)
+class Stair:
+    """A straight or turned flight between two storeys."""
+
+    id: str
+    rooms: tuple[str, str]
+    """The room at its foot and the room at its head."""
+    path: tuple[tuple[float, float, float], ...]
+    """Centre line from foot to head, metres, world."""
+    width: float
+    risers: int
+
+
+@dataclass(frozen=True)
+class House:
+    seed: int
+    name: str
+    storeys: tuple[Storey, ...]
+    rooms: tuple[Room, ...]
+    openings: tuple[Opening, ...]
+    placements: tuple[Placement, ...]
+    lights: tuple[Light, ...]
+    stairs: tuple[Stair, ...] = ()
+    sky: Sky = Sky()
+    inner_wall: float = 0.12
+    outer_wall: float = 0.32
+    """Wall thicknesses, metres."""
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Hex SHA-256 of the canonical JSON: two houses with one digest are the same house."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    @functools.cached_property
+    def room_by_id(self) -> dict[str, Room]:
+        return {r.id: r for r in self.rooms}
+
+    @functools.cached_property
+    def placement_by_id(self) -> dict[str, Placement]:
+        return {p.id: p for p in self.placements}
+
+    def storey_of(self, room: Room) -> Storey:
+        return self.storeys[room.storey]
+
+    def floor(self, room: Room) -> shapely.Polygon:
+        """What one can stand on in `room` between bare walls, metres, world."""
+        return shapely.Polygon(room.polygon).buffer(-self.inner_wall / 2, join_style="mitre")
+
+    @functools.cached_property
+    def area(self) -> float:
+        """Sum of the rooms' polygon areas, square metres."""
+        return float(sum(shapely.Polygon(r.polygon).area for r in self.rooms))
+
+    def to_json(self) -> str:
+        """Canonical JSON: sorted keys, no blanks."""
+        body = {"schema": SCHEMA, **dataclasses.asdict(self)}
+        return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+    @staticmethod
+    def from_json(text: str) -> House:
+        """Read what `to_json` wrote.
+
+        Raises:
+          HouseError: not JSON, another schema version, unknown or missing fields, wrong types,
+            numbers that are not finite, or a house that fails `check`.
+        """
+        try:
+            body = json.loads(text)
+        except json.JSONDecodeError as e:
+            raise HouseError(f"house file is not JSON ({e}); write it with House.save") from e
+        if not isinstance(body, dict) or "schema" not in body:
+            raise HouseError("house file has no 'schema' field; write it with House.save")
+        if (schema := body.pop("schema")) != SCHEMA:
+            raise HouseError(
+                f"house file has schema {schema!r}, this version reads {SCHEMA}; "
+                "generate the house again from its seed"
+            )
+        house = _read(House, body, "house")
+        check(house)
+        return house
+
+    def save(self, path: Path) -> None:
+        """Write to `path` atomically, indented for people."""
+        text = json.dumps(json.loads(self.to_json()), indent=1)
+        write_bytes(Path(path), (text + "\n").encode())
+
+    @staticmethod
+    def load(path: Path) -> House:
+        """Read a house.json; raises HouseError with the file's name."""
+        try:
+            return House.from_json(Path(path).read_text())
+        except HouseError as e:
+            raise HouseError(f"{path}: {e}") from e
+
+
+def check(house: House) -> None:
+    """Refuse a house that cannot be.
+
+    Raises:
+      HouseError: duplicate or dangling ids, unknown kinds, overlapping rooms, a room without a
+        door, an opening that is on no shared wall, an object outside its room.
+    """
+    _check_ids(house)
+    polygons = {}
+    for room in house.rooms:
+        polygon = shapely.Polygon(room.polygon)
+        if not polygon.is_valid or polygon.area < 0.5 or not shapely.is_ccw(polygon.exterior):
+            raise HouseError(
+                f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, "
+                f"got {room.polygon}"
+            )
+        polygons[room.id] = polygon
+    _check_overlaps(house, polygons)
+    _check_openings(house, polygons)
+    for p in house.placements:
+        if polygons[p.room].distance(shapely.Point(p.position[:2])) > house.outer_wall:
+            raise HouseError(
+                f"object {p.id!r} stands at {p.position} outside its room {p.room!r}; "
+                "move it inside or name the room it is in"
+            )
+
+
+def _check_ids(house: House) -> None:
+    for what in ("rooms", "openings", "placements", "lights", "stairs"):
+        ids = [x.id for x in getattr(house, what)]
+        if len(set(ids)) < len(ids):
+            twice = sorted({i for i in ids if ids.count(i) > 1})
+            raise HouseError(f"{what} share the ids {twice}; every id must be unique")
+    if not house.rooms:
+        raise HouseError("a house needs at least one room, got none")
+    rooms = set(house.room_by_id)
+    for r in house.rooms:
+        if not 0 <= r.storey < len(house.storeys):
+            raise HouseError(f"room {r.id!r} is on storey {r.storey}, the house has {len(house.storeys)}")
+    for x in (*house.placements, *house.lights):
+        if x.room not in rooms:
+            raise HouseError(f"{x.id!r} names the unknown room {x.room!r}; rooms are {sorted(rooms)}")
+    for p in house.placements:
+        if p.parent is not None and p.parent not in house.placement_by_id:
+            raise HouseError(f"object {p.id!r} rests on the unknown object {p.parent!r}")
+        if min(p.size) <= 0:
+            raise HouseError(f"object {p.id!r} has the size {p.size}; all three must be positive")
+
+
+def _check_overlaps(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+    tree = shapely.STRtree([polygons[r.id] for r in house.rooms])
+    for i, room in enumerate(house.rooms):
+        for j in sorted(tree.query(polygons[room.id])):
+            other = house.rooms[j]
+            if j <= i or other.storey != room.storey:
+                continue
+            shared = polygons[room.id].intersection(polygons[other.id]).area
+            if shared > 1e-3:
+                raise HouseError(f"rooms {room.id!r} and {other.id!r} overlap by {shared:.3f} m2")
+
+
+def _check_openings(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+    has_door = {end for s in house.stairs for end in s.rooms}
+    for o in house.openings:
+        if o.kind not in OPENING_KINDS:
+            raise HouseError(f"opening {o.id!r} has the unknown kind {o.kind!r}; use one of {OPENING_KINDS}")
+        segment = shapely.LineString([o.a, o.b])
+        for room in o.rooms:
+            if room is None:
+                continue
+            if room not in polygons:
+                raise HouseError(f"opening {o.id!r} names the unknown room {room!r}")
+            if not polygons[room].exterior.buffer(1e-3).covers(segment):
+                raise HouseError(f"opening {o.id!r} does not lie on a wall of room {room!r}")
+            if o.kind in DOORS:
+                has_door.add(room)
+        if not 0 <= o.sill < o.head:
+            raise HouseError(f"opening {o.id!r} needs 0 <= sill < head, got {o.sill} and {o.head}")
+    for room in house.rooms:
+        if room.id not in has_door:
+            raise HouseError(f"room {room.id!r} has no door; every room needs one, add an Opening or drop the room")
+
+
+def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
+    """`value`, as JSON gives it, turned into the type `kind`."""
+    origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if dataclasses.is_dataclass(kind):
+        return _read_record(kind, value, where)
+    if origin in (types.UnionType, typing.Union):
+        if value is None and type(None) in args:
+            return None
+        if float in args and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return _read(float, value, where)
+        return _read(next(a for a in args if a is not type(None)), value, where)
+    if origin is tuple:
+        if not isinstance(value, list):
+            raise HouseError(f"{where} should be a list, got {value!r}")
+        if len(args) == 2 and args[1] is Ellipsis:
+            return tuple(_read(args[0], v, f"{where}[{i}]") for i, v in enumerate(value))
+        if len(value) != len(args):
+            raise HouseError(f"{where} should have {len(args)} values, got {len(value)}")
+        return tuple(_read(a, v, f"{where}[{i}]") for i, (a, v) in enumerate(zip(args, value)))
+    if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise HouseError(f"{where} should be a finite number, got {value!r}")
+        return float(value)
+    if type(value) is not kind:
+        raise HouseError(f"{where} should be {kind.__name__}, got {value!r}")
+    return value
+
+
+def _read_record(kind: typing.Any, value: object, where: str) -> typing.Any:
+    if not isinstance(value, dict):
+        raise HouseError(f"{where} should be an object, got {value!r}")
+    hints = typing.get_type_hints(kind)
+    names = [f.name for f in dataclasses.fields(kind)]
+    if unknown := sorted(set(value) - set(names)):
+        raise HouseError(f"{where} has the unknown fields {unknown}; it may hold {names}")
+    required = [f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING]
+    if missing := [n for n in required if n not in value]:
+        raise HouseError(f"{where} lacks the fields {missing}")
+    return kind(**{n: _read(hints[n], value[n], f"{where}.{n}") for n in names if n in value})
+
+
+def rounded(value: typing.Any, digits: int = 4) -> typing.Any:
+    """`value` (number, tuple, array) with floats rounded, so that digests agree across machines."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return tuple(rounded(v, digits) for v in value)
+    if isinstance(value, (float, np.floating)):
+        return round(float(value), digits) + 0.0
+    return value

@@ -1,0 +1,1 @@
+"""Rerun recordings, plots and reports. Rerun lives here and only here."""
