@@ -36,6 +36,9 @@ class Finish:
     emission: tuple[float, float, float] | None = None
     """Linear relative radiance when the lamp is on; None for things that do not glow."""
     mirror: bool = False
+    tile: float | None = None
+    """Side in metres of the square that the maps of a tileable material cover; whoever builds a
+    mesh with such a finish divides metres by it to get uv. None for maps of imported models."""
 
 
 @dataclass(frozen=True, eq=False)
