@@ -1,0 +1,30 @@
+# Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
+.PHONY: help demo test setup lint wheel clean
+PYTHON ?=
+OUT ?= out/demo
+SEED ?=
+
+help:
+	@echo 'make demo    seed -> furnished house -> panoramas -> an agent finds something -> Rerun recording, in $(OUT)'
+	@echo 'make test    the whole test suite'
+	@echo 'make setup   only the set-up: system packages, .venv, Python packages'
+	@echo 'make lint    ruff'
+	@echo 'make wheel   build the wheel into dist/'
+
+setup:
+	@PYTHON='$(PYTHON)' ./setup.sh
+
+demo: setup
+	@.venv/bin/embodied demo --out '$(OUT)' $(if $(SEED),--seed $(SEED))
+
+test: setup
+	@.venv/bin/python -m pytest -q -n 2 --dist loadfile
+
+lint: setup
+	@.venv/bin/ruff check .
+
+wheel: setup
+	@.venv/bin/python -m pip wheel -q --no-deps -w dist .
+
+clean:
+	rm -rf .venv build dist out *.egg-info
