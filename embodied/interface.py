@@ -1,0 +1,446 @@
+"""The nouns of play: tasks, observations, actions, situations, replies, steps, episodes. Read this first.
+
+An episode is a task played in a world: the policy sees an `Observation`, takes an `Action`
+(move, ask or stop), an assistant may answer with a `Reply`, and a `Step` is written down.
+Whoever knows more than the policy (assistants, teachers, metrics) is given a `Situation`.
+
+Angles of a pose are multiples of 30 degrees (dissertation 4.2.2) and are kept as integers:
+`turn` counts 30-degree steps of yaw counter-clockwise from +x, `tilt` is -1, 0 or +1 above the
+horizon. View k of the 36 views looks along turn k % 12 and tilt k // 12 - 1.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+STEP = math.pi / 6
+"""The angle of one turn or tilt, radians."""
+TURNS = 12
+VIEWS = 36
+
+
+# Where an agent is and what it can see ----------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """(v, psi, omega) of dissertation 4.2.2. An agent knows its angles, never its node."""
+
+    node: int
+    turn: int = 0
+    """Yaw in steps of 30 degrees, 0..11, counter-clockwise from +x."""
+    tilt: int = 0
+    """Pitch in steps of 30 degrees, -1, 0 or 1."""
+
+    @property
+    def yaw(self) -> float:
+        """Radians counter-clockwise from +x, in [0, 2 pi)."""
+        return self.turn * STEP
+
+    @property
+    def pitch(self) -> float:
+        """Radians above the horizon."""
+        return self.tilt * STEP
+
+    @property
+    def view(self) -> int:
+        """Which of the 36 views it looks into."""
+        return TURNS * (self.tilt + 1) + self.turn
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Sight:
+    """What can be seen from one place, as an opaque key.
+
+    A policy hands it to a `FeatureSource` (or to a renderer) and must not look inside: the place
+    itself is privileged. Assistants send a Sight as the target image.
+    """
+
+    _world: str
+    _node: int
+
+    def __repr__(self) -> str:
+        return "Sight(...)"
+
+
+class FeatureSource(Protocol):
+    """Turns a Sight into numbers: CNN features of the panorama, or cheap semantic ones."""
+
+    size: int
+    """D, the length of one feature vector."""
+
+    def features(self, sight: Sight) -> np.ndarray:
+        """(36, D) float32; row k belongs to view k, in absolute order (not turned to the agent)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """The moves an agent may choose from, sorted by |bearing|: (n,) arrays that share an index.
+
+    In the panoramic action space each candidate is a neighbouring node: the agent turns towards
+    it and goes there. In VNLA's monocular action space the candidates are the five of `words`.
+    """
+
+    bearing: np.ndarray
+    """(n,) float32, radians in [-pi, pi): exact direction relative to the agent's yaw, left positive."""
+    slope: np.ndarray
+    """(n,) float32, radians above the horizon."""
+    view: np.ndarray
+    """(n,) int64, absolute view 0..35 whose centre is nearest to the candidate."""
+    allowed: np.ndarray
+    """(n,) bool; a Move to a candidate that is not allowed is an error."""
+    words: tuple[str, ...] = ()
+    """VNLA: ('forward', 'left', 'right', 'up', 'down'); empty in the panoramic action space."""
+
+    def __len__(self) -> int:
+        return len(self.bearing)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Candidates) and self.words == other.words and all(
+            np.array_equal(getattr(self, name), getattr(other, name))
+            for name in ("bearing", "slope", "view", "allowed")
+        )
+
+
+# What an agent is asked to do -------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class FindObject:
+    """Find an object of a class, in a room of a kind when one is named."""
+
+    object_class: str
+    room_kind: str | None = None
+    placements: tuple[str, ...] = ()
+    """The placements in the house that satisfy it, at least one."""
+
+
+@dataclass(frozen=True)
+class FollowRoute:
+    """Follow a route instruction to its end (R2R)."""
+
+    route: str
+    """Id of the route."""
+    path: tuple[int, ...]
+    """Nodes from start to end."""
+
+
+Goal = FindObject | FollowRoute
+
+
+@dataclass(frozen=True)
+class Task:
+    id: str
+    """Unique in a data set: '<world>/<kind>/<number>'."""
+    kind: str
+    """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
+    world: str
+    """Name of the house (House.name)."""
+    start: Pose
+    goal: Goal
+    goal_nodes: tuple[int, ...]
+    """Success is to end within `radius` of one of these, along the graph."""
+    request: str
+    """What the requester says, d* in the dissertation."""
+    radius: float
+    """Metres along the graph, inclusive."""
+    horizon: int
+    """Most steps of any kind, H in the dissertation."""
+    budget: int | None = None
+    """Most requests for help; None is without limit."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """A language-assisted route xi = (psi, omega, p, d) of dissertation 4.2.2."""
+
+    id: str
+    path: tuple[int, ...]
+    turn: int
+    tilt: int
+    """Camera angles on entering, in steps of 30 degrees."""
+    instruction: str
+    split: str = "train_seen"
+    """'train_seen', 'train_unseen', 'val' or 'test': who may hear this wording."""
+
+
+# What an agent may do ---------------------------------------------------------------------------
+
+class Intention(enum.Enum):
+    """What a request for help asks for."""
+
+    HELP = "help"
+    """VNLA and HANNA: the assistant decides what to say."""
+    CUR = "cur"
+    """HARI: describe where I am."""
+    GOAL = "goal"
+    """HARI: describe where I should go."""
+    SUB = "sub"
+    """HARI: give me a nearer goal."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thought:
+    """What a policy thought when it acted. The environment never reads it; teachers and viz may."""
+
+    moves: np.ndarray | None = None
+    """(n + 1,) float32 probabilities over the candidates and, last, stop."""
+    asks: Mapping[str, float] | None = None
+    """Probability of each help action: {'help': 0.2, 'nothing': 0.8}."""
+    reasons: tuple[float, ...] | None = None
+    """HANNA: probabilities of (lost, uncertain_wrong, never_asked)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Turn to a candidate and go there."""
+
+    candidate: int
+    """Index into Observation.candidates."""
+    thought: Thought | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Ask the assistant; possible only when Observation.can_ask holds the intention."""
+
+    intention: Intention = Intention.HELP
+    thought: Thought | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Say that the current task or sub-task is done (HARI: DONE)."""
+
+    thought: Thought | None = field(default=None, compare=False, repr=False)
+
+
+Action = Move | Ask | Stop
+
+
+# What an agent is told --------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """One feature set of HARI's bag-of-features descriptions (appendix E)."""
+
+    kind: str
+    """'object', 'room' or 'action'."""
+    name: str
+    """Object class, room kind, 'go' or 'stop'."""
+    horizontal: int = 0
+    """Direction in steps of 30 degrees, 0..11, counter-clockwise from +x; 0 for rooms."""
+    vertical: int = 0
+    """-1, 0 or 1 steps of 30 degrees."""
+    distance: int = 0
+    """Metres rounded down, 0..4."""
+
+
+Description = tuple[Feature, ...]
+
+
+class Mode(enum.Enum):
+    MAIN = "main"
+    """Working on the task request."""
+    SUB = "sub"
+    """Working on what the assistant said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Subtask:
+    """What stands behind a reply. Privileged: for the environment, teachers and metrics."""
+
+    id: str
+    """Route id in HANNA, 'subgoal' elsewhere."""
+    target: int
+    """Node where the assistant wants it to end: v_depart (4.6), a subgoal in HARI."""
+    start: Pose | None = None
+    """HANNA: where the route is entered and with which angles; None stays put."""
+    goal: int | None = None
+    """HANNA: g* (4.7), whose image is shown after departing."""
+    path: tuple[int, ...] = ()
+    """Nodes that the text talks about."""
+    words: tuple[str, ...] = ()
+    """VNLA: the teacher's next k actions as words, 'stop' included, for direct intervention."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What the assistant says: a text, an image, a description, or several of them."""
+
+    text: str | None = None
+    image: Sight | None = None
+    description: Description | None = None
+    intention: Intention = Intention.HELP
+    """What was answered; an uncooperative assistant may answer another question."""
+    subtask: Subtask | None = None
+    """Privileged; never shown to a policy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """Everything a policy may know at one step, and nothing else."""
+
+    sight: Sight
+    """The panorama around the agent, for a FeatureSource."""
+    turn: int
+    """The agent's own yaw in steps of 30 degrees, 0..11."""
+    tilt: int
+    candidates: Candidates
+    instruction: str
+    """d+: the text being executed: the request, or what the assistant said."""
+    target: Sight | None
+    """The image being looked for (HANNA), if any."""
+    mode: Mode
+    can_ask: tuple[Intention, ...]
+    """The intentions that may be asked now; empty where nobody can be asked."""
+    requests_left: int | None
+    """Remaining request budget; None without a budget."""
+    time: int
+    """Steps since the episode began."""
+    time_on_task: int
+    """Steps since the instruction last changed; 0 tells a policy that it just did."""
+    state_description: Description = ()
+    """HARI: d^s."""
+    goal_descriptions: tuple[Description, ...] = ()
+    """HARI: the goal-description stack G^d, top last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """The privileged view of one step: for assistants, teachers and metrics, never for a policy."""
+
+    world: World
+    task: Task
+    pose: Pose
+    mode: Mode
+    targets: tuple[int, ...]
+    """Nodes the current task or sub-task wants: all goals, g* after departing, or the sub-goal."""
+    subtask: Subtask | None
+    """What the last reply meant; None before any reply and, in HANNA, after departing."""
+    candidate_nodes: tuple[int, ...]
+    """Node of each candidate in the observation of this step."""
+    candidates: Candidates
+    time: int
+    requests: int
+    """Requests made so far."""
+    goals: tuple[int, ...] = ()
+    """HARI: the true goal nodes on the stack, top last."""
+
+
+# What is written down ---------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step as it was taken. Everything privileged is here, pixels are not."""
+
+    pose: Pose
+    """Before the action."""
+    mode: Mode
+    instruction: str
+    targets: tuple[int, ...]
+    subtask: str
+    """Id of the sub-task, 'none' for every stretch of the main task (originals X7)."""
+    can_ask: tuple[Intention, ...]
+    candidate_nodes: tuple[int, ...]
+    action: Action
+    reply: Reply | None
+    next_pose: Pose
+    cost: float = 0.0
+    """HARI: the cost of this step, shaping excluded."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    task: Task
+    steps: tuple[Step, ...]
+    ended: str
+    """'stop' when the agent stopped, 'limit' when the horizon cut it short."""
+    seed: int = 0
+    agent: str = ""
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """Nodes visited, the start first, repeats kept: len(steps) + 1 of them."""
+        return (self.task.start.node, *(s.next_pose.node for s in self.steps))
+
+    @property
+    def requests(self) -> int:
+        return sum(isinstance(s.action, Ask) for s in self.steps)
+
+
+# Who takes part ---------------------------------------------------------------------------------
+
+class Assistant(Protocol):
+    """Part of the world, present at test time too. Sees the situation and answers requests."""
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        """What may be asked here and now."""
+        ...
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """What a teacher says about one step."""
+
+    move: Move | Stop | None
+    """The reference navigation action; None: not to be learned from."""
+    ask: bool | None = None
+    """Whether it should have asked; None: not to be learned from (no zone, or no such teacher)."""
+    reasons: tuple[bool, bool, bool] | None = None
+    """HANNA: (lost, uncertain_wrong, never_asked)."""
+    negatives: tuple[Move | Stop, ...] = ()
+    """HANNA: past mistakes at this node under this instruction, the set of (4.12)."""
+
+
+class Teacher(Protocol):
+    """Sees everything, labels training data, never speaks to the agent."""
+
+    def label(self, situation: Situation) -> Label:
+        """The reference action now."""
+        ...
+
+    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+        """Labels of every step of a finished episode (the retrospective mode of 4.2.3)."""
+        ...
+
+
+class Policy(Protocol):
+    """Acts for a batch of episodes at once.
+
+    Position i of every call belongs to the same episode; its observation is None once it has
+    ended, and so must its action be. The memory is the policy's own business: None on the first
+    call of a batch, then whatever it returned. It may draw only from rngs[i] for episode i, so
+    that an episode does not depend on the batch around it.
+    """
+
+    def act(
+        self, observations: Sequence[Observation | None], memory: object | None, *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[list[Action | None], object]: ...
+
+
+class Language(Protocol):
+    """The voice of requesters and assistants; embodied.language implements it."""
+
+    def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
+        """The words of a task: 'find a mug in the kitchen'."""
+        ...
+
+    def route(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+        """How a person describes walking along `path` (nodes), starting to look along `yaw` (radians)."""
+        ...
+
+    def subgoal(self, words: Sequence[str]) -> str:
+        """VNLA: primitive actions ('left', 'left', 'forward', 'stop') as a sentence."""
+        ...
