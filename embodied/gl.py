@@ -1,0 +1,150 @@
+"""Choosing and owning the off-screen OpenGL context. Import this before mujoco.
+
+EGL is preferred (it uses a GPU where one is, Mesa's software rasteriser elsewhere); OSMesa is the
+fall-back. MUJOCO_GL, MuJoCo's own switch, is honoured when the user has set it to either.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import ctypes.util
+import functools
+import os
+from dataclasses import dataclass
+
+BACKENDS = ("egl", "osmesa")
+REMEDY = (
+    "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
+    "or OSMesa (apt-get install libosmesa6) and set MUJOCO_GL=osmesa"
+)
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
+"""Words by which a device name tells that no graphics hardware is used."""
+
+
+class GLError(RuntimeError):
+    """No OpenGL context can be had; says why and what to do."""
+
+
+@dataclass(frozen=True)
+class GLInfo:
+    """What draws the pictures; goes into every recording, data set and benchmark."""
+
+    backend: str
+    """'egl' or 'osmesa'."""
+    vendor: str
+    device: str
+    version: str
+    software: bool
+    """True where the CPU draws."""
+
+    def __str__(self) -> str:
+        return f"{self.device} ({'software' if self.software else 'hardware'}, {self.vendor}) through {self.backend}"
+
+
+def choose() -> str:
+    """The backend this process uses; also tells MuJoCo and PyOpenGL through their variables.
+
+    Raises:
+      GLError: MUJOCO_GL names something that draws on a screen, or neither EGL nor OSMesa is there.
+    """
+    asked = os.environ.get("MUJOCO_GL", "").lower()
+    if asked and asked not in BACKENDS:
+        raise GLError(f"MUJOCO_GL is {asked!r}; off-screen rendering needs one of {BACKENDS}, or unset it")
+    backend = asked or _first_available()
+    os.environ["MUJOCO_GL"] = backend
+    os.environ["PYOPENGL_PLATFORM"] = backend
+    return backend
+
+
+@functools.cache
+def _first_available() -> str:
+    if _egl_works():
+        return "egl"
+    if ctypes.util.find_library("OSMesa"):
+        return "osmesa"
+    raise GLError(f"neither EGL nor OSMesa works here. {REMEDY}")
+
+
+def _egl_works() -> bool:
+    """Whether some EGL device initialises, tried without PyOpenGL, which binds one platform for good."""
+    name = ctypes.util.find_library("EGL")
+    if name is None:
+        return False
+    egl = ctypes.CDLL(name)
+    egl.eglGetProcAddress.restype = ctypes.c_void_p
+    query_address = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+    display_address = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
+    if not query_address or not display_address:
+        return False
+    pointer = ctypes.c_void_p
+    query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.POINTER(pointer), ctypes.POINTER(ctypes.c_int))
+    get_display = ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)(display_address)
+    devices, count = (pointer * 16)(), ctypes.c_int()
+    if not query(query_address)(16, devices, ctypes.byref(count)):
+        return False
+    platform_device = 0x313F  # EGL_PLATFORM_DEVICE_EXT
+    egl.eglInitialize.argtypes = [pointer, pointer, pointer]
+    displays = (get_display(platform_device, devices[i], None) for i in range(count.value))
+    return any(d and egl.eglInitialize(d, None, None) for d in displays)
+
+
+class _Owner:
+    """The one context of a process. It changes over time: absent, created, released."""
+
+    def __init__(self) -> None:
+        self.context = None
+        self.pid = 0
+
+
+@functools.cache
+def _owner() -> _Owner:
+    return _Owner()
+
+
+def make_current() -> None:
+    """Create this process's context on first use and make it current in the calling thread.
+
+    Raises:
+      GLError: it cannot be created, or the parent of this forked process already had one (Mesa's
+        worker threads do not survive a fork, and the first draw call would hang).
+    """
+    owner = _owner()
+    if owner.context is not None and owner.pid != os.getpid():
+        raise GLError(
+            f"process {os.getpid()} was forked after its parent {owner.pid} had opened OpenGL, which does not "
+            "survive a fork; start workers with multiprocessing.get_context('spawn'), or fork before rendering"
+        )
+    if owner.context is None:
+        owner.context, owner.pid = _create(choose()), os.getpid()
+        atexit.register(release)
+    owner.context.make_current()
+
+
+def _create(backend: str):
+    try:
+        if backend == "egl":
+            from mujoco.egl import GLContext
+        else:
+            from mujoco.osmesa import GLContext
+        return GLContext(64, 64)
+    except (ImportError, RuntimeError, AttributeError, OSError) as e:
+        raise GLError(f"cannot open an OpenGL context through {backend} ({e}). {REMEDY}") from e
+
+
+def info() -> GLInfo:
+    """Who draws here; opens the context if need be."""
+    make_current()
+    from OpenGL import GL
+
+    vendor, device, version = (GL.glGetString(k).decode() for k in (GL.GL_VENDOR, GL.GL_RENDERER, GL.GL_VERSION))
+    software = any(word in device.lower() for word in SOFTWARE)
+    return GLInfo(os.environ["MUJOCO_GL"], vendor, device, version, software)
+
+
+def release() -> None:
+    """Close this process's context; renderers must be closed before."""
+    owner = _owner()
+    if owner.context is not None and owner.pid == os.getpid():
+        owner.context.free()
+    owner.context = None
