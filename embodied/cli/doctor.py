@@ -1,0 +1,115 @@
+"""Check that this machine can do the main job, and say what it will use.
+
+Prints the renderer (vendor, device, software or hardware), the asset packs found, library
+versions and free disk. Exits 1, with the remedy, when houses cannot be generated or rendered.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import platform
+import shutil
+from dataclasses import asdict, dataclass
+
+from embodied.cli.common import add_cache, add_json, add_packs, show
+
+LIBRARIES = (
+    "embodied", "mujoco", "dm-control", "trimesh", "torch", "opencv-python-headless",
+    "rerun-sdk", "gymnasium", "mitsuba", "numpy", "shapely",
+)
+FREE_DISK = 2.0
+"""GiB below which rendering houses will soon fail."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report."""
+
+    name: str
+    ok: bool
+    text: str
+    remedy: str = ""
+    needed: bool = True
+    """Whether the main job fails without it."""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    findings = [versions(), renderer(), packs(args), path_tracer(), vulkan(), disk(args)]
+    ok = all(f.ok for f in findings if f.needed)
+    lines = []
+    for f in findings:
+        mark = "ok  " if f.ok else ("FAIL" if f.needed else "note")
+        lines.append(f"[{mark}] {f.name:<12} {f.text}")
+        if not f.ok:
+            lines.append(f"       {'':<12} -> {f.remedy}")
+    lines.append("Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.")
+    show(args, {"ok": ok, "findings": [asdict(f) for f in findings]}, "\n".join(lines))
+    return 0 if ok else 1
+
+
+def versions() -> Finding:
+    """Python and library versions; every one listed is needed."""
+    found, missing = [f"Python {platform.python_version()}"], []
+    for name in LIBRARIES:
+        try:
+            found.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            missing.append(name)
+    text = ", ".join(found) + (f"; missing: {', '.join(missing)}" if missing else "")
+    return Finding("versions", not missing, text, "run `make setup`, or pip install -e . -c constraints.txt")
+
+
+def renderer() -> Finding:
+    """The off-screen renderer that MuJoCo gets."""
+    from embodied.gl import GlError, probe
+
+    try:
+        device = probe()
+    except GlError as e:
+        return Finding("renderer", False, str(e), "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6")
+    return Finding("renderer", True, str(device))
+
+
+def packs(args: argparse.Namespace) -> Finding:
+    """The furniture libraries."""
+    from assets.packs import find_packs
+
+    found = find_packs(tuple(args.pack))
+    text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
+    return Finding("furniture", bool(found), text, "apt-get install sweethome3d-furniture, or name files with --pack")
+
+
+def path_tracer() -> Finding:
+    """Mitsuba's variant: CUDA, LLVM or scalar."""
+    from embodied.light.tracer import variant_in_use
+
+    variant = variant_in_use()
+    fast = not variant.startswith("scalar")
+    return Finding("path tracer", fast, f"Mitsuba {variant}", "apt-get install libllvm19 makes baking light many times faster", False)
+
+
+def vulkan() -> Finding:
+    """The loader that the Filament back end needs."""
+    import ctypes.util
+
+    found = ctypes.util.find_library("vulkan")
+    return Finding(
+        "Vulkan", found is not None, found or "no Vulkan loader",
+        "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers", False,
+    )
+
+
+def disk(args: argparse.Namespace) -> Finding:
+    """Free space where the cache lives."""
+    place = args.cache
+    while not place.exists():
+        place = place.parent
+    free = shutil.disk_usage(place).free / 2**30
+    return Finding("disk", free >= FREE_DISK, f"{free:.0f} GiB free for {args.cache}", f"free {FREE_DISK} GiB or choose another --cache")

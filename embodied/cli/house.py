@@ -1,0 +1,51 @@
+"""Generate a furnished house into a folder.
+
+Writes house.json (the house as data), house.xml with its meshes and textures (opens in MuJoCo's
+own viewer), connectivity.json (the navigation graph in Matterport's format) and plan.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.options import add_options, read_options
+from embodied.generate import HouseConfig, generate_house
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="which house; the same seed gives the same house")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
+    parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
+    parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
+    add_options(parser.add_argument_group("what kind of house"), HouseConfig)
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from embodied.export import export_glb, export_mjcf
+    from embodied.navgraph import build_graph, to_matterport
+    from embodied.plan import save_plan
+
+    catalogue = catalogue_of(args)
+    house = generate_house(args.seed, read_options(args, HouseConfig), catalogue)
+    graph = build_graph(house, catalogue)
+    args.out.mkdir(parents=True, exist_ok=True)
+    house.save(args.out / "house.json")
+    to_matterport(graph, args.out / "connectivity.json")
+    save_plan(house, args.out / "plan.png", graph=graph, catalogue=catalogue)
+    if not args.no_mjcf:
+        note("writing house.xml with its meshes and textures")
+        export_mjcf(house, catalogue, args.out)
+    if args.glb:
+        export_glb(house, catalogue, args.out / "house.glb")
+    facts = {
+        "seed": args.seed, "digest": house.digest, "area_m2": round(house.area, 1), "rooms": len(house.rooms),
+        "objects": len(house.placements), "nodes": len(graph.ids), "out": str(args.out),
+    }
+    show(args, facts, f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
+                      f"{facts['nodes']} viewpoints -> {args.out}")
+    return 0

@@ -1,0 +1,92 @@
+"""Imports go one way: assets <- embodied <- agents, embodied <- viz; heavy libraries stay where they belong."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("assets", "embodied", "agents", "viz")
+MAY_IMPORT = {
+    "assets": {"assets"},
+    "embodied": {"assets", "embodied"},
+    "agents": {"assets", "embodied", "agents"},
+    "viz": {"assets", "embodied", "viz"},
+}
+GRAPHICS = ("embodied/scene.py", "embodied/render.py", "embodied/gl.py", "embodied/sheet.py", "embodied/export.py",
+            "embodied/collision.py", "embodied/body.py", "embodied/filament.py")
+HOMES = {
+    "torch": ("agents/",),
+    "rerun": ("viz/",),
+    "mitsuba": ("embodied/light/",),
+    "drjit": ("embodied/light/",),
+    "mujoco": (*GRAPHICS, "embodied/light/", "embodied/bench/"),
+    "dm_control": ("embodied/body.py",),
+    "OpenGL": ("embodied/gl.py", "embodied/render.py"),
+    "gymnasium": ("embodied/gym_env.py", "embodied/spaces.py", "agents/"),
+}
+"""Heavy library -> path prefixes of the files that may import it."""
+COMPOSERS = ("embodied/cli/",)
+"""The console command puts everything together, so it may import agents and viz (late, inside `run`)."""
+
+
+def sources() -> list[Path]:
+    return sorted(p for package in PACKAGES for p in (ROOT / package).rglob("*.py"))
+
+
+def imported(path: Path) -> list[str]:
+    """Every module name that `path` imports, nested imports included."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names.append(node.module)
+        elif isinstance(node, ast.ImportFrom):
+            names.append(path.relative_to(ROOT).parts[0])
+    return names
+
+
+def wrong_arrows(path: Path) -> list[str]:
+    """The imports of `path` that its folder may not make."""
+    where = path.relative_to(ROOT).as_posix()
+    package, wrong = where.split("/")[0], []
+    for name in imported(path):
+        top = name.split(".")[0]
+        if top in PACKAGES and top not in MAY_IMPORT[package] and not where.startswith(COMPOSERS):
+            wrong.append(f"{where} imports {name}")
+        if top in HOMES and not where.startswith(HOMES[top]):
+            wrong.append(f"{where} imports {name}, which lives in {', '.join(HOMES[top])}")
+    return wrong
+
+
+def test_imports_follow_the_arrows_of_the_design():
+    wrong = [w for path in sources() for w in wrong_arrows(path)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_wrong_arrow_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr("test_arrows.ROOT", tmp_path)
+    bad = tmp_path / "assets" / "bad.py"
+    bad.parent.mkdir()
+    bad.write_text("import torch\nfrom embodied.house import House\n")
+    assert len(wrong_arrows(bad)) == 2
+
+
+def test_only_the_command_line_composes_agents_and_viz():
+    for path in sources():
+        where = path.relative_to(ROOT).as_posix()
+        if where.startswith(COMPOSERS):
+            top_level = [n for n in ast.parse(path.read_text()).body if isinstance(n, (ast.Import, ast.ImportFrom))]
+            names = [a.name for n in top_level for a in n.names] + [getattr(n, "module", "") or "" for n in top_level]
+            assert not {n.split(".")[0] for n in names} & {"agents", "viz"}, f"{where} must import agents and viz late"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_package_on_disk_is_in_the_wheel(package):
+    listed = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"])
+    on_disk = {p.parent.relative_to(ROOT).as_posix().replace("/", ".") for p in (ROOT / package).rglob("__init__.py")}
+    assert on_disk <= listed, f"add to pyproject.toml, tool.setuptools.packages: {sorted(on_disk - listed)}"

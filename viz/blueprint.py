@@ -1,0 +1,49 @@
+"""How the viewer lays an episode out, so that nobody needs to rearrange anything."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from embodied.house import House
+
+
+def episode_blueprint(house: House, *, dialogue: bool = True, target: bool = False, probabilities: bool = False) -> rrb.Blueprint:
+    """The house in 3D on the left, what the agent sees and hears on the right, plots below.
+
+    Args:
+      house: decides where the eye starts.
+      dialogue: show who said what.
+      target: show the image that an assistant sent.
+      probabilities: plot the policy's own probabilities.
+    """
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre, span = (low + high) / 2, float(max(high - low))
+    world = rrb.Spatial3DView(
+        origin="/", name="House", contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
+        eye_controls=rrb.EyeControls3D(
+            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1),
+        ),
+        background=(245, 246, 248), line_grid=False,
+    )
+    sees = rrb.Spatial2DView(origin="/agent/camera/image", name="What the agent sees")
+    panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
+    looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image from the assistant")] if target else [sees]
+    texts = [rrb.TextDocumentView(origin="/text/request", name="Request"),
+             rrb.TextDocumentView(origin="/text/instruction", name="Doing now")]
+    plots = [rrb.TimeSeriesView(origin="/plot/distance", name="Metres to go"),
+             rrb.StateTimelineView(origin="/mode", name="Mode")]
+    if probabilities:
+        plots.append(rrb.TimeSeriesView(origin="/plot/probability", name="Probability of asking"))
+    said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
+    right = rrb.Vertical(
+        rrb.Horizontal(*looks), panorama, rrb.Horizontal(*texts),
+        *([said] if dialogue else []), row_shares=[5, 3, 2, *([3] if dialogue else [])],
+    )
+    left = rrb.Vertical(world, rrb.Horizontal(*plots, rrb.TextLogView(origin="/events", name="Events")), row_shares=[3, 1])
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.TimePanel(state="collapsed", timeline="step", fps=1.5, play_state="playing"),
+        rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden"),
+    )

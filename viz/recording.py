@@ -1,0 +1,251 @@
+"""An episode as a Rerun recording: the house, the graph, the agent, its views, the dialogue.
+
+Entity tree (timeline 'step'):
+  house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
+  task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
+  agent/path, agent/route  walked, spoken of       view/panorama, view/target
+  text/...               request, instruction, dialogue, goal stack
+  plot/...               distance to the goal, requests, probabilities     events   a log
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import rerun as rr
+
+from embodied.geometry import rotation
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
+from embodied.world import World
+from viz.house3d import light_meshes, log_house
+
+PALETTE = {
+    "graph": (120, 130, 150), "path": (31, 119, 255), "route": (255, 160, 30),
+    "goal": (20, 190, 90), "start": (90, 90, 90), "agent": (31, 119, 255), "person": (255, 120, 0),
+}
+VFOV = np.deg2rad(75.0)
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """How large the pictures in a recording are; it decides the size of the file."""
+
+    view: tuple[int, int] = (360, 480)
+    """Height and width of the first-person view, pixels."""
+    panorama: int = 256
+    """Height of the equirectangular panorama; twice as wide."""
+    jpeg: int = 85
+    """JPEG quality, 1 to 100."""
+
+
+def record(
+    recording: rr.RecordingStream, world: World, task: Task, steps: Iterable[Step], *,
+    pictures: Pictures = Pictures(), with_house: bool = True,
+) -> Iterator[Step]:
+    """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
+
+    Args:
+      recording: where to log; the caller has connected it to a file or a viewer.
+      world: the world of the task; its panoramas are drawn when a step needs them.
+      task: what is being played.
+      steps: the steps of one episode as they happen.
+      pictures: sizes of the pictures.
+      with_house: False when the recording holds the house already.
+
+    Yields:
+      The same steps.
+    """
+    if with_house:
+        log_world(recording, world)
+    log_task(recording, world, task)
+    state = _Story(task)
+    for index, step in enumerate(steps):
+        recording.set_time("step", sequence=index)
+        log_step(recording, world, task, step, state, pictures)
+        yield step
+        state.last = step
+    if state.last is not None:
+        recording.set_time("step", sequence=state.count)
+        log_end(recording, world, task, state, pictures)
+
+
+def log_world(recording: rr.RecordingStream, world: World) -> None:
+    """The house without ceilings, and its navigation graph, for all times."""
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    log_house(recording, light_meshes(world.parts))
+    floor = world.graph.positions - [0, 0, 1.45]
+    recording.log("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]), static=True)
+    strips = floor[np.asarray(world.graph.edges)]
+    recording.log("graph/edges", rr.LineStrips3D(strips, radii=0.012, colors=(*PALETTE["graph"], 130)), static=True)
+
+
+def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
+    """Request, goal and start, for all times."""
+    at = world.graph.positions
+    goals = at[list(task.goal_nodes)] - [0, 0, 1.44]
+    recording.log("task/goal", rr.Points3D(goals, radii=0.16, colors=PALETTE["goal"]), static=True)
+    sought = [world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id]
+    if sought:
+        centres = np.array([np.add(p.position, (0, 0, p.size[2] / 2)) for p in sought])
+        recording.log("task/sought", rr.Boxes3D(
+            centers=centres, half_sizes=np.array([p.size for p in sought]) / 2 + 0.05,
+            rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in sought],
+            colors=PALETTE["goal"], labels=[p.object_class for p in sought], radii=0.012,
+        ), static=True)
+    recording.log("task/start", rr.Points3D(at[task.start.node] - [0, 0, 1.44], radii=0.13, colors=PALETTE["start"]), static=True)
+    recording.log("text/request", rr.TextDocument(f"## “{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True)
+    people = [p for p in world.house.placements if p.object_class == "person"]
+    if people:
+        recording.log("people", rr.Points3D(
+            [np.add(p.position, (0, 0, p.size[2] + 0.25)) for p in people], radii=0.05,
+            colors=PALETTE["person"], labels=["assistant"] * len(people), show_labels=False,
+        ), static=True)
+
+
+class _Story:
+    """What has happened so far: the dialogue, the path and the counts."""
+
+    def __init__(self, task: Task) -> None:
+        self.dialogue = [f"**Requester:** {task.request}"]
+        self.nodes = [task.start.node]
+        self.count = 0
+        self.requests = 0
+        self.last: Step | None = None
+
+
+def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: _Story, pictures: Pictures) -> None:
+    """One step: what is seen before the action, then the action and the reply to it."""
+    log_sight(recording, world, step.pose.node, step.pose.yaw, step.pose.pitch, pictures)
+    goal_distance = min(float(world.graph.distance[step.pose.node, g]) for g in task.goal_nodes)
+    recording.log("plot/distance/goal", rr.Scalars(goal_distance))
+    if step.targets and tuple(step.targets) != tuple(task.goal_nodes):
+        target = min(float(world.graph.distance[step.pose.node, g]) for g in step.targets)
+        recording.log("plot/distance/current target", rr.Scalars(target))
+    recording.log("mode", rr.StateChange(state="sub-task" if step.mode is Mode.SUB else "main task"))
+    recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
+    log_thought(recording, step)
+    if isinstance(step.action, Ask):
+        state.requests += 1
+        log_reply(recording, world, step, state, pictures)
+    recording.log("plot/requests", rr.Scalars(state.requests))
+    recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
+    recording.log("text/dialogue", rr.TextDocument("\n\n".join(state.dialogue), media_type=rr.MediaType.MARKDOWN))
+    if step.next_pose.node != state.nodes[-1]:
+        state.nodes.append(step.next_pose.node)
+    state.count += 1
+
+
+def log_end(recording: rr.RecordingStream, world: World, task: Task, state: _Story, pictures: Pictures) -> None:
+    """Where it ended, and whether that was right."""
+    end = state.last.next_pose
+    log_sight(recording, world, end.node, end.yaw, end.pitch, pictures)
+    log_path(recording, world, state.nodes)
+    distance = min(float(world.graph.distance[end.node, g]) for g in task.goal_nodes)
+    recording.log("plot/distance/goal", rr.Scalars(distance))
+    verdict = "reached the goal" if distance <= task.radius else f"missed the goal by {distance:.1f} m"
+    state.dialogue.append(f"**Judge:** the agent {verdict}, after {state.count} steps and {state.requests} requests.")
+    recording.log("text/dialogue", rr.TextDocument("\n\n".join(state.dialogue), media_type=rr.MediaType.MARKDOWN))
+    recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
+
+
+def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float, pitch: float, pictures: Pictures) -> None:
+    """The agent's pose, what it sees ahead, and the panorama around it with its gaze in the middle."""
+    panorama = world.panorama(node)
+    height, width = pictures.view
+    view = panorama.view(yaw, pitch, VFOV, pictures.view)
+    recording.log("agent/camera", rr.Transform3D(translation=world.graph.positions[node], mat3x3=camera_axes(yaw, pitch)))
+    recording.log("agent/camera/image", rr.Pinhole(
+        fov_y=float(VFOV), aspect_ratio=width / height, width=width, height=height,
+        camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.9, color=PALETTE["agent"],
+    ), encoded(view.rgb, pictures.jpeg))
+    equirect = panorama.equirect(pictures.panorama)
+    shift = int(round(yaw / (2 * np.pi) * equirect.shape[1]))
+    recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), pictures.jpeg))
+    eye = world.graph.positions[node]
+    recording.log("agent/body", rr.Capsules3D(lengths=1.0, radii=0.2, translations=[eye - [0, 0, 1.3]], colors=(*PALETTE["agent"], 200)))
+
+
+def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> None:
+    """The path walked so far."""
+    points = world.graph.positions[nodes] - [0, 0, 1.4]
+    recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
+
+
+def log_reply(recording: rr.RecordingStream, world: World, step: Step, state: _Story, pictures: Pictures) -> None:
+    """The question, the answer, the route it speaks of and the picture that came with it."""
+    question = {Intention.HELP: "Can you help me?", Intention.CUR: "Where am I?", Intention.GOAL: "Where should I go?",
+                Intention.SUB: "Can you give me a nearer goal?"}[step.action.intention]
+    state.dialogue.append(f"**Agent** (step {state.count}): {question}")
+    reply = step.reply
+    if reply is None:
+        return
+    said = reply.text or ", ".join(f"{f.kind} {f.name}" for f in (reply.description or ())[:8])
+    state.dialogue.append(f"**Assistant:** {said}")
+    if reply.image is not None:
+        recording.log("view/target", encoded(sight_picture(world, reply.image, pictures.panorama), pictures.jpeg))
+    if reply.subtask is not None and reply.subtask.path:
+        points = world.graph.positions[list(reply.subtask.path)] - [0, 0, 1.37]
+        recording.log("agent/route", rr.LineStrips3D([points], radii=0.035, colors=PALETTE["route"]))
+
+
+def log_thought(recording: rr.RecordingStream, step: Step) -> None:
+    """The policy's own probabilities, where it gives them."""
+    thought = step.action.thought
+    if thought is None:
+        return
+    if thought.moves is not None:
+        recording.log("plot/moves", rr.BarChart(np.asarray(thought.moves)))
+    for name, p in (thought.asks or {}).items():
+        recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
+
+
+def instruction_text(step: Step) -> str:
+    """What the agent is trying to carry out right now, as Markdown."""
+    mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
+    helpers = "  \n*Somebody is near who can be asked.*" if step.can_ask else ""
+    return f"**{mode}**\n\n> {step.instruction}{helpers}"
+
+
+def event_text(world: World, step: Step) -> str:
+    """One line of the event log."""
+    room = world.graph.room_of_node[step.pose.node].replace("_", " ")
+    if isinstance(step.action, Move):
+        to = world.graph.room_of_node[step.next_pose.node].replace("_", " ")
+        return f"goes on in the {room}" if to == room else f"goes from the {room} to the {to}"
+    if isinstance(step.action, Stop):
+        return f"stops in the {room}"
+    return f"asks for help in the {room} ({step.action.intention.value})"
+
+
+def event_level(step: Step) -> str:
+    """Asking stands out in the log."""
+    return "WARN" if isinstance(step.action, Ask) else "INFO"
+
+
+def sight_picture(world: World, sight: Sight, height: int) -> np.ndarray:
+    """The equirectangular panorama of a Sight, (height, 2 height, 3) uint8."""
+    return world.panorama(world.node_of(sight)).equirect(height)
+
+
+def camera_axes(yaw: float, pitch: float) -> np.ndarray:
+    """(3, 3) with the camera's right, down and forward axes as columns, in the world's frame."""
+    ahead = rotation(yaw) @ [1.0, 0.0]
+    forward = np.array([*(ahead * np.cos(pitch)), np.sin(pitch)])
+    right = np.array([ahead[1], -ahead[0], 0.0])
+    return np.stack([right, np.cross(forward, right), forward], axis=1)
+
+
+def encoded(rgb: np.ndarray, quality: int) -> rr.EncodedImage:
+    """An RGB picture as JPEG."""
+    ok, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not ok:
+        raise ValueError(f"a picture of shape {rgb.shape} and type {rgb.dtype} cannot be encoded; expected (h, w, 3) uint8")
+    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
+
+
+def summary(episode: Episode) -> str:
+    """One line about an episode, for lists."""
+    return f"{episode.task.id}: “{episode.task.request}”, {len(episode.steps)} steps, {episode.requests} requests, ended by {episode.ended}"
