@@ -1,0 +1,42 @@
+"""LitPages: what baked light hands to the renderers. A house's surfaces with their light painted on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class LitMesh:
+    """The share of one owner in one page."""
+
+    owner: str
+    """Placement id or shell id, as in Part.owner."""
+    kind: str
+    """As in Part.kind."""
+    room: str
+    """As in Part.room."""
+    page: int
+    """Index into LitPages.pages."""
+    vertices: np.ndarray
+    """(n, 3) float32, metres, world."""
+    faces: np.ndarray
+    """(m, 3) int32, counter-clockwise seen from the visible side; list a two-sided face twice."""
+    uv: np.ndarray
+    """(n, 2) float32 in [0, 1]: u to the right, v DOWN (v = 0 is the upper edge of row 0 of the page)."""
+    alpha: float = 1.0
+    """Opacity; below 1 for glass and sheer curtains."""
+
+
+@dataclass(frozen=True, eq=False)
+class LitPages:
+    """A house as it is displayed: what a texel says is what a pixel shows, no lamp is added."""
+
+    meshes: tuple[LitMesh, ...]
+    pages: tuple[np.ndarray, ...]
+    """Each (h, w, 3) uint8, sRGB, row 0 on top."""
+    digest: str
+    """Hex digest of what the light depends on; part of the key of every panorama made with it."""
+    owners: tuple[str, ...] = ()
+    """parts.owners(house) of the house that was lit; checked by the renderer where given."""
