@@ -8,7 +8,6 @@ first use.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import json
@@ -19,7 +18,7 @@ from types import MappingProxyType
 import numpy as np
 
 from assets.cache import default_cache
-from assets.records import ROOM_KINDS, SUPPORTS, Asset, Finish, MeshPart, SupportSurface
+from assets.records import ROOM_KINDS, SUPPORTS, Asset, SupportSurface
 
 DATA = Path(__file__).parent / "data"
 
