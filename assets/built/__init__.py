@@ -1,0 +1,1 @@
+"""Things built in code: furniture and small objects that the asset packs lack."""

@@ -1,0 +1,452 @@
+"""Small solid shapes with smooth normals and uv in metres, from which things are built in code.
+
+Every function is pure. Points are (n, 3) float64 in metres; faces run counter-clockwise seen from
+outside. Texture coordinates are metres along the surface, u along the grain; `part` divides them
+by the finish's tile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from assets.records import Finish, MeshPart
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A mesh without a finish: (n, 3) vertices, (m, 3) faces, (n, 3) unit normals, (n, 2) uv in metres."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    uv: np.ndarray
+
+
+# ------------------------------------------------------------------ putting shapes together
+
+
+def joined(*shapes: Shape) -> Shape:
+    """All `shapes` as one."""
+    starts = np.cumsum([0, *(len(s.vertices) for s in shapes)])
+    return Shape(
+        np.concatenate([s.vertices for s in shapes]),
+        np.concatenate([s.faces + k for s, k in zip(shapes, starts)]),
+        np.concatenate([s.normals for s in shapes]),
+        np.concatenate([s.uv for s in shapes]),
+    )
+
+
+def part(finish: Finish, *shapes: Shape) -> MeshPart:
+    """`shapes` as one mesh of `finish`, uv divided by its tile."""
+    s = joined(*shapes)
+    return MeshPart(
+        s.vertices.astype(np.float32), s.faces.astype(np.int32), s.normals.astype(np.float32),
+        (s.uv / (finish.tile or 1.0)).astype(np.float32), finish,
+    )
+
+
+def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
+    return Shape(shape.vertices + [x, y, z], shape.faces, shape.normals, shape.uv)
+
+
+def turned(shape: Shape, angle: float, axis: str = "z") -> Shape:
+    """Turned by `angle` radians, right-handed, about an axis through the origin."""
+    i = "xyz".index(axis)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    m = np.eye(3)
+    m[j, j] = m[k, k] = np.cos(angle)
+    m[k, j] = np.sin(angle)
+    m[j, k] = -np.sin(angle)
+    return Shape(shape.vertices @ m.T, shape.faces, shape.normals @ m.T, shape.uv)
+
+
+def scaled(shape: Shape, x: float, y: float, z: float) -> Shape:
+    """Scaled along the axes; a negative factor mirrors and keeps faces outward."""
+    factors = np.array([x, y, z])
+    normals = shape.normals / factors
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    faces = shape.faces if np.prod(factors) > 0 else shape.faces[:, ::-1]
+    return Shape(shape.vertices * factors, faces, normals, shape.uv)
+
+
+def reversed_shape(shape: Shape) -> Shape:
+    """The same surface seen from its other side."""
+    return Shape(shape.vertices, shape.faces[:, ::-1], -shape.normals, shape.uv)
+
+
+def two_sided(shape: Shape) -> Shape:
+    return joined(shape, reversed_shape(shape))
+
+
+def shifted_uv(shape: Shape, u: float, v: float) -> Shape:
+    """The same shape cut from another place of its material, metres."""
+    return Shape(shape.vertices, shape.faces, shape.normals, shape.uv + [u, v])
+
+
+def swapped_uv(shape: Shape) -> Shape:
+    """The same shape with the grain running the other way."""
+    return Shape(shape.vertices, shape.faces, shape.normals, shape.uv[:, ::-1])
+
+
+def bounds(parts: Sequence[MeshPart]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (3,) of all parts, metres."""
+    return (np.min([p.vertices.min(0) for p in parts], axis=0), np.max([p.vertices.max(0) for p in parts], axis=0))
+
+
+def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, ...]:
+    """`parts` scaled and moved so that their box is exactly `size`, origin at the centre of its base."""
+    low, high = bounds(parts)
+    factors = np.asarray(size, float) / np.maximum(high - low, 1e-9)
+    origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    done = []
+    for p in parts:
+        normals = p.normals / factors
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        vertices = (p.vertices - origin) * factors
+        done.append(MeshPart(vertices.astype(np.float32), p.faces, normals.astype(np.float32), p.uv, p.finish))
+    return tuple(done)
+
+
+# ------------------------------------------------------------------ flat things
+
+
+def quads(corners: np.ndarray, uv: np.ndarray | None = None) -> Shape:
+    """Flat quadrilaterals (m, 4, 3), counter-clockwise; uv (m, 4, 2) metres or projected along the face."""
+    corners = np.asarray(corners, float).reshape(-1, 4, 3)
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    m = len(corners)
+    base = 4 * np.arange(m)[:, None]
+    faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]], axis=1).reshape(-1, 3)
+    vertices, normals = corners.reshape(-1, 3), np.repeat(normals, 4, axis=0)
+    uv = projected_uv(vertices, normals) if uv is None else np.asarray(uv, float).reshape(-1, 2)
+    return Shape(vertices, faces, normals, uv)
+
+
+def projected_uv(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """uv (n, 2) in metres by projection along the axis each normal is closest to, z upward as v."""
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.sign(np.take_along_axis(normals, axis[:, None], 1)[:, 0])
+    x, y, z = points.T
+    u = np.select([axis == 0, axis == 1], [y * sign, -x * sign], x)
+    v = np.select([axis == 0, axis == 1], [z, z], y * sign)
+    return np.stack([u, v], axis=1)
+
+
+def flat(polygon: shapely.Geometry, z: float = 0.0, up: bool = True) -> Shape:
+    """A horizontal polygon (holes allowed) at height z, facing up or down; uv = x, y in metres."""
+    shape_points, faces = [], []
+    triangles = shapely.constrained_delaunay_triangles(polygon)
+    for t in shapely.get_parts(triangles):
+        ring = np.asarray(t.exterior.coords)[:3]
+        a, b, c = ring
+        if abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) < 1e-12:
+            continue
+        if ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0) != up:
+            ring = ring[::-1]
+        faces.append(len(shape_points) + np.arange(3))
+        shape_points.extend(ring[:, :2])
+    points = np.asarray(shape_points, float).reshape(-1, 2)
+    points, inverse = np.unique(np.round(points, 9), axis=0, return_inverse=True)
+    vertices = np.column_stack([points, np.full(len(points), z)])
+    normals = np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(points), 1))
+    faces = inverse.reshape(-1)[np.asarray(faces, int).reshape(-1, 3)]
+    return Shape(vertices, faces, normals, points.copy())
+
+
+def extruded(polygon: shapely.Polygon, z0: float, z1: float, bevel: float = 0.0) -> Shape:
+    """A prism over `polygon` from z0 to z1; `bevel` chamfers the upper edge."""
+    polygon = shapely.geometry.polygon.orient(polygon)
+    rings = [polygon.exterior, *polygon.interiors]
+    top = polygon.buffer(-bevel, join_style="mitre") if bevel else polygon
+    if len(shapely.get_coordinates(top)) != len(shapely.get_coordinates(polygon)):
+        top, bevel = polygon, 0.0  # too fine an outline to inset corner by corner
+    shapes = [flat(polygon, z0, up=False), flat(top, z1)]
+    for ring in rings:
+        p = np.asarray(ring.coords)[:-1]
+        shapes.append(wall_band(p, z0, z1 - bevel))
+    if bevel:
+        # The chamfer: a flat ring between outline and inset, split along matching corners.
+        for ring, inner in zip(rings, [top.exterior, *top.interiors]):
+            p, q = np.asarray(ring.coords)[:-1], np.asarray(shapely.geometry.polygon.orient(
+                shapely.Polygon(inner), 1 if ring is rings[0] else -1).exterior.coords)[:-1]
+            q = np.roll(q, -int(np.argmin(np.linalg.norm(q - p[0], axis=1))), axis=0)
+            shapes.append(_band_between(p, z1 - bevel, q, z1))
+    return joined(*shapes)
+
+
+def wall_band(ring: np.ndarray, z0: float, z1: float) -> Shape:
+    """Vertical band under a closed ring (k, 2), facing outward for a counter-clockwise ring."""
+    return _band_between(ring, z0, ring, z1)
+
+
+def _band_between(low: np.ndarray, z0: float, high: np.ndarray, z1: float) -> Shape:
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(low, -1, 0) - low, axis=1))])
+    a = np.column_stack([low, np.full(len(low), z0)])
+    b = np.column_stack([high, np.full(len(high), z1)])
+    corners = np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1)
+    uv = np.empty((len(low), 4, 2))
+    uv[:, [0, 3], 0], uv[:, [1, 2], 0] = along[:-1, None], along[1:, None]
+    uv[:, :2, 1], uv[:, 2:, 1] = z0, z1
+    return quads(corners, uv)
+
+
+# ------------------------------------------------------------------ boxes
+
+
+def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shape:
+    """An axis-aligned box from corner `low` to corner `high`, its edges rounded off by `bevel` metres.
+
+    The bevel shares the faces' vertices, so that shading runs smoothly around the edge. The grain
+    (u) follows the longest side.
+    """
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    middle, half = (low + high) / 2, (high - low) / 2
+    bevel = float(min(bevel, 0.49 * half.min() * 2 * 0.5))
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
+    vertices, normals, faces = np.zeros((24, 3)), np.zeros((24, 3)), []
+    for f in range(6):
+        i, s = f // 2, 1.0 if f % 2 else -1.0
+        j, k = (i + 1) % 3, (i + 2) % 3
+        corner = signs if s > 0 else signs[::-1]
+        v = vertices[4 * f: 4 * f + 4]
+        v[:, i], v[:, j], v[:, k] = s * half[i], corner[:, 0] * (half[j] - bevel), corner[:, 1] * (half[k] - bevel)
+        normals[4 * f: 4 * f + 4, i] = s
+        faces += [[4 * f, 4 * f + 1, 4 * f + 2], [4 * f, 4 * f + 2, 4 * f + 3]]
+    if bevel > 0:
+        faces += _bevel_faces(vertices)
+    longest = int(half.argmax())
+    uv = projected_uv(vertices + middle, normals)
+    u_axis = np.select([np.abs(normals[:, 0]) > 0.5, np.abs(normals[:, 1]) > 0.5], [1, 0], 0)
+    v_axis = np.select([np.abs(normals[:, 0]) > 0.5, np.abs(normals[:, 1]) > 0.5], [2, 2], 1)
+    swap = (v_axis == longest) | ((u_axis != longest) & (half[v_axis] > half[u_axis]))
+    uv[swap] = uv[swap][:, ::-1]
+    return Shape(vertices + middle, np.asarray(faces), normals, uv)
+
+
+def _bevel_faces(vertices: np.ndarray) -> list[list[int]]:
+    """Edge strips and corner triangles between the six inset faces of a box centred at 0."""
+    octant = {}
+    for n, v in enumerate(vertices):
+        octant[(n // 8, *(v > 0).tolist())] = n
+    faces = []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for sj in (False, True):
+            for sk in (False, True):
+                ends = []
+                for si in (False, True):
+                    key = [False] * 3
+                    key[i], key[j], key[k] = si, sj, sk
+                    ends.append((octant[(j, *key)], octant[(k, *key)]))
+                (a, b), (c, d) = ends
+                faces += [[a, c, d], [a, d, b]]
+    for sx in (False, True):
+        for sy in (False, True):
+            for sz in (False, True):
+                faces.append([octant[(0, sx, sy, sz)], octant[(1, sx, sy, sz)], octant[(2, sx, sy, sz)]])
+    done = []
+    for f in faces:
+        p = vertices[f]
+        outward = np.dot(np.cross(p[1] - p[0], p[2] - p[0]), p.mean(0)) > 0
+        done.append(f if outward else f[::-1])
+    return done
+
+
+def bar(a: Sequence[float], b: Sequence[float], width: float, height: float, bevel: float = 0.0) -> Shape:
+    """A straight beam from a to b, `width` across (level) and `height` thick (upright), metres."""
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    length = float(np.linalg.norm(b - a))
+    x = (b - a) / length
+    side = np.cross([0.0, 0.0, 1.0], x)
+    side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([0.0, 1.0, 0.0])
+    m = np.stack([x, side, np.cross(x, side)], axis=1)
+    s = box([0, -width / 2, -height / 2], [length, width / 2, height / 2], bevel)
+    return Shape(s.vertices @ m.T + a, s.faces, s.normals @ m.T, s.uv)
+
+
+# ------------------------------------------------------------------ round things
+
+
+def lathe(profile: Sequence[Sequence[float]], segments: int = 24, crease: float = 0.7) -> Shape:
+    """A surface of revolution about z of `profile` (k, 2): radius, height.
+
+    Outside is to the right of the profile's direction: run it bottom-centre, outside, up, and down
+    the inside. Corners sharper than `crease` radians get split normals.
+    """
+    p = np.asarray(profile, float)
+    keep = np.concatenate([[True], np.linalg.norm(np.diff(p, axis=0), axis=1) > 1e-7])
+    p = p[keep]
+    d = np.diff(p, axis=0)
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    outward = np.stack([d[:, 1], -d[:, 0]], axis=1)
+    rows, row_normals, bands = [], [], []
+    for i in range(len(d)):
+        turn = np.arccos(np.clip(d[i - 1] @ d[i], -1, 1)) if i else np.pi
+        if i and turn < crease:
+            first = len(rows) - 1
+            mixed = outward[i - 1] + outward[i]
+            row_normals[first] = mixed / np.linalg.norm(mixed)
+        else:
+            first = len(rows)
+            rows.append(p[i])
+            row_normals.append(outward[i])
+        rows.append(p[i + 1])
+        row_normals.append(outward[i])
+        bands.append((first, len(rows) - 1))
+    rows, row_normals = np.asarray(rows), np.asarray(row_normals)
+    angle = np.linspace(0, 2 * np.pi, segments + 1)
+    c, s = np.cos(angle), np.sin(angle)
+    vertices = np.stack([rows[:, :1] * c, rows[:, :1] * s, np.repeat(rows[:, 1:], segments + 1, 1)], axis=-1)
+    normals = np.stack([row_normals[:, :1] * c, row_normals[:, :1] * s,
+                        np.repeat(row_normals[:, 1:], segments + 1, 1)], axis=-1)
+    along = np.zeros(len(rows))
+    for a, b in bands:
+        along[b] = along[a] + np.linalg.norm(rows[b] - rows[a])
+        if b + 1 < len(rows):
+            along[b + 1] = along[b]
+    reach = max(float(rows[:, 0].max()), 1e-6)
+    uv = np.stack(np.broadcast_arrays(angle[None] * reach, along[:, None]), axis=-1)
+    w, faces = segments + 1, []
+    k = np.arange(segments)
+    for a, b in bands:
+        quad = np.stack([a * w + k, a * w + k + 1, b * w + k + 1, b * w + k], axis=1)
+        if rows[a, 0] > 1e-9:
+            faces.append(quad[:, [0, 1, 2]])
+        if rows[b, 0] > 1e-9:
+            faces.append(quad[:, [0, 2, 3]])
+    return Shape(vertices.reshape(-1, 3), np.concatenate(faces), normals.reshape(-1, 3), uv.reshape(-1, 2))
+
+
+def cylinder(radius: float, z0: float, z1: float, bevel: float = 0.0, segments: int = 20) -> Shape:
+    """An upright closed cylinder about the z axis."""
+    b = min(bevel, radius * 0.45, (z1 - z0) * 0.45)
+    if b <= 0:
+        return lathe([(0, z0), (radius, z0), (radius, z1), (0, z1)], segments)
+    return lathe([(0, z0), (radius - b, z0), (radius, z0 + b), (radius, z1 - b), (radius - b, z1), (0, z1)], segments, 0.9)
+
+
+def ball(radius: float, segments: int = 16, rings: int = 9) -> Shape:
+    t = np.linspace(-np.pi / 2, np.pi / 2, rings)
+    return lathe(np.column_stack([np.abs(np.cos(t)) * radius * (np.abs(t) < 1.57), np.sin(t) * radius]), segments, 2.0)
+
+
+def tube(path: Sequence[Sequence[float]], radius: float | Sequence[float], segments: int = 8,
+         closed: bool = False, caps: bool = True) -> Shape:
+    """A round pipe along `path` (k, 3); `radius` in metres, one or one per point."""
+    p = np.asarray(path, float)
+    k = len(p)
+    r = np.broadcast_to(np.asarray(radius, float), (k,))
+    tangent = (np.roll(p, -1, 0) - np.roll(p, 1, 0)) if closed else np.gradient(p, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    side = np.empty_like(p)
+    start = np.eye(3)[np.abs(tangent[0]).argmin()]
+    for i in range(k):
+        start = start - tangent[i] * (start @ tangent[i])
+        start = start / np.linalg.norm(start)
+        side[i] = start
+    other = np.cross(tangent, side)
+    angle = np.linspace(0, 2 * np.pi, segments + 1)
+    normals = side[:, None] * np.cos(angle)[None, :, None] + other[:, None] * np.sin(angle)[None, :, None]
+    vertices = p[:, None] + normals * r[:, None, None]
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
+    if closed:
+        vertices, normals = np.concatenate([vertices, vertices[:1]]), np.concatenate([normals, normals[:1]])
+        along = np.append(along, along[-1] + np.linalg.norm(p[0] - p[-1]))
+    uv = np.stack(np.broadcast_arrays(along[:, None], angle[None] * r.max()), axis=-1)
+    shape = _grid(vertices, normals, uv)
+    if closed or not caps:
+        return shape
+    ends = []
+    for i, sign in ((0, -1.0), (k - 1, 1.0)):
+        ring = vertices[i, :-1]
+        rim = np.concatenate([p[i][None], ring])
+        j = np.arange(segments)
+        f = np.stack([np.zeros(segments, int), 1 + j, 1 + (j + 1) % segments], axis=1)
+        n = np.tile(tangent[i] * sign, (len(rim), 1))
+        ends.append(Shape(rim, f if sign > 0 else f[:, ::-1], n, np.zeros((len(rim), 2))))
+    return joined(shape, *ends)
+
+
+# ------------------------------------------------------------------ soft things
+
+
+def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
+    """A smooth surface through a grid of points (r, c, 3); rows run up, columns run right, seen from its front.
+
+    With a `thickness` it becomes a closed slab, the given points its front.
+    """
+    p = np.asarray(points, float)
+    normals = _grid_normals(p)
+    across = np.concatenate([np.zeros((len(p), 1)), np.cumsum(np.linalg.norm(np.diff(p, axis=1), axis=2), axis=1)], axis=1)
+    up = np.concatenate([np.zeros((1, p.shape[1])), np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=2), axis=0)])
+    uv = np.stack([across, up], axis=-1)
+    front = _grid(p, normals, uv)
+    if thickness <= 0:
+        return front
+    q = p - normals * thickness
+    back = reversed_shape(_grid(q, normals, uv))
+    r, c = p.shape[:2]
+    rim = [(0, j) for j in range(c)] + [(i, c - 1) for i in range(1, r)]
+    rim += [(r - 1, j) for j in range(c - 2, -1, -1)] + [(i, 0) for i in range(r - 2, 0, -1)]
+    i, j = np.array(rim).T
+    a, b = q[i, j], p[i, j]
+    edge = quads(np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1))
+    return joined(front, back, edge)
+
+
+def _grid_normals(p: np.ndarray) -> np.ndarray:
+    du, dv = np.gradient(p, axis=1), np.gradient(p, axis=0)
+    n = np.cross(du, dv)
+    return n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-12)
+
+
+def _grid(points: np.ndarray, normals: np.ndarray, uv: np.ndarray) -> Shape:
+    r, c = points.shape[:2]
+    i, j = (x.reshape(-1) for x in np.meshgrid(np.arange(r - 1), np.arange(c - 1), indexing="ij"))
+    a, b, d, e = i * c + j, i * c + j + 1, (i + 1) * c + j + 1, (i + 1) * c + j
+    faces = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, e], 1)])
+    return Shape(points.reshape(-1, 3), faces, normals.reshape(-1, 3), uv.reshape(-1, 2))
+
+
+def pillow(width: float, depth: float, height: float, cells: int = 14, roundness: float = 0.35,
+           waves: np.ndarray | None = None) -> Shape:
+    """A stuffed cushion lying flat: pointed corners, a seam around its middle, origin at its centre.
+
+    waves: optional (cells + 1, cells + 1) metres added to the upper side, zero at the rim.
+    """
+    t = np.linspace(-1, 1, cells + 1)
+    t = np.sign(t) * np.abs(t) ** 0.8
+    x, y = np.meshgrid(t, t)
+    puff = ((1 - x**4) * (1 - y**4)) ** roundness
+    pinch = 1 - 0.06 * (1 - np.abs(np.stack([y, x])) ** 2) * np.abs(np.stack([x, y])) ** 6
+    px, py = x * pinch[0] * width / 2, y * pinch[1] * depth / 2
+    rise = puff * height / 2
+    bump = 0.0 if waves is None else waves * puff
+    top = sheet(np.stack([px, py, rise + bump], axis=-1))
+    low = sheet(np.stack([px, py, -rise], axis=-1))
+    return joined(top, reversed_shape(low))
+
+
+def folds(width: float, height: float, count: float, depth: float, *, rng: np.random.Generator,
+          columns: int | None = None, rows: int = 8, gather: float = 0.0) -> np.ndarray:
+    """Grid (rows + 1, columns + 1, 3) of hanging cloth in the xz plane facing -y, z from 0 to height.
+
+    `count` folds of +-`depth` metres, irregular in width and swing; `gather` narrows it toward the top.
+    """
+    columns = columns or int(count * 8)
+    s = np.linspace(0, 1, columns + 1)
+    wobble = np.cumsum(rng.normal(0, 1, columns + 1))
+    wobble = (wobble - np.linspace(wobble[0], wobble[-1], columns + 1)) / max(np.abs(wobble).max(), 1e-9)
+    phase = 2 * np.pi * count * s + 0.9 * wobble
+    amplitude = depth * (0.75 + 0.25 * np.sin(2 * np.pi * s * rng.uniform(1, 3) + rng.uniform(0, 6)))
+    z = np.linspace(0, height, rows + 1)[:, None]
+    drop = 1 - z / height
+    y = -amplitude * np.sin(phase + 0.25 * drop * np.sin(3 * phase / count + 1.0)) * (0.55 + 0.45 * drop)
+    x = (s - 0.5)[None] * width * (1 - gather * (z / height))
+    x = x + 0.35 * depth * np.cos(2 * phase) * drop * 0.3
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)

@@ -1,0 +1,1 @@
+"""Procedural, physically scaled, seamlessly tileable materials."""

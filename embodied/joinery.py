@@ -1,0 +1,367 @@
+"""What fills the openings: reveals, window frames with panes and sills, door linings, casings and leaves.
+
+An opening is built in its own frame: x from jamb p to jamb q along the wall's centre line, y into
+the first room, z up from the storey's floor; `_Hole.world` carries it into the house.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from assets.built.primitives import Shape, box, cylinder, joined, moved, part, quads, scaled, tube, turned, two_sided
+from assets.records import Finish
+from embodied.house import House, Opening
+from embodied.outdoors import facade_finish
+from embodied.part import Part
+from embodied.seeds import stream
+from embodied.walls import floor_turn, turned_uv
+
+PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
+"""Owners of an opening are '<opening>/<piece>'."""
+
+GLASS = Finish(color=(0.86, 0.93, 0.92, 0.08), roughness=0.02, specular=0.5)
+METAL = Finish(color=(0.72, 0.71, 0.69, 1.0), roughness=0.32, metallic=1.0)
+STONE_SILL = Finish(color=(0.78, 0.77, 0.74, 1.0), roughness=0.35)
+
+LINING = 0.025
+"""Thickness of a door's lining, metres; it stands inside the hole."""
+CASING = (0.065, 0.015)
+"""Width and thickness of the boards around a door, metres."""
+LEAF_STYLES = ("flat", "two_panels", "four_panels", "three_panels")
+
+
+@dataclass(frozen=True, eq=False)
+class _Hole:
+    opening: Opening
+    length: float
+    origin: tuple[float, float, float]
+    yaw: float
+    inside: float
+    """y of the first room's wall face."""
+    outside: float
+    """y of the far face: the second room's wall or the facade."""
+    hinge_at_origin: bool
+
+    def world(self, shape: Shape) -> Shape:
+        return moved(turned(shape, self.yaw), *self.origin)
+
+    def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return (self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, self.origin[2] + z)
+
+
+def casing_width(opening: Opening) -> float:
+    """How far the boards around a door reach beyond its hole, metres; skirting stops there."""
+    return CASING[0] if opening.kind in ("door", "front_door", "back_door") or _cased(opening) else 0.0
+
+
+def _cased(opening: Opening) -> bool:
+    return opening.kind == "passage" and opening.leaf_finish is not None
+
+
+def hole_frame(house: House, opening: Opening) -> _Hole:
+    """The opening's own frame in the house."""
+    room = house.room_by_id[opening.rooms[0]]
+    p, q = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    d = (q - p) / np.linalg.norm(q - p)
+    probe = (p + q) / 2 + 0.03 * np.array([-d[1], d[0]])
+    flipped = not shapely.Polygon(room.polygon).contains(shapely.Point(probe))
+    if flipped:
+        p, q, d = q, p, -d
+    half = house.inner_wall / 2
+    far = -half if opening.rooms[1] is not None else -(house.outer_wall - half)
+    z = house.storey_of(room).elevation
+    return _Hole(opening, float(np.linalg.norm(q - p)), (float(p[0]), float(p[1]), z),
+                 math.atan2(d[1], d[0]), half, far, (opening.hinge == "a") != flipped)
+
+
+def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish]) -> list[Part]:
+    """Everything that belongs to one opening."""
+    hole = hole_frame(house, opening)
+    if opening.kind in ("window", "french_window"):
+        return _window(house, hole, finish)
+    if opening.kind == "passage" and opening.leaf_finish is None:
+        return _passage(house, hole, finish)
+    return _door(house, hole, finish)
+
+
+def _part(hole: _Hole, piece: str, kind: str, finish: Finish, *shapes: Shape, tag: str = "") -> Part:
+    owner = f"{hole.opening.id}/{piece}"
+    return Part(owner, kind, hole.opening.rooms[0], part(finish, hole.world(joined(*shapes))), owner + tag)
+
+
+# ------------------------------------------------------------------ the hole's own surfaces
+
+
+def _tunnel(hole: _Hole, y0: float, y1: float, floor: bool) -> Shape:
+    """Jambs and head (and the floor of the hole) from depth y0 to y1, looking into the hole."""
+    w, z0, z1 = hole.length, hole.opening.sill, hole.opening.head
+    corners = [
+        [(0, y1, z0), (0, y0, z0), (0, y0, z1), (0, y1, z1)],
+        [(w, y0, z0), (w, y1, z0), (w, y1, z1), (w, y0, z1)],
+        [(0, y0, z1), (w, y0, z1), (w, y1, z1), (0, y1, z1)],
+    ]
+    if floor:
+        corners.append([(0, y0, z0), (0, y1, z0), (w, y1, z0), (w, y0, z0)][::-1])
+    return quads(np.asarray(corners, float))
+
+
+def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable[[str], Finish]) -> list[Part]:
+    """The floor through a doorway, laid in line with the floor it continues."""
+    o = hole.opening
+    first = house.room_by_id[o.rooms[0]]
+    second = house.room_by_id[o.rooms[1]] if o.rooms[1] is not None else first
+    strip = hole.world(quads([[(0, y0, 0), (hole.length, y0, 0), (hole.length, y1, 0), (0, y1, 0)]]))
+    strip = Shape(strip.vertices, strip.faces, strip.normals, strip.vertices[:, :2].copy())
+    owner = f"{o.id}/threshold"
+    parts = [Part(owner, "floor", first.id, part(finish(second.floor_finish), turned_uv(strip, floor_turn(house))), owner)]
+    if first.floor_finish != second.floor_finish:
+        bar = box([LINING if o.kind != "passage" else 0, y1 - 0.028, -0.001],
+                  [hole.length - (LINING if o.kind != "passage" else 0), y1 - 0.002, 0.0035], 0.0015)
+        parts.append(Part(owner, "floor", first.id, part(METAL, hole.world(bar)), owner + "#bar"))
+    return parts
+
+
+def _passage(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:
+    room = house.room_by_id[hole.opening.rooms[0]]
+    reveal = _part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, hole.outside, hole.inside, False))
+    return [reveal, *_threshold(house, hole, hole.outside, hole.inside, finish)]
+
+
+# ------------------------------------------------------------------ windows
+
+
+def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:
+    o = hole.opening
+    room = house.room_by_id[o.rooms[0]]
+    frame_finish = finish(o.leaf_finish or "paint_white/0")
+    outdoors = o.rooms[1] is None
+    y0 = hole.outside + (0.10 if outdoors else 0.025)
+    y1 = y0 + 0.07
+    french = o.kind == "french_window" or o.sill < 0.05
+    frame, panes, handles = _sashes(house, hole, y0, y1, french)
+    parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1, hole.inside, False))]
+    outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
+    parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
+    parts.append(_part(hole, "frame", "opening", frame_finish, frame))
+    parts.append(_part(hole, "glass", "opening", GLASS, panes))
+    if handles:
+        parts.append(_part(hole, "handle", "opening", METAL, *handles))
+    if french:
+        parts += _threshold(house, hole, y1, hole.inside, finish)
+    else:
+        board = [box([0.0, y1, o.sill - 0.002], [hole.length, hole.inside, o.sill + 0.022])]
+        board.append(box([-0.035, hole.inside, o.sill - 0.002], [hole.length + 0.035, hole.inside + 0.04, o.sill + 0.022], 0.005))
+        stone = stream(house.seed, "joinery", "sill").random() < 0.4
+        parts.append(_part(hole, "sill", "opening", STONE_SILL if stone else frame_finish, *board))
+    return parts
+
+
+def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tuple[Shape, Shape, list[Shape]]:
+    """Fixed frame with one to five casements; their panes; their handles."""
+    o = hole.opening
+    w, z0, z1 = hole.length, o.sill, o.head
+    outer, sash = 0.045, 0.055
+    count = max(1, min(6, round(w / (0.85 if french else 0.95))))
+    bars = stream(house.seed, "joinery", "bars").random() < 0.3
+    frame = _ring(0, w, z0, z1, outer, y0, y1, 0.004)
+    cells = np.linspace(outer, w - outer, count + 1)
+    panes, handles = [], []
+    for i in range(count):
+        x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
+        b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
+        frame += _ring(x0, x1, b0, b1, sash, y0 + 0.012, y1 + 0.012, 0.006, low=0.12 if french else sash)
+        gx0, gx1, gz0, gz1 = x0 + sash - 0.006, x1 - sash + 0.006, b0 + (0.12 if french else sash) - 0.006, b1 - sash + 0.006
+        ym = (y0 + y1) / 2
+        pane = quads([[(gx1, ym, gz0), (gx0, ym, gz0), (gx0, ym, gz1), (gx1, ym, gz1)]])
+        panes.append(two_sided(pane))
+        if bars:
+            for k in range(1, max(1, round((gz1 - gz0) / 0.5))):
+                zb = gz0 + (gz1 - gz0) * k / max(1, round((gz1 - gz0) / 0.5))
+                frame.append(box([gx0, ym - 0.012, zb - 0.011], [gx1, ym + 0.012, zb + 0.011], 0.003))
+            if gx1 - gx0 > 0.45:
+                xb = (gx0 + gx1) / 2
+                frame.append(box([xb - 0.011, ym - 0.0125, gz0], [xb + 0.011, ym + 0.0125, gz1], 0.003))
+        if i % 2 == 0:
+            xh = x1 - sash / 2
+            zh = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
+            handles.append(_window_handle(xh, y1 + 0.012, zh))
+    return joined(*frame), joined(*panes), handles
+
+
+def _ring(x0: float, x1: float, z0: float, z1: float, width: float, y0: float, y1: float,
+          bevel: float, low: float | None = None) -> list[Shape]:
+    """Four boards around a rectangle; `low` is the height of the bottom one."""
+    low = width if low is None else low
+    return [
+        box([x0, y0, z0], [x0 + width, y1, z1], bevel),
+        box([x1 - width, y0, z0], [x1, y1, z1], bevel),
+        box([x0 + width, y0, z1 - width], [x1 - width, y1, z1], bevel),
+        box([x0 + width, y0, z0], [x1 - width, y1, z0 + low], bevel),
+    ]
+
+
+def _window_handle(x: float, y: float, z: float) -> Shape:
+    plate = box([x - 0.014, y, z - 0.035], [x + 0.014, y + 0.01, z + 0.035], 0.004)
+    grip = tube([(x, y + 0.008, z), (x, y + 0.035, z), (x, y + 0.042, z - 0.012), (x, y + 0.042, z - 0.11)], 0.008, 8)
+    return joined(plate, grip)
+
+
+# ------------------------------------------------------------------ doors
+
+
+def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:
+    o = hole.opening
+    wood = finish(o.leaf_finish or "paint_white/0")
+    outdoors = o.rooms[1] is None
+    y0 = hole.inside - 0.10 if outdoors else hole.outside
+    parts = [_part(hole, "frame", "opening", wood, *_lining(hole, y0, hole.inside),
+                   *_casing(hole, hole.inside, 1.0), *([] if outdoors else _casing(hole, hole.outside, -1.0)))]
+    if outdoors:
+        parts.append(_part(hole, "reveal", "wall", finish(facade_finish(house)), _tunnel(hole, hole.outside, y0, True)))
+    parts += _threshold(house, hole, y0, hole.inside, finish)
+    if o.kind == "garage_door":
+        parts.append(_part(hole, "leaf", "opening", wood, *_sections(hole)))
+    elif o.kind != "passage":
+        parts += _leaves(house, hole, wood)
+    return parts
+
+
+def _lining(hole: _Hole, y0: float, y1: float) -> list[Shape]:
+    w, head, t = hole.length, hole.opening.head, LINING
+    stop = y1 - 0.045
+    boards = [box([0, y0, 0], [t, y1, head]), box([w - t, y0, 0], [w, y1, head]), box([t, y0, head - t], [w - t, y1, head])]
+    if hole.opening.kind in ("door", "front_door", "back_door"):
+        s = t + 0.012
+        boards += [box([t, y0 + 0.004, 0], [s, stop, head - t], 0.002),
+                   box([w - s, y0 + 0.004, 0], [w - t, stop, head - t], 0.002),
+                   box([s, y0 + 0.004, head - s], [w - s, stop, head - t], 0.002)]
+    return boards
+
+
+def _casing(hole: _Hole, y: float, side: float) -> list[Shape]:
+    """Boards on the wall around the hole, mitred at the corners, standing out by CASING[1] towards `side`."""
+    w, head = hole.length, hole.opening.head
+    wide, thick = CASING
+    i = 0.006  # the casing leaves a small step on the lining
+    inner = np.array([(i, 0), (i, head - i), (w - i, head - i), (w - i, 0)])
+    outer = np.array([(-wide, 0), (-wide, head + wide), (w + wide, head + wide), (w + wide, 0)])
+    ridge = inner + (outer - inner) * 0.72
+    lip = inner + (outer - inner) * 0.06
+    lines = [(inner, 0.0), (inner, thick * 0.55), (lip, thick * 0.7), (ridge, thick), (outer, thick * 0.9), (outer, 0.0)]
+    corners = []
+    for (a, ya), (b, yb) in itertools.pairwise(lines):
+        for k in range(3):
+            quad = [(a[k], ya), (b[k], yb), (b[k + 1], yb), (a[k + 1], ya)]
+            quad = [(x, y + side * depth, z) for (x, z), depth in quad]
+            corners.append(quad if side > 0 else quad[::-1])
+    return [_grain_up(quads(np.asarray(corners, float)))]
+
+
+def _grain_up(shape: Shape) -> Shape:
+    """uv with the grain (u) along z, as boards of a frame are cut."""
+    return Shape(shape.vertices, shape.faces, shape.normals, np.stack([shape.uv[:, 1], shape.uv[:, 0]], axis=1))
+
+
+def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
+    """One leaf, or two from 1.25 m on, at the opening's angle; hinges on the first room's side."""
+    o = hole.opening
+    clear = hole.length - 2 * LINING - 0.006
+    pair = clear > 1.2
+    width = clear / 2 - 0.0015 if pair else clear
+    height = o.head - LINING - 0.004 - 0.006
+    style = LEAF_STYLES[int(stream(house.seed, "joinery", "leaf").integers(len(LEAF_STYLES)))]
+    thick = 0.042 if o.kind == "door" else 0.058
+    glazed = o.kind == "back_door"
+    wood_shape, panes = _leaf(width, height, thick, "glazed" if glazed else style)
+    handle = _lever(width - 0.06, thick)
+    parts = []
+    for n, at_origin in enumerate((hole.hinge_at_origin, not hole.hinge_at_origin) if pair else (hole.hinge_at_origin,)):
+        side = 1.0 if at_origin else -1.0
+        x = LINING + 0.003 if at_origin else hole.length - LINING - 0.003
+        pivot = hole.point(x, hole.inside + CASING[1], 0.006)
+        yaw = hole.yaw + side * o.angle
+        piece = "leaf" if n == 0 else "leaf_2"
+        stem = f"leaf/{style}/{o.kind}/{width:.4f}/{height:.4f}/{side:+.0f}"
+        pieces = [(piece, wood, wood_shape, f"{stem}/{o.leaf_finish}"), ("handle", METAL, handle, stem + "/handle")]
+        if panes is not None:
+            pieces.append(("glass", GLASS, panes, stem + "/glass"))
+        for name, material, shape, key in pieces:
+            mesh = part(material, scaled(shape, side, 1, 1))
+            parts.append(Part(f"{o.id}/{name}", "opening", o.rooms[0], mesh, key, pivot, yaw))
+    return parts
+
+
+def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape, Shape | None]:
+    """A leaf from its hinge at x = 0, its room side at y = 0: stiles, rails and recessed panels or a pane."""
+    if style == "flat":
+        return box([0, -thick, 0], [width, 0, height], 0.0025), None
+    stile, top, lock = 0.105, 0.11, 0.15
+    rows = {"two_panels": [(0.2, 0.95), (0.95 + lock, height - top)], "four_panels": [(0.2, 0.85), (0.85 + lock, height - top)],
+            "three_panels": [(0.2, 0.75), (0.75 + 0.1, 1.35), (1.35 + 0.1, height - top)],
+            "glazed": [(0.22, 0.85), (0.85 + 0.12, height - top)]}[style]
+    columns = [(stile, width - stile)]
+    if style == "four_panels" and width > 0.5:
+        columns = [(stile, width / 2 - 0.045), (width / 2 + 0.045, width - stile)]
+    shapes = [box([0, -thick, 0], [stile, 0, height], 0.002), box([width - stile, -thick, 0], [width, 0, height], 0.002)]
+    heights = [0.0, *(z for row in rows for z in row), height]
+    for z0, z1 in zip(heights[::2], heights[1::2]):
+        shapes.append(box([stile, -thick, z0], [width - stile, 0, z1], 0.0015))
+    if len(columns) == 2:
+        for z0, z1 in rows:
+            shapes.append(box([columns[0][1], -thick, z0], [columns[1][0], 0, z1], 0.0015))
+    panes = []
+    for r, (z0, z1) in enumerate(rows):
+        for x0, x1 in columns:
+            if style == "glazed" and r == 1:
+                ym = -thick / 2
+                panes.append(two_sided(quads([[(x1, ym, z0), (x0, ym, z0), (x0, ym, z1), (x1, ym, z1)]])))
+            else:
+                shapes.append(_panel(x0, x1, z0, z1, thick))
+    return joined(*shapes), joined(*panes) if panes else None
+
+
+def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
+    """A panel between stiles, sunk by a third of the leaf, with a sloping moulding on both sides."""
+    sunk, slope = thick * 0.28, 0.022
+    rings = [((x0, z0), (x1, z1)), ((x0 + slope, z0 + slope), (x1 - slope, z1 - slope))]
+    corners = []
+    (a, b), (c, d) = rings
+    outer = [(a[0], a[1]), (b[0], a[1]), (b[0], b[1]), (a[0], b[1])]
+    inner = [(c[0], c[1]), (d[0], c[1]), (d[0], d[1]), (c[0], d[1])]
+    for face, flip in ((0.0, False), (-thick, True)):
+        sign = -1.0 if not flip else 1.0
+        quad = [(x, face + sign * sunk, z) for x, z in inner]
+        corners.append(quad[::-1] if not flip else quad)
+        for k in range(4):
+            m = (k + 1) % 4
+            quad = [(outer[k][0], face, outer[k][1]), (outer[m][0], face, outer[m][1]),
+                    (inner[m][0], face + sign * sunk, inner[m][1]), (inner[k][0], face + sign * sunk, inner[k][1])]
+            corners.append(quad[::-1] if not flip else quad)
+    return _grain_up(quads(np.asarray(corners, float)))
+
+
+def _lever(x: float, thick: float) -> Shape:
+    """Lever handles on both sides of a leaf at 1.03 m."""
+    z, shapes = 1.03, []
+    for y, out in ((0.0, 1.0), (-thick, -1.0)):
+        rose = moved(turned(cylinder(0.025, 0, 0.009, 0.003, 14), -out * math.pi / 2, "x"), x, y, z)
+        path = [(x, y + out * 0.004, z), (x, y + out * 0.045, z), (x - 0.012, y + out * 0.055, z), (x - 0.12, y + out * 0.055, z)]
+        key = moved(turned(cylinder(0.018, 0, 0.006, 0.0, 12), -out * math.pi / 2, "x"), x, y, z - 0.09)
+        shapes += [rose, tube(path, 0.0095, 10), key]
+    return joined(*shapes)
+
+
+def _sections(hole: _Hole) -> list[Shape]:
+    """A closed sectional garage door: horizontal panels with grooves between."""
+    o, y = hole.opening, hole.inside - 0.06
+    count = max(3, round(o.head / 0.5))
+    edges = np.linspace(0.0, o.head - LINING, count + 1)
+    return [box([LINING, y - 0.04, a + 0.002], [hole.length - LINING, y, b - 0.002], 0.004)
+            for a, b in itertools.pairwise(edges)]

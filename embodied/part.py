@@ -1,0 +1,26 @@
+"""Part: one visible mesh of the house, who owns it and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from assets.records import MeshPart
+
+KINDS = ("object", "wall", "floor", "ceiling", "opening", "outdoor")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    owner: str
+    """Placement id, or a shell id: '<room>/floor', '<room>/wall_<i>', '<opening>/leaf', 'outdoor/ground'."""
+    kind: str
+    """One of KINDS; 'opening' is all joinery: frames, leaves, panes, sills, reveals, and stairs."""
+    room: str
+    """The room it is seen from first; '' for the outdoors."""
+    mesh: MeshPart
+    mesh_key: str
+    """Parts with equal keys have equal meshes and may share geometry."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the mesh's origin stands, world, metres."""
+    yaw: float = 0.0
+    """Turn about z, radians counter-clockwise."""

@@ -1,0 +1,44 @@
+"""The one translation from a House to triangles: everything visible as a tuple of Parts."""
+
+from __future__ import annotations
+
+import typing
+
+from assets.records import Finish, MeshPart
+from embodied.house import House
+from embodied.part import Part
+from embodied.shell import shell_owners, shell_parts
+
+__all__ = ["Meshes", "Part", "house_parts", "owners"]
+
+
+class Meshes(typing.Protocol):
+    """What this module needs of a catalogue."""
+
+    def mesh(self, key: str, size: tuple[float, float, float],
+             params: tuple[tuple[str, str | float], ...] = ()) -> tuple[MeshPart, ...]: ...
+
+    def finish(self, material_key: str) -> Finish: ...
+
+
+def house_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
+    """Everything visible in and around the house: shell first, then placements, in the house's order."""
+    return shell_parts(house, catalogue.finish) + object_parts(house, catalogue)
+
+
+def object_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
+    """The placements alone."""
+    parts = []
+    for p in house.placements:
+        stem = "/".join([p.asset, *(f"{s:.4f}" for s in p.size), *(f"{k}={v}" for k, v in p.params)])
+        for i, mesh in enumerate(catalogue.mesh(p.asset, p.size, p.params)):
+            parts.append(Part(p.id, "object", p.room, mesh, f"{stem}#{i}", p.position, p.yaw))
+    return tuple(parts)
+
+
+def owners(house: House) -> tuple[str, ...]:
+    """Who may own pixels: instance id i + 1 belongs to owners(house)[i]; 0 is nothing (the sky).
+
+    Placements come first, in the house's order, then the shell.
+    """
+    return tuple(p.id for p in house.placements) + shell_owners(house)

@@ -1,0 +1,160 @@
+"""The fixed part of a house as meshes: walls with their openings, floors, ceilings, skirting, facade.
+
+Each room has its own wall faces on the edges of `house.floor(room)`, looking into the room; joinery
+and reveals (embodied.joinery) close the gap between the faces of two rooms, and a facade closes the
+house from outside. Every wall is one planar mesh around its holes, so that it makes one light-map
+chart. Texture coordinates are metres divided by the finish's tile.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from assets.built.primitives import Shape, flat, joined, part, quads
+from assets.records import Finish
+from embodied import joinery, outdoors, stairs
+from embodied.house import House, Opening, Room
+from embodied.part import Part
+from embodied.walls import floor_turn, hole_on, inset, turned_uv, wall_face
+
+FinishOf = Callable[[str], Finish]
+
+SKIRTING_HEIGHT = 0.08
+SKIRTING_THICKNESS = 0.014
+
+
+def shell_parts(house: House, finish: FinishOf) -> tuple[Part, ...]:
+    """All parts that are no placements: rooms, openings, stairs, outdoors, in `shell_owners` order."""
+    parts: list[Part] = []
+    for room in house.rooms:
+        parts += room_parts(house, room, finish)
+    for opening in house.openings:
+        parts += joinery.opening_parts(house, opening, finish)
+    for stair in house.stairs:
+        parts += stairs.stair_parts(house, stair, finish)
+    parts += outdoors.outdoor_parts(house, finish)
+    return tuple(parts)
+
+
+def shell_owners(house: House) -> tuple[str, ...]:
+    """Every owner that `shell_parts` may use, in a fixed order."""
+    names: list[str] = []
+    for room in house.rooms:
+        names += [f"{room.id}/floor", f"{room.id}/ceiling", f"{room.id}/skirting"]
+        names += [f"{room.id}/wall_{i}" for i in range(len(room.polygon))]
+    for opening in house.openings:
+        names += [f"{opening.id}/{piece}" for piece in joinery.PIECES]
+    names += [f"{s.id}/stairs" for s in house.stairs]
+    names += [f"outdoor/{piece}" for piece in outdoors.PIECES]
+    return tuple(names)
+
+
+def room_parts(house: House, room: Room, finish: FinishOf) -> list[Part]:
+    """Floor, ceiling, walls and skirting of one room."""
+    storey = house.storey_of(room)
+    z0, z1 = storey.elevation, storey.elevation + storey.height
+    floor_area, ceiling_area = house.floor(room), house.floor(room)
+    for stair in house.stairs:
+        lower, upper = (house.room_by_id[r] for r in stair.rooms)
+        if room.storey == lower.storey:
+            ceiling_area = ceiling_area.difference(stairs.well(stair))
+        if room.storey == upper.storey:
+            floor_area = floor_area.difference(stairs.well(stair))
+    turn = floor_turn(house)
+    parts = [
+        _part(f"{room.id}/floor", "floor", room, finish(room.floor_finish), turned_uv(flat(floor_area, z0), turn)),
+        _part(f"{room.id}/ceiling", "ceiling", room, finish(room.ceiling_finish), flat(ceiling_area, z1, up=False)),
+    ]
+    ring = inset(room.polygon, house.inner_wall / 2)
+    along = 0.0
+    for i, (p, q) in enumerate(zip(ring, np.roll(ring, -1, axis=0))):
+        key = room.accent_finish if i == room.accent_wall and room.accent_finish else room.wall_finish
+        face = wall_face(p, q, z0, z1, holes_of(house, room, p, q), along)
+        parts.append(_part(f"{room.id}/wall_{i}", "wall", room, finish(key), face))
+        along += float(np.linalg.norm(q - p))
+    skirting = skirting_of(house, room)
+    if skirting is not None:
+        parts.append(_part(f"{room.id}/skirting", "wall", room, finish(room.skirting_finish), skirting))
+    return parts
+
+
+def _part(owner: str, kind: str, room: Room, finish: Finish, shape: Shape) -> Part:
+    return Part(owner, kind, room.id, part(finish, shape), owner)
+
+
+# ------------------------------------------------------------------ walls
+
+
+def hole_of(house: House, room: Room, opening: Opening, p: np.ndarray,
+            q: np.ndarray) -> tuple[float, float, float, float] | None:
+    """The hole of `opening` in the face from p to q of `room`, see `hole_on`."""
+    if room.id not in opening.rooms:
+        return None
+    return hole_on(p, q, opening, house.storey_of(room).elevation, house.inner_wall / 2)
+
+
+def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray) -> list[tuple[float, float, float, float]]:
+    """All holes in the wall face from p to q, see `hole_of`."""
+    holes = [hole_of(house, room, o, p, q) for o in house.openings]
+    return sorted(h for h in holes if h is not None)
+
+
+def skirting_of(house: House, room: Room) -> Shape | None:
+    """Boards at the foot of the walls, mitred in the corners, left out at doors; None if nothing is left."""
+    z = house.storey_of(room).elevation
+    wall, front = (inset(room.polygon, house.inner_wall / 2 + t) for t in (0.0, SKIRTING_THICKNESS))
+    runs = []
+    for i in range(len(wall)):
+        p, q, fp, fq = wall[i], wall[(i + 1) % len(wall)], front[i], front[(i + 1) % len(wall)]
+        length = float(np.linalg.norm(q - p))
+        d = (q - p) / length
+        n = np.array([-d[1], d[0]]) * SKIRTING_THICKNESS
+        cuts = [(s0, s1) for s0, low, s1, _ in _door_cuts(house, room, p, q) if low < z + SKIRTING_HEIGHT]
+        start = 0.0
+        for s0, s1 in [*cuts, (length, math.inf)]:
+            if s0 - start > 0.01:
+                a, b = p + start * d, p + s0 * d
+                fa = fp if start == 0.0 else a + n
+                fb = fq if s0 == length else b + n
+                runs.append(_board(a, b, fa, fb, z, start > 0.0, s0 < length))
+            start = max(start, s1)
+    return joined(*runs) if runs else None
+
+
+def _door_cuts(house: House, room: Room, p: np.ndarray, q: np.ndarray) -> list[tuple[float, float, float, float]]:
+    """Holes widened by the casing around them, clipped to the wall."""
+    length = float(np.linalg.norm(q - p))
+    cuts = []
+    for o in house.openings:
+        hole, margin = hole_of(house, room, o, p, q), joinery.casing_width(o)
+        if hole is not None:
+            cuts.append((max(0.0, hole[0] - margin), hole[1], min(length, hole[2] + margin), hole[3]))
+    return sorted(cuts)
+
+
+def _board(a: np.ndarray, b: np.ndarray, fa: np.ndarray, fb: np.ndarray, z: float,
+           cap_a: bool, cap_b: bool) -> Shape:
+    """One skirting board from a to b on the wall, fa to fb on its front: front, rounded top, cut ends."""
+    top, shoulder = z + SKIRTING_HEIGHT, z + SKIRTING_HEIGHT - 0.008
+    length = float(np.linalg.norm(b - a))
+
+    def at(point: np.ndarray, height: float) -> list[float]:
+        return [point[0], point[1], height]
+
+    ia, ib = fa + (a - fa) * 0.55, fb + (b - fb) * 0.55
+    corners = [
+        [at(fb, z), at(fa, z), at(fa, shoulder), at(fb, shoulder)],
+        [at(fb, shoulder), at(fa, shoulder), at(ia, top), at(ib, top)],
+        [at(ib, top), at(ia, top), at(a, top), at(b, top)],
+    ]
+    uv = [[(0, v0), (length, v0), (length, v1), (0, v1)]
+          for v0, v1 in ((0.0, 0.072), (0.072, 0.08), (0.08, 0.09))]
+    if cap_a:
+        corners.append([at(fa, z), at(a, z), at(a, top), at(fa, shoulder)])
+    if cap_b:
+        corners.append([at(b, z), at(fb, z), at(fb, shoulder), at(b, top)])
+    uv += [[(0, 0), (0.014, 0), (0.014, 0.08), (0, 0.08)]] * (cap_a + cap_b)
+    return quads(np.asarray(corners), np.asarray(uv))
