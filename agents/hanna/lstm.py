@@ -1,0 +1,115 @@
+"""The LSTM encoder-decoder baseline of Table 4.6, after Wang et al. (2019c), with the same interface as HannaNetwork.
+
+It predicts no reasons, is trained without the curiosity loss, and its recurrent state is never
+reset within an episode.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from agents.hanna.attention import DotAttend
+from agents.hanna.network import HannaConfig, Scores
+from agents.hanna.percept import SLOTS, VIEWS, Percept, slot_distribution, target_similarity
+
+
+@dataclass(frozen=True, eq=False)
+class LstmMemory:
+    """What one decoder carries from step to step, for B agents."""
+
+    text: Tensor
+    """(B, L, h), with `text_mask` (B, L) bool."""
+    text_mask: Tensor
+    hidden: Tensor
+    cell: Tensor
+    """(B, h)."""
+
+    def select(self, rows: Tensor) -> LstmMemory:
+        """The memory of some agents, in the order of `rows` (k,)."""
+        return LstmMemory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+
+
+class LstmStateNetwork(nn.Module):
+    """Text LSTM, decoder LSTM, attention over words, current view and target view."""
+
+    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int):
+        super().__init__()
+        h, d = config.hidden_size, config.feature_size
+        self.hidden_size = h
+        self.embedding = nn.Embedding(config.words, h, padding_idx=0)
+        self.text_lstm = nn.LSTM(h, h, batch_first=True)
+        self.scene_attend = DotAttend(h, d, h)
+        self.decoder = nn.LSTMCell(previous_size + d + VIEWS + extra_size, h)
+        self.text_attend = DotAttend(h, h, h)
+        self.current_attend = DotAttend(h, d, h)
+        self.target_attend = DotAttend(h, d, h)
+        self.dropout = nn.Dropout(config.dropout)
+        self.out = nn.Linear(2 * h + 2 * d, h)
+
+    def start(self, batch: int, length: int) -> LstmMemory:
+        """The memory of `batch` agents before their first step."""
+        zero = self.out.weight.new_zeros(batch, self.hidden_size)
+        mask = torch.ones(batch, length, dtype=torch.bool, device=zero.device)
+        return LstmMemory(zero[:, None].expand(-1, length, -1), mask, zero, zero)
+
+    def forward(
+        self, m: LstmMemory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor
+    ) -> tuple[Tensor, LstmMemory]:
+        """State (B, h) of this step, and the memory after it; arguments as in StateNetwork."""
+        text, text_mask = m.text, m.text_mask
+        rows = percept.new_task.nonzero()[:, 0]
+        if len(rows):
+            words, _ = self.text_lstm(self.dropout(self.embedding(percept.tokens[rows])))  # left to right: padding
+            text = text.index_copy(0, rows, words)  # comes last, so it changes nothing before it
+            text_mask = percept.tokens != 0
+        scene = self.scene_attend(m.hidden, percept.current)  # (B, D)
+        inputs = self.dropout(torch.cat([previous, scene, delta, extra], -1))
+        hidden, cell = self.decoder(inputs, (m.hidden, m.cell))  # (B, h)
+        seen = self.dropout(hidden)
+        said = _attend_words(self.text_attend, seen, text, text_mask)  # (B, h)
+        here = self.current_attend(said, percept.current)  # (B, D)
+        there = self.target_attend(said, percept.target)  # (B, D)
+        state = torch.tanh(self.out(torch.cat([seen, said, here, there], -1)))
+        return state, LstmMemory(text, text_mask, hidden, cell)
+
+
+def _attend_words(attend: DotAttend, query: Tensor, text: Tensor, mask: Tensor) -> Tensor:
+    """DOTATTEND that skips padding: query (B, h), text (B, L, h), mask (B, L) -> (B, h)."""
+    scores = torch.einsum("bh,blh->bl", attend.query(query) @ attend.row.weight, text)
+    return torch.einsum("bl,blh->bh", scores.masked_fill(~mask, -torch.inf).softmax(-1), text)
+
+
+class LstmNetwork(nn.Module):
+    """Navigation and help-request decoders of the baseline."""
+
+    def __init__(self, config: HannaConfig):
+        super().__init__()
+        self.config = config
+        h = config.hidden_size
+        self.navigation = LstmStateNetwork(config, config.action_size, 0)
+        self.action_in = nn.Linear(config.action_size, h)
+        self.action_out = nn.Linear(h, 1)
+        self.help = LstmStateNetwork(config, config.ask_embedding, SLOTS)
+        self.ask_embedding = nn.Embedding(3, config.ask_embedding)
+        self.ask_out = nn.Linear(h, 2)
+
+    def start(self, batch: int, length: int) -> tuple[LstmMemory, LstmMemory]:
+        """Memories of both decoders before the first step of `batch` agents."""
+        return self.navigation.start(batch, length), self.help.start(batch, length)
+
+    def forward(
+        self, memory: tuple[LstmMemory, LstmMemory], percept: Percept
+    ) -> tuple[Scores, tuple[LstmMemory, LstmMemory]]:
+        """One step of B agents; no gradient flows from asking into navigation."""
+        delta = target_similarity(percept.current, percept.target)
+        nothing = percept.current.new_zeros(len(delta), 0)
+        state, navigation_memory = self.navigation(memory[0], percept, delta, percept.previous_action, nothing)
+        logits = self.action_out(state[:, None] * self.action_in(percept.actions))[..., 0]  # (B, A)
+        logits = logits.masked_fill(~percept.action_mask, -torch.inf)
+        slots = slot_distribution(logits.detach(), percept.action_slots)
+        state, help_memory = self.help(memory[1], percept, delta, self.ask_embedding(percept.previous_ask), slots)
+        return Scores(logits, slots, self.ask_out(state), None), (navigation_memory, help_memory)

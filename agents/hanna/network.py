@@ -1,0 +1,263 @@
+"""The two networks of HANNA, dissertation appendix D.2: where to go, and when to ask.
+
+B agents, A navigation actions, h hidden size, D visual feature size, n steps so far plus one (a
+memory opens with zero vectors). Each line carries the number of the equation it computes. What
+differs from the text, and why, is said at the line; X-numbers are those differences between the
+dissertation and its authors' program that had to be decided here:
+  * an agent's inter-task memory is reset when *its own* task changes (text; the program resets the
+    whole batch, X2), so results do not depend on the batch;
+  * the navigation score is the bilinear form of D.18, with biases (X8);
+  * reasons are three independent sigmoids, as loss 4.14 needs (D.20 prints a softmax, X9);
+  * the help-request network compares only with past steps at which it asked (X10).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
+from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, slot_distribution, target_similarity
+
+
+@dataclass(frozen=True)
+class HannaConfig:
+    """Sizes of Table D.1 and the ablations of Table D.2 (alpha = 0 is an option of training)."""
+
+    words: int
+    """Vocabulary size; word 0 is padding."""
+    feature_size: int = 2048
+    """D, what the visual encoder gives per view."""
+    hidden_size: int = 256
+    navigation_embedding: int = 256
+    ask_embedding: int = 128
+    self_heads: int = 8
+    text_heads: int = 8
+    dropout: float = 0.3
+    orientation_copies: int = 32
+    """How often each of the four orientation features is repeated."""
+    reset_inter_task: bool = True
+    """False: ablation 'no inter-task reset'."""
+    predict_reasons: bool = True
+    """False: ablation 'no condition prediction': the request is read off the state directly."""
+    similarity_attention: bool = True
+    """False: ablation 'no cosine-similarity attention' (beta = 0)."""
+    similarity_normaliser: str = "kept"
+    """'kept' or 'all', see attention.sim_attend (X10)."""
+
+    def __post_init__(self) -> None:
+        for name in ("words", "feature_size", "hidden_size", "navigation_embedding", "ask_embedding"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0 <= self.dropout < 1:
+            raise ValueError(f"dropout must be in [0, 1), got {self.dropout}")
+        if self.similarity_normaliser not in ("kept", "all"):
+            raise ValueError(f"similarity_normaliser must be 'kept' or 'all', got {self.similarity_normaliser!r}")
+
+    @property
+    def action_size(self) -> int:
+        """E, length of a navigation action's embedding (D.1)."""
+        return self.feature_size + 4 * self.orientation_copies
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What one network carries from step to step, for B agents. Keys and values are projected."""
+
+    text: Tensor
+    """(B, L, h) M^text; with `text_mask` (B, L) bool."""
+    text_mask: Tensor
+    inter_state: Tensor
+    """(B, h) h_{t-1}^inter."""
+    inter_keys: Tensor
+    inter_values: Tensor
+    """(B, n, h) M^inter; entry 0 stands for the zero vectors."""
+    inter_mask: Tensor
+    """(B, n) bool, entries since the agent's task changed, and entry 0."""
+    local_time: Tensor
+    global_time: Tensor
+    """(B, h)."""
+    intra_keys: Tensor
+    intra_values: Tensor
+    """(B, n, h) M^intra for SELFATTEND."""
+    intra_inputs: Tensor
+    intra_states: Tensor
+    """(B, n, h) the same memory, not projected, for SIMATTEND."""
+    similar_mask: Tensor
+    """(B, n - 1) bool, which entries but the newest SIMATTEND may consider."""
+
+    def select(self, rows: Tensor) -> Memory:
+        """The memory of some agents, in the order of `rows` (k,)."""
+        return Memory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """What both networks say about one step."""
+
+    navigation: Tensor
+    """(B, A) logits, -inf where there is no action."""
+    slots: Tensor
+    """(B, 37) the same as probabilities on static indices; carries no gradient."""
+    ask: Tensor
+    """(B, 2) logits of DO_NOTHING and REQUEST."""
+    reasons: Tensor | None
+    """(B, 3) logits of the conditions lost, uncertain_wrong, never_asked; None without them."""
+
+
+class StateNetwork(nn.Module):
+    """Text-encoding, inter-task and intra-task components: everything but the last layer."""
+
+    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int):
+        """`previous_size` is that of a_{t-1}, `extra_size` that of P^nav (37) or 0."""
+        super().__init__()
+        c, h, d = config, config.hidden_size, config.feature_size
+        self.config = config
+        self.text_encoder = TextEncoder(c.words, h, c.self_heads, c.dropout)
+        self.local_time = IncTime(h, h)
+        self.global_time = IncTime(2 * h, h)
+        self.scene_attend = DotAttend(h, d, h)
+        self.inter_in = nn.Linear(d + previous_size + VIEWS, h)
+        self.inter_attend = SelfAttend(h, c.self_heads, c.dropout)
+        self.text_attend = MultiAttend(h, c.text_heads, c.dropout)
+        self.text_feed = FeedForward(h, c.dropout)
+        self.current_attend = DotAttend(h, d, h)
+        self.target_attend = DotAttend(h, d, h)
+        self.intra_in = nn.Linear(h + 2 * d + VIEWS + extra_size, h)
+        self.intra_attend = SelfAttend(h, c.self_heads, c.dropout)
+        self.intra_feed = FeedForward(h, c.dropout)
+        self.gate = nn.Linear(2 * h, h)
+
+    def start(self, batch: int, length: int) -> Memory:
+        """The memory of `batch` agents before their first step, for instructions of `length` words."""
+        like = self.inter_in.weight
+        zero = like.new_zeros(batch, self.config.hidden_size)
+        seen = torch.ones(batch, 1, dtype=torch.bool, device=like.device)
+        inter_keys, inter_values = self.inter_attend.empty(batch, like)
+        intra_keys, intra_values = self.intra_attend.empty(batch, like)
+        return Memory(
+            text=zero[:, None].expand(-1, length, -1), text_mask=seen.expand(-1, length),
+            inter_state=zero, inter_keys=inter_keys, inter_values=inter_values, inter_mask=seen,
+            local_time=zero, global_time=zero, intra_keys=intra_keys, intra_values=intra_values,
+            intra_inputs=zero[:, None], intra_states=zero[:, None], similar_mask=seen[:, :0],
+        )
+
+    def forward(
+        self, m: Memory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor, similar: Tensor
+    ) -> tuple[Tensor, Memory]:
+        """One step.
+
+        Args:
+          m: memory after the step before.
+          percept: what B agents see.
+          delta: (B, 36) target similarity.
+          previous: (B, p) a_{t-1}.
+          extra: (B, e) further inputs of D.15.
+          similar: (B,) bool, whether SIMATTEND may consider the step before this one.
+
+        Returns:
+          h_t^intra (B, h) and the memory after this step.
+        """
+        text, text_mask = self._read(m, percept)
+        m = self._reset(m, percept.new_task) if self.config.reset_inter_task else m
+
+        local_time = self.local_time(m.local_time)  # (B, h) D.1
+        global_time = self.global_time(torch.cat([local_time, m.global_time], -1))  # (B, h) D.2
+
+        scene = self.scene_attend(m.inter_state, percept.current)  # (B, D) c^inter, D.8
+        inter_in = self.inter_in(torch.cat([scene, previous, delta], -1)) + local_time  # (B, h) q^inter, D.7
+        inter, inter_keys = self.inter_attend(inter_in, m.inter_keys, m.inter_values, m.inter_mask)  # (B, h) D.6
+
+        words = self.text_attend.key(text), self.text_attend.value(text)
+        said = self.text_feed(self.text_attend(inter, *words, text_mask))  # (B, h) c^text, D.9 and D.10
+        here = self.current_attend(said, percept.current)  # (B, D) c^cur, D.11
+        there = self.target_attend(said, percept.target)  # (B, D) c^tgt, D.12
+
+        intra_in = self.intra_in(torch.cat([said, here, there, delta, extra], -1)) + global_time  # q^intra, D.15
+        seen = torch.ones_like(m.intra_keys[..., 0], dtype=torch.bool)  # (B, n): the whole episode
+        attended, intra_keys = self.intra_attend(intra_in, m.intra_keys, m.intra_values, seen)
+        tentative = self.intra_feed(attended)  # (B, h) bar h^intra, D.13
+        similar_mask = torch.cat([m.similar_mask, similar[:, None]], 1)  # (B, n)
+        state = tentative
+        if self.config.similarity_attention:
+            past = sim_attend(  # (B, h) tilde h^intra, D.14
+                intra_in, m.intra_inputs, m.intra_states, similar_mask, self.config.similarity_normaliser
+            )
+            beta = torch.sigmoid(self.gate(torch.cat([tentative, past], -1)))  # (B, h) D.17
+            state = tentative - beta * past  # (B, h) D.16
+
+        return state, Memory(
+            text=text, text_mask=text_mask, inter_state=inter, inter_keys=inter_keys,
+            inter_values=self.inter_attend.append_value(m.inter_values, inter),
+            inter_mask=torch.cat([m.inter_mask, seen[:, :1]], 1),
+            local_time=local_time, global_time=global_time, intra_keys=intra_keys,
+            intra_values=self.intra_attend.append_value(m.intra_values, state),
+            intra_inputs=torch.cat([m.intra_inputs, intra_in[:, None]], 1),
+            intra_states=torch.cat([m.intra_states, state[:, None]], 1),
+            similar_mask=similar_mask,
+        )
+
+    def _read(self, m: Memory, percept: Percept) -> tuple[Tensor, Tensor]:
+        """M^text (B, L, h) and its mask, read anew for the agents whose instruction changed (D.5)."""
+        rows = percept.new_task.nonzero()[:, 0]
+        if not len(rows):
+            return m.text, m.text_mask
+        text = m.text.index_copy(0, rows, self.text_encoder(percept.tokens[rows]))
+        return text, percept.tokens != 0
+
+    @staticmethod
+    def _reset(m: Memory, who: Tensor) -> Memory:
+        """Inter-task state, memory and local time back to zero for the agents in `who` (B,)."""
+        keep = ~who[:, None]
+        opening = torch.arange(m.inter_mask.shape[1], device=who.device) == 0
+        return dataclasses.replace(
+            m, inter_state=m.inter_state * keep, local_time=m.local_time * keep,
+            inter_mask=m.inter_mask & (keep | opening),
+        )
+
+
+class HannaNetwork(nn.Module):
+    """Navigation policy and help-request policy: two networks that share nothing."""
+
+    def __init__(self, config: HannaConfig):
+        super().__init__()
+        self.config = config
+        h, e = config.hidden_size, config.navigation_embedding
+        self.navigation = StateNetwork(config, config.action_size, 0)
+        self.action_out = nn.Linear(h, e)
+        self.action_in = nn.Linear(config.action_size, e)
+        self.help = StateNetwork(config, config.ask_embedding, SLOTS)
+        self.ask_embedding = nn.Embedding(3, config.ask_embedding)
+        if config.predict_reasons:
+            self.reason_out = nn.Linear(h, 3)
+            self.ask_out = nn.Linear(3, 2)
+        else:
+            self.ask_out = nn.Linear(h, 2)
+
+    def start(self, batch: int, length: int) -> tuple[Memory, Memory]:
+        """Memories of both networks before the first step of `batch` agents."""
+        return self.navigation.start(batch, length), self.help.start(batch, length)
+
+    def forward(self, memory: tuple[Memory, Memory], percept: Percept) -> tuple[Scores, tuple[Memory, Memory]]:
+        """One step of B agents; no gradient flows from asking into navigation."""
+        delta = target_similarity(percept.current, percept.target)  # (B, 36)
+        everywhere = torch.ones_like(percept.new_task)
+        nothing = percept.current.new_zeros(len(delta), 0)
+        state, navigation_memory = self.navigation(
+            memory[0], percept, delta, percept.previous_action, nothing, everywhere
+        )
+        action = self.action_in(percept.actions)  # (B, A, e) W^act E^nav
+        logits = torch.einsum("be,bae->ba", self.action_out(state), action)  # (B, A) D.18
+        logits = logits.masked_fill(~percept.action_mask, -torch.inf)
+        slots = slot_distribution(logits.detach(), percept.action_slots)  # (B, 37) P^nav
+
+        asked = percept.previous_ask == REQUEST
+        state, help_memory = self.help(
+            memory[1], percept, delta, self.ask_embedding(percept.previous_ask), slots, asked
+        )
+        reasons = self.reason_out(state) if self.config.predict_reasons else None  # (B, 3) D.20
+        ask = self.ask_out(state if reasons is None else reasons)  # (B, 2) D.19
+        return Scores(logits, slots, ask, reasons), (navigation_memory, help_memory)

@@ -1,0 +1,88 @@
+"""What the networks see in one step: a Percept of tensors, and the features of appendix D.1 that need no learning.
+
+Row k of a view set is the view of the Matterport convention: band k // 12 looks 30 degrees down,
+level, 30 degrees up; column k % 12 turns clockwise in steps of 30 degrees.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+VIEWS = 36
+HEADINGS = 12
+SLOTS = VIEWS + 1
+"""Static places of the navigation distribution: one per view relative to the agent, and stop (last)."""
+DO_NOTHING, REQUEST, START = 0, 1, 2
+"""Help-request actions; START stands for 'no step before this one'."""
+
+
+@dataclass(frozen=True, eq=False)
+class Percept:
+    """Inputs of one step for B agents; A is the largest number of navigation actions among them."""
+
+    tokens: Tensor
+    """(B, L) int64 current instruction, 0 is padding."""
+    new_task: Tensor
+    """(B,) bool, the instruction changed in the step before (or this is the first step)."""
+    current: Tensor
+    """(B, 36, D) features of the current panorama."""
+    target: Tensor
+    """(B, 36, D) features of the target's panorama, zero where there is no target image."""
+    actions: Tensor
+    """(B, A, E) embeddings of the navigation actions; 0 is stop, a zero vector."""
+    action_mask: Tensor
+    """(B, A) bool, which of them exist."""
+    action_slots: Tensor
+    """(B, A) int64 in 0..36: the view relative to the agent in which the action lies; stop has 36."""
+    previous_action: Tensor
+    """(B, E) embedding of the last navigation action, zero after stop, after a request and at first."""
+    previous_ask: Tensor
+    """(B,) int64: DO_NOTHING, REQUEST or START."""
+
+    def select(self, rows: Tensor) -> Percept:
+        """The percept of some agents, in the order of `rows` (k,)."""
+        return Percept(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+
+
+def target_similarity(current: Tensor, target: Tensor) -> Tensor:
+    """delta_t of D.1: for each current view the cosine of the target view most like it.
+
+    Args:
+      current, target: (B, 36, D).
+
+    Returns:
+      (B, 36); all ones where the panoramas are equal, zero where the target is missing.
+    """
+    cosines = F.normalize(current, dim=-1, eps=1e-6) @ F.normalize(target, dim=-1, eps=1e-6).transpose(1, 2)
+    return cosines.amax(-1)  # rows of C are current views
+
+
+def orientation(heading: Tensor, elevation: Tensor, copies: int) -> Tensor:
+    """(..., 4 * copies) orientation features [sin dpsi; cos dpsi; sin domega; cos domega] of D.1.
+
+    Each is repeated `copies` times (32 in Speaker-Follower and in the authors' program), so that
+    four numbers weigh something beside hundreds of visual features.
+    """
+    parts = (heading.sin(), heading.cos(), elevation.sin(), elevation.cos())
+    return torch.cat([p[..., None].expand(*p.shape, copies) for p in parts], -1)
+
+
+def slot_distribution(logits: Tensor, slots: Tensor) -> Tensor:
+    """P_t^nav on static indices (D.1): probabilities of actions that share a view add up.
+
+    Args:
+      logits: (B, A), -inf where there is no action.
+      slots: (B, A) int64 in 0..36.
+
+    Returns:
+      (B, 37).
+    """
+    probabilities = logits.softmax(-1)
+    return torch.zeros(*logits.shape[:-1], SLOTS, dtype=logits.dtype, device=logits.device).scatter_add(
+        -1, slots, probabilities
+    )

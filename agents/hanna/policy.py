@@ -1,0 +1,195 @@
+"""HannaPolicy: the networks as a Policy of embodied.interface, batched over episodes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.hanna.asking import AskRule, ask_greedily, ask_sampled
+from agents.hanna.lstm import LstmNetwork
+from agents.hanna.network import HannaNetwork, Scores
+from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.vision.bank import FeatureBank
+from agents.vocabulary import Vocabulary
+from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Stop, Thought
+
+Chooser = Callable[[np.ndarray, np.random.Generator], int]
+
+
+def choose_likeliest(probabilities: np.ndarray, rng: np.random.Generator) -> int:
+    """Index of the largest probability, the first of equals: for evaluation."""
+    return int(probabilities.argmax())
+
+
+def choose_sampled(probabilities: np.ndarray, rng: np.random.Generator) -> int:
+    """Index drawn from the distribution with one uniform number: for training."""
+    possible = np.flatnonzero(probabilities)
+    edges = np.cumsum(probabilities[possible], dtype=np.float64)
+    drawn = int(np.searchsorted(edges, rng.random() * edges[-1], side="right"))
+    return int(possible[min(drawn, len(possible) - 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What the networks said in one step, for the episodes that were still running."""
+
+    positions: tuple[int, ...]
+    """Place of each row in the batch."""
+    scores: Scores
+
+
+@dataclass(frozen=True, eq=False)
+class HannaMemory:
+    """What the policy carries between steps; rows belong to the episodes that still run."""
+
+    positions: tuple[int, ...]
+    networks: tuple[Any, Any]
+    """Memories of the navigation and the help-request network."""
+    previous_action: Tensor
+    """(k, E)."""
+    previous_ask: Tensor
+    """(k,) int64."""
+    last_ask: tuple[int, ...]
+    moments: tuple[Moment, ...] = ()
+    """All steps so far, if the policy keeps them."""
+
+    def keep(self, positions: tuple[int, ...]) -> HannaMemory:
+        """The memory of the episodes at `positions` only."""
+        if positions == self.positions:
+            return self
+        rows = [self.positions.index(p) for p in positions]
+        index = torch.tensor(rows, dtype=torch.long, device=self.previous_ask.device)
+        return dataclasses.replace(
+            self, positions=positions, networks=tuple(m.select(index) for m in self.networks),
+            previous_action=self.previous_action[index], previous_ask=self.previous_ask[index],
+            last_ask=tuple(self.last_ask[r] for r in rows),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HannaPolicy:
+    """A trained (or training) pair of networks that acts."""
+
+    network: HannaNetwork | LstmNetwork
+    vocabulary: Vocabulary
+    bank: FeatureBank
+    choose: Chooser = choose_likeliest
+    ask_rule: AskRule = ask_greedily
+    instruction_length: int = 50
+    turn_to_agent: bool = True
+    """Rows of views begin at the agent's own heading. The authors' program keeps them absolute
+    (X27), which tells the agent where east is; D.1 leaves the order open and a robot has no compass."""
+    read_assistance: bool = True
+    """False: on a route the text is empty, 'target image only' of Table 4.4."""
+    keep_moments: bool = False
+    """Keep Scores, with their gradients, in memory: for training."""
+    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+    def act(
+        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[list[Action | None], HannaMemory]:
+        """One step of every running episode; see embodied.interface.Policy."""
+        positions = tuple(i for i, o in enumerate(observations) if o is not None)
+        seen = [observations[i] for i in positions]
+        memory = self.start(positions) if memory is None else memory.keep(positions)
+        if not positions:
+            return [None] * len(observations), memory
+        percept = self.percept(seen, memory)
+        scores, networks = self.network(memory.networks, percept)
+        moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
+        asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
+        reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
+
+        actions: list[Action | None] = [None] * len(observations)
+        chosen, last_ask = [], []
+        for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
+            n = len(o.candidates)
+            thought = Thought(
+                moves=np.append(moves[row, 1 : n + 1], moves[row, 0]),
+                asks={"help": float(asks[row]), "nothing": float(1 - asks[row])},
+                reasons=None if reasons is None else tuple(float(r) for r in reasons[row]),
+            )
+            rng = rngs[position]
+            index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
+            wants = self.ask_rule(float(asks[row]), o.time, memory.last_ask[row], rng)
+            if wants and Intention.HELP in o.can_ask:
+                actions[position] = Ask(Intention.HELP, thought)
+                chosen.append(0)  # its own move is discarded; the last action reads as stop
+                last_ask.append(o.time)
+            else:
+                actions[position] = Stop(thought) if index == 0 else Move(index - 1, thought)
+                chosen.append(index)
+                last_ask.append(memory.last_ask[row])
+
+        device = percept.actions.device
+        rows = torch.arange(len(positions), device=device)
+        asked = [isinstance(actions[p], Ask) for p in positions]
+        moments = (*memory.moments, Moment(positions, scores)) if self.keep_moments else ()
+        return actions, HannaMemory(
+            positions, networks, percept.actions[rows, torch.tensor(chosen, device=device)],
+            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device), tuple(last_ask), moments,
+        )
+
+    def start(self, positions: tuple[int, ...]) -> HannaMemory:
+        """Memory before the first step of the episodes at `positions`."""
+        k, device = len(positions), next(self.network.parameters()).device
+        return HannaMemory(
+            positions, self.network.start(k, self.instruction_length),
+            torch.zeros(k, self.network.config.action_size, device=device),
+            torch.full((k,), START, device=device), (-1,) * k,
+        )
+
+    def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
+        """The tensors of one step, from observations of running episodes and their memory."""
+        config, k = self.network.config, len(observations)
+        most = 1 + max(len(o.candidates) for o in observations)
+        angles = np.zeros((2, k, most), dtype=np.float32)  # bearing and slope
+        views = np.zeros((k, most), dtype=np.int64)
+        mask = np.zeros((k, most), dtype=bool)
+        mask[:, 0] = True  # stop
+        for row, o in enumerate(observations):
+            n = len(o.candidates)
+            angles[0, row, 1 : n + 1], angles[1, row, 1 : n + 1] = o.candidates.bearing, o.candidates.slope
+            views[row, 1 : n + 1], mask[row, 1 : n + 1] = o.candidates.view, o.candidates.allowed
+        turns = np.array([o.turn for o in observations])[:, None]  # (k, 1)
+        slots = views // HEADINGS * HEADINGS + (views - turns) % HEADINGS
+        slots[:, 0] = SLOTS - 1
+
+        device = next(self.network.parameters()).device
+        send = lambda array: torch.from_numpy(array).to(device)
+        current = self.bank.gather([o.sight for o in observations])  # (k, 36, D) absolute
+        rows = torch.arange(k, device=device)[:, None]
+        looks = current[rows, send(views)]  # (k, A, D)
+        facing = orientation(send(angles[0]), send(angles[1]), config.orientation_copies)  # exact bearing (X11)
+        exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
+        actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
+        target = self.bank.gather([o.target for o in observations])
+        if self.turn_to_agent:
+            order = np.arange(VIEWS)[None]
+            order = send(order // HEADINGS * HEADINGS + (order + turns) % HEADINGS)  # (k, 36)
+            current, target = current[rows, order], target[rows, order]
+        return Percept(
+            tokens=send(np.stack([self.encode(o) for o in observations])),
+            new_task=send(np.array([o.time_on_task == 0 for o in observations])),
+            current=current, target=target, actions=actions, action_mask=send(mask), action_slots=send(slots),
+            previous_action=memory.previous_action, previous_ask=memory.previous_ask,
+        )
+
+    def encode(self, observation: Observation) -> np.ndarray:
+        """(L,) int64 numbers of the instruction's words."""
+        text = observation.instruction if self.read_assistance or observation.mode is Mode.MAIN else ""
+        if text not in self._encoded:
+            self._encoded[text] = self.vocabulary.encode(text, self.instruction_length)
+        return self._encoded[text]
+
+
+def for_training(policy: HannaPolicy, ask_rule: AskRule = ask_sampled) -> HannaPolicy:
+    """The same networks, sampling their actions and keeping what they said."""
+    return dataclasses.replace(policy, choose=choose_sampled, ask_rule=ask_rule, keep_moments=True)

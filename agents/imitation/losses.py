@@ -1,0 +1,81 @@
+"""The losses of dissertation 4.2.3: small functions over logits, labels and masks.
+
+N is any number of (episode, step) pairs, A the number of navigation actions. Each function gives
+one loss per pair, zero where a label says that the step is not to be learned from.
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+IGNORE = -100
+"""Label of a step that is not learned from."""
+
+
+def negative_log_likelihood(logits: Tensor, labels: Tensor) -> Tensor:
+    """L_NL = -log pi(a* | o), Eq 4.11.
+
+    Args:
+      logits: (N, A), -inf where there is no action.
+      labels: (N,) int64, IGNORE where there is none.
+
+    Returns:
+      (N,).
+    """
+    return F.cross_entropy(logits, labels, ignore_index=IGNORE, reduction="none")
+
+
+def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor) -> Tensor:
+    """Mean log-likelihood of the mistakes made before in this situation: second term of Eq 4.13.
+
+    Args:
+      logits: (N, A).
+      labels: (N,) int64.
+      negatives: (N, A) bool, the set A^main-otimes of Eq 4.12.
+
+    Returns:
+      (N,), zero where there are no mistakes.
+    """
+    log_p = logits.log_softmax(-1).masked_fill(~negatives, 0.0)
+    mean = log_p.sum(-1) / negatives.sum(-1).clamp(min=1)
+    return mean * (labels != IGNORE)
+
+
+def navigation_loss(logits: Tensor, labels: Tensor, negatives: Tensor, alpha: float) -> Tensor:
+    """L_main of Eq 4.13, (N,)."""
+    loss = negative_log_likelihood(logits, labels)
+    return loss + alpha * curiosity(logits, labels, negatives) if alpha else loss
+
+
+def reason_loss(logits: Tensor, reasons: Tensor, labels: Tensor) -> Tensor:
+    """Binary logistic loss of the three conditions, second term of Eq 4.14.
+
+    Args:
+      logits, reasons: (N, 3); reasons are 0 or 1.
+      labels: (N,) int64 of asking; IGNORE silences the reasons as well.
+
+    Returns:
+      (N,).
+    """
+    each = F.binary_cross_entropy_with_logits(logits, reasons, reduction="none")
+    return each.mean(-1) * (labels != IGNORE)
+
+
+def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons: Tensor) -> Tensor:
+    """L_ask of Eq 4.14, (N,); without reason logits its first term only.
+
+    Args:
+      ask: (N, 2) logits of DO_NOTHING and REQUEST.
+      labels: (N,) int64, IGNORE outside the zones of attention.
+      reason_logits: (N, 3) or None.
+      reasons: (N, 3) float, 0 or 1.
+    """
+    loss = negative_log_likelihood(ask, labels)
+    return loss if reason_logits is None else loss + reason_loss(reason_logits, reasons, labels)
+
+
+def relative_entropy(probabilities: Tensor, base: int) -> Tensor:
+    """Entropy in base `base` ("efficiency", footnote 3): (N, n) -> (N,)."""
+    return torch.special.entr(probabilities).sum(-1) / torch.log(torch.tensor(float(base)))

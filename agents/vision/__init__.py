@@ -1,0 +1,1 @@
+"""Pixels to features: residual networks, their training on our own renders, 36 x D features."""
