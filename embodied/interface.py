@@ -154,8 +154,9 @@ class Task:
     """Metres along the graph, inclusive."""
     horizon: int
     """Most steps of any kind, H in the dissertation."""
-    budget: int | None = None
-    """Most requests for help; None is without limit."""
+    budget: float | None = None
+    """Most requests for help; None is without limit. An episode rounds a fraction up with that
+    probability (VNLA, originals 4.2)."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,263 @@
+"""Episodes as small explicit state machines: one class per rule of play, all driven by `step`.
+
+`HelpEnv` keeps what every rule shares (pose, time, recording, checks) and is by itself the rule of
+plain navigation: moves move, stop ends. A rule with help overrides three methods: what a reply
+does, what stopping does, and what may be asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from embodied.interface import (
+    Action,
+    Ask,
+    Assistant,
+    Description,
+    Episode,
+    FindObject,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Pose,
+    Reply,
+    Sight,
+    Situation,
+    Step,
+    Stop,
+    Subtask,
+    Task,
+)
+from embodied.moves import Moves, PanoramicMoves
+from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+
+class TaskError(ValueError):
+    """A task that cannot be played in the worlds at hand."""
+
+
+class ActionError(ValueError):
+    """An action that is not possible now; the episode is unchanged and can go on."""
+
+
+class HelpEnv:
+    """Plays one task at a time; without an assistant this is plain navigation ('find' and VLN).
+
+    Nothing it does depends on other episodes: the only randomness is what the assistant draws
+    from a generator named after the seed, the task and the step.
+    """
+
+    asking_takes_time = True
+    """Whether a request uses up a step of the horizon (Algorithms 6 and 7)."""
+
+    def __init__(
+        self, worlds: Mapping[str, World], assistant: Assistant | None = None, moves: Moves | None = None
+    ) -> None:
+        """
+        Args:
+          worlds: by House.name.
+          assistant: who answers; None where nobody does.
+          moves: the action space; environments of one batch may share it, and its cache.
+        """
+        self.worlds = worlds
+        self.assistant = assistant
+        self.moves = moves or PanoramicMoves()
+        self.ended: str | None = "limit"
+        self._steps: list[Step] = []
+
+    # Playing -------------------------------------------------------------------------------------
+
+    def reset(self, task: Task, *, seed: int = 0) -> Observation:
+        """Begin `task`; equal (task, seed) and equal actions give equal episodes.
+
+        Raises:
+          TaskError: unknown world, nodes outside the graph, a goal that is not in the house.
+        """
+        check_task(task, self.worlds)
+        self.task, self.seed, self.world = task, seed, self.worlds[task.world]
+        self.pose = task.start
+        self.mode, self.instruction, self.target = Mode.MAIN, task.request, None
+        self.targets, self.subtask = task.goal_nodes, None
+        self.time = self.time_on_task = self.requests = 0
+        self.budget = self._budget()
+        self.ended = None
+        self._steps = []
+        self._begin()
+        return self._look()
+
+    def step(self, action: Action) -> Observation | None:
+        """Take one action; the next observation, or None when the episode has ended.
+
+        Raises:
+          ActionError: the episode is over, the candidate does not exist or is masked, or nobody
+            can be asked that here. Nothing has changed then.
+        """
+        self._check(action)
+        before, situation = self.observation, self.situation
+        mode, instruction, targets, subtask = self.mode, self.instruction, self.targets, self.subtask
+        clock, reply, cost = self.time, None, self._cost(action)
+        if isinstance(action, Move):
+            self.pose = self._reach[1][action.candidate]
+            self._moved()
+        elif isinstance(action, Ask):
+            rng = stream(self.seed, "assistant", self.task.id, self.time)
+            reply = self.assistant.answer(situation, action.intention, rng=rng)
+            self.requests += 1
+            self._replied(reply)
+        else:
+            self._stopped()
+        changed = (self.instruction, self.target) != (instruction, before.target) or self.mode is not mode
+        self.time_on_task = 0 if changed else self.time_on_task + 1
+        if self.asking_takes_time or not isinstance(action, Ask):
+            self.time = clock + 1
+        if self.ended is None and self.time >= self.task.horizon:
+            self.ended = "limit"
+            cost += self._cost_of_limit()
+        self._steps.append(Step(
+            situation.pose, mode, instruction, targets, subtask.id if subtask else "none", before.can_ask,
+            situation.candidate_nodes, action, reply, self.pose, cost,
+        ))
+        return self._look() if self.ended is None else None
+
+    @property
+    def last_step(self) -> Step:
+        """What was just written down."""
+        return self._steps[-1]
+
+    def episode(self, agent: str = "") -> Episode:
+        """The finished episode.
+
+        Raises:
+          RuntimeError: it has not ended.
+        """
+        if self.ended is None:
+            raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
+        return Episode(self.task, tuple(self._steps), self.ended, self.seed, agent)
+
+    # What a rule with help overrides -------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """Set up what the rule needs beyond the common state."""
+
+    def _replied(self, reply: Reply) -> None:
+        """Take in what the assistant said."""
+        raise NotImplementedError
+
+    def _stopped(self) -> None:
+        """The agent says it is done."""
+        self.ended = "stop"
+
+    def _moved(self) -> None:
+        """The agent has just moved."""
+
+    def _askable(self, situation: Situation) -> tuple[Intention, ...]:
+        if self.assistant is None or (self.budget is not None and self.requests >= self.budget):
+            return ()
+        return self.assistant.intentions(situation)
+
+    def _cost(self, action: Action) -> float:
+        return 0.0
+
+    def _cost_of_limit(self) -> float:
+        return 0.0
+
+    def _stack(self) -> tuple[int, ...]:
+        return ()
+
+    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
+        return (), ()
+
+    # Looking -------------------------------------------------------------------------------------
+
+    def _budget(self) -> int | None:
+        """The task's budget; a fraction becomes one more request with that probability (originals 4.2)."""
+        if self.task.budget is None:
+            return None
+        whole = int(self.task.budget)
+        part = self.task.budget - whole
+        if part > 0 and stream(self.seed, "budget", self.task.id).random() < part:
+            whole += 1
+        return whole
+
+    def _look(self) -> Observation:
+        self._reach = self.moves.at(self.world, self.pose)
+        candidates, poses = self._reach
+        self.situation = Situation(
+            self.world, self.task, self.pose, self.mode, self.targets, self.subtask,
+            tuple(p.node for p in poses), candidates, self.time, self.requests, self._stack(),
+        )
+        state, goals = self._descriptions()
+        self.observation = Observation(
+            Sight(self.task.world, self.pose.node), self.pose.turn, self.pose.tilt, candidates, self.instruction,
+            self.target, self.mode, self._askable(self.situation),
+            None if self.budget is None else max(self.budget - self.requests, 0),
+            self.time, self.time_on_task, state, goals,
+        )
+        return self.observation
+
+    def _check(self, action: Action) -> None:
+        if self.ended is not None:
+            raise ActionError(f"the episode is over ({self.ended}); reset before taking {action}")
+        if isinstance(action, Move):
+            allowed = self.observation.candidates.allowed
+            if not 0 <= action.candidate < len(allowed):
+                raise ActionError(f"candidate {action.candidate} does not exist, there are {len(allowed)} here")
+            if not allowed[action.candidate]:
+                raise ActionError(f"candidate {action.candidate} is masked here; choose one with allowed = True")
+        elif isinstance(action, Ask):
+            if action.intention not in self.observation.can_ask:
+                can = [i.value for i in self.observation.can_ask] or "nothing"
+                raise ActionError(
+                    f"cannot ask {action.intention.value!r} here, only {can}; look at Observation.can_ask"
+                )
+        elif not isinstance(action, Stop):
+            raise ActionError(f"expected Move, Ask or Stop, got {action!r}")
+
+
+class HannaEnv(HelpEnv):
+    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go."""
+
+    def _replied(self, reply: Reply) -> None:
+        subtask = reply.subtask
+        self.mode = Mode.SUB  # line 9
+        self.instruction = reply.text  # line 11
+        self.target = reply.image  # line 12: I^depart
+        self.subtask, self.targets = subtask, (subtask.target,)
+        self.pose = subtask.start  # line 13: step to the start of the route and look along it
+
+    def _stopped(self) -> None:
+        if self.mode is Mode.MAIN:  # lines 17-18
+            self.ended = "stop"
+            return
+        self.mode = Mode.MAIN  # line 20
+        self.instruction = self.task.request  # line 21
+        self.target = Sight(self.task.world, self.subtask.goal)  # line 22: I^{g*}, Eq 4.7
+        self.targets, self.subtask = (self.subtask.goal,), None  # the program's teacher, originals 3.1
+
+
+def check_task(task: Task, worlds: Mapping[str, World]) -> None:
+    """Refuse a task that cannot be played.
+
+    Raises:
+      TaskError: says what is missing.
+    """
+    if task.world not in worlds:
+        raise TaskError(f"task {task.id!r} plays in the unknown world {task.world!r}; known are {sorted(worlds)[:8]}")
+    world = worlds[task.world]
+    n = len(world.graph.positions)
+    nodes = (task.start.node, *task.goal_nodes)
+    if not task.goal_nodes or not all(0 <= v < n for v in nodes):
+        raise TaskError(f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again")
+    if isinstance(task.goal, FindObject):
+        gone = [p for p in task.goal.placements if p not in world.house.placement_by_id]
+        if gone:
+            raise TaskError(f"task {task.id!r} looks for {gone}, not in the house {task.world!r}; sample it again")
+    if task.horizon < 1 or (task.budget is not None and task.budget < 0):
+        raise TaskError(
+            f"task {task.id!r} needs horizon >= 1 and budget >= 0, got {task.horizon} and {task.budget}"
+        )

@@ -1,0 +1,1 @@
+"""What people say: requests, routes, sub-goals."""

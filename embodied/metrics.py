@@ -1,0 +1,152 @@
+"""Judges: each quantity is defined once, over finished episodes, with the source of its formula.
+
+Distances are metres along the graph. A function of one episode takes the episode and the graph of
+its world; tables over many episodes are in embodied.tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.interface import Ask, Episode, Mode, Move, Stop
+
+if TYPE_CHECKING:
+    from embodied.navgraph import NavGraph
+
+
+def navigation_error(episode: Episode, graph: NavGraph) -> float:
+    """Distance from the last node to the nearest goal (4.2.5)."""
+    return float(min(graph.distance[episode.nodes[-1], g] for g in episode.task.goal_nodes))
+
+
+def success(episode: Episode, graph: NavGraph) -> float:
+    """1 if the episode ended within the radius of a goal, inclusive (originals 3.7); else 0."""
+    return float(navigation_error(episode, graph) <= episode.task.radius + 1e-9)
+
+
+def oracle_success(episode: Episode, graph: NavGraph) -> float:
+    """1 if any visited node lies within the radius of a goal."""
+    nearest = min(graph.distance[v, g] for v in episode.nodes for g in episode.task.goal_nodes)
+    return float(nearest <= episode.task.radius + 1e-9)
+
+
+def path_length(episode: Episode, graph: NavGraph) -> float:
+    """Metres walked: the sum of graph distances between consecutive nodes (originals 3.7)."""
+    nodes = episode.nodes
+    return float(sum(graph.distance[a, b] for a, b in zip(nodes, nodes[1:])))
+
+
+def spl(episode: Episode, graph: NavGraph) -> float:
+    """Success weighted by path length, one term of (4.17).
+
+    L is the distance from the start to the goal nearest the *final* node. An episode whose start
+    is that goal has L = 0; it scores 1 if the agent did not walk, else 0.
+    """
+    goals = episode.task.goal_nodes
+    goal = min(goals, key=lambda g: (graph.distance[episode.nodes[-1], g], g))
+    shortest, walked = float(graph.distance[episode.nodes[0], goal]), path_length(episode, graph)
+    if max(walked, shortest) == 0.0:
+        return success(episode, graph)
+    return success(episode, graph) * shortest / max(walked, shortest)
+
+
+def requests(episode: Episode, graph: NavGraph) -> float:
+    """Requests for help in the episode."""
+    return float(episode.requests)
+
+
+def steps(episode: Episode, graph: NavGraph) -> float:
+    return float(len(episode.steps))
+
+
+def room_success(episode: Episode, graph: NavGraph) -> float:
+    """1 if the agent ended in a room that holds a goal (VNLA, originals 4.8)."""
+    rooms = graph.room_of_node
+    return float(rooms[episode.nodes[-1]] in {rooms[g] for g in episode.task.goal_nodes})
+
+
+def subtask_success(episode: Episode, graph: NavGraph) -> float:
+    """Share of sub-tasks that were left (departed, asked anew, or cut short) within 2 m of their target.
+
+    NaN without any (HANNA, originals 3.7 'target success').
+    """
+    outcomes = []
+    for i, step in enumerate(episode.steps):
+        if step.mode is not Mode.SUB:
+            continue
+        last = i + 1 == len(episode.steps)
+        if isinstance(step.action, (Ask, Stop)) or last:
+            node = step.next_pose.node if isinstance(step.action, Move) else step.pose.node
+            outcomes.append(graph.distance[node, step.targets[0]] <= 2.0 + 1e-9)
+    return float(np.mean(outcomes)) if outcomes else float("nan")
+
+
+def mistake_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
+    """Steps that repeat a past mistake, and all steps (Table 4.6 'nav. mistake repeat').
+
+    A mistake is a navigation action that the teacher would not take; it repeats when the same
+    wrong next node was chosen before at this node, with this instruction and these targets.
+    """
+    wrong: set[tuple[object, ...]] = set()
+    repeats = 0
+    for step in episode.steps:
+        if isinstance(step.action, Ask):
+            continue
+        here = step.pose.node
+        target = min(step.targets, key=lambda g: (graph.distance[here, g], g))
+        reference = here if here == target else int(graph.next_hop[here, target])
+        chosen = step.candidate_nodes[step.action.candidate] if isinstance(step.action, Move) else here
+        if chosen == reference:
+            continue
+        key = (here, step.instruction, tuple(sorted(step.targets)), chosen)
+        repeats += key in wrong
+        wrong.add(key)
+    return repeats, len(episode.steps)
+
+
+def request_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
+    """Requests made before at the same node, instruction and targets, and all requests (Table 4.6)."""
+    seen: set[tuple[object, ...]] = set()
+    repeats = 0
+    for step in episode.steps:
+        if isinstance(step.action, Ask):
+            key = (step.pose.node, step.instruction, tuple(sorted(step.targets)))
+            repeats += key in seen
+            seen.add(key)
+    return repeats, len(seen) + repeats
+
+
+def dtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph) -> float:
+    """Dynamic time warping cost between two node sequences, metres (Magalhaes et al. 2019)."""
+    cost = np.full((len(path) + 1, len(reference) + 1), np.inf)
+    cost[0, 0] = 0.0
+    for i, a in enumerate(path, 1):
+        for j, b in enumerate(reference, 1):
+            cost[i, j] = graph.distance[a, b] + min(cost[i - 1, j], cost[i, j - 1], cost[i - 1, j - 1])
+    return float(cost[-1, -1])
+
+
+def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
+    """exp(-DTW / (|R| radius)), 1 for the reference itself (originals 5.2)."""
+    return float(np.exp(-dtw(path, reference, graph) / (len(reference) * radius)))
+
+
+def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
+    """nDTW if the ends are within the radius, else 0 (originals 5.2)."""
+    near = graph.distance[path[-1], reference[-1]] <= radius + 1e-9
+    return ndtw(path, reference, graph, radius) if near else 0.0
+
+
+def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
+    """The node sequence with consecutive repeats removed (turning, asking and stopping stay put)."""
+    return tuple(v for i, v in enumerate(nodes) if i == 0 or v != nodes[i - 1])
+
+
+PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
+    "success": success, "spl": spl, "navigation error": navigation_error, "requests": requests,
+    "oracle success": oracle_success, "path length": path_length, "steps": steps,
+}
+"""The numbers every task reports, by name, in the order of their columns."""

@@ -1,0 +1,127 @@
+"""Action spaces on the graph: the panoramic one of HANNA, VLN and HARI, and VNLA's monocular one.
+
+Both answer the same question: from this pose, which poses can the next move reach, and what does
+the agent know about each. Results depend on the graph and the pose only, never on the task, so
+they are computed once per pose and shared by all episodes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from embodied.geometry import wrap
+from embodied.interface import STEP, TURNS, VIEWS, Candidates, Pose
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+WORDS = ("forward", "left", "right", "up", "down")
+"""VNLA's moves, in the order of its candidates; stopping is an action of its own."""
+FIELD = math.radians(40)
+"""Half the horizontal field in which 'forward' looks for a node: vfov 60 degrees times 640 / 480,
+halved, the linear rule of the Matterport3D simulator (originals 1.4)."""
+
+Reach = tuple[Candidates, tuple[Pose, ...]]
+"""What the agent knows about its moves, and the privileged pose that each leads to."""
+
+
+class Moves(Protocol):
+    def at(self, world: World, pose: Pose) -> Reach: ...
+
+
+class PanoramicMoves:
+    """Rotate towards a neighbouring node and go there (Fried et al. 2018, dissertation 4.2.2)."""
+
+    def __init__(self) -> None:
+        self._reach: dict[tuple[str, int, int], Reach] = {}
+
+    def at(self, world: World, pose: Pose) -> Reach:
+        key = (world.house.name, pose.node, pose.turn)
+        reach = self._reach.get(key)
+        if reach is None:
+            reach = self._reach[key] = panoramic_reach(world.graph, pose)
+        return reach
+
+
+class MonocularMoves:
+    """Turn or tilt by 30 degrees, or go to the node nearest the middle of the view (VNLA).
+
+    Differs from the authors' program, whose 'forward' prefers the next node of the optimal path
+    even at test time (originals X14): here an action never depends on the goal.
+    """
+
+    def __init__(self) -> None:
+        self._reach: dict[tuple[str, Pose], Reach] = {}
+
+    def at(self, world: World, pose: Pose) -> Reach:
+        key = (world.house.name, pose)
+        reach = self._reach.get(key)
+        if reach is None:
+            reach = self._reach[key] = monocular_reach(world.graph, pose)
+        return reach
+
+
+def directions(graph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Neighbours of `node`, ascending, and where they are seen: (n,) nodes, yaws and pitches in radians."""
+    nodes = np.array(sorted(int(j) for j in graph.neighbours(node)), dtype=np.int64)
+    offset = np.asarray(graph.positions)[nodes] - np.asarray(graph.positions)[node]
+    yaw = np.arctan2(offset[:, 1], offset[:, 0])
+    pitch = np.arctan2(offset[:, 2], np.hypot(offset[:, 0], offset[:, 1]))
+    return nodes, yaw, pitch
+
+
+def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """(n,) int64: the views whose centres are nearest in sqrt(dyaw^2 + dpitch^2) (originals 2.2)."""
+    views = np.arange(VIEWS)
+    d_yaw = wrap(yaw[:, None] - (views % TURNS) * STEP)
+    d_pitch = pitch[:, None] - (views // TURNS - 1) * STEP
+    return np.argmin(np.round(d_yaw**2 + d_pitch**2, 9), axis=1)
+
+
+def panoramic_reach(graph, pose: Pose) -> Reach:
+    """Neighbours sorted by |bearing| from the agent's yaw (originals 2.2); the tilt does not matter."""
+    nodes, yaw, pitch = directions(graph, pose.node)
+    bearing = wrap(yaw - pose.yaw)
+    order = np.lexsort((nodes, np.round(np.abs(bearing), 9)))
+    view = nearest_views(yaw, pitch)[order]
+    candidates = Candidates(
+        bearing[order].astype(np.float32), pitch[order].astype(np.float32), view, np.ones(len(nodes), dtype=bool)
+    )
+    poses = tuple(Pose(int(j), int(v) % TURNS, int(v) // TURNS - 1) for j, v in zip(nodes[order], view))
+    return candidates, poses
+
+
+def monocular_reach(graph, pose: Pose) -> Reach:
+    """The five moves of WORDS; 'forward' keeps the camera's angles."""
+    ahead = node_ahead(graph, pose)
+    forward = pose if ahead is None else Pose(ahead, pose.turn, pose.tilt)
+    up, down = min(pose.tilt + 1, 1), max(pose.tilt - 1, -1)
+    poses = (
+        forward,
+        Pose(pose.node, (pose.turn + 1) % TURNS, pose.tilt),
+        Pose(pose.node, (pose.turn - 1) % TURNS, pose.tilt),
+        Pose(pose.node, pose.turn, up),
+        Pose(pose.node, pose.turn, down),
+    )
+    candidates = Candidates(
+        np.array([0.0, STEP, -STEP, 0.0, 0.0], dtype=np.float32),
+        np.array([pose.pitch, pose.pitch, pose.pitch, up * STEP, down * STEP], dtype=np.float32),
+        np.array([p.view for p in poses]),
+        np.array([ahead is not None, True, True, pose.tilt < 1, pose.tilt > -1]),
+        WORDS,
+    )
+    return candidates, poses
+
+
+def node_ahead(graph, pose: Pose) -> int | None:
+    """The neighbour nearest the middle of the view among those within FIELD sideways, if any."""
+    nodes, yaw, pitch = directions(graph, pose.node)
+    bearing = wrap(yaw - pose.yaw)
+    inside = np.abs(bearing) <= FIELD
+    if not inside.any():
+        return None
+    offset = np.where(inside, np.round(np.hypot(bearing, pitch - pose.pitch), 9), np.inf)
+    return int(nodes[int(np.argmin(offset))])

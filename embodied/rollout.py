@@ -1,0 +1,85 @@
+"""Playing episodes: a generator of frames that streaming, saving, training and metrics consume."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from embodied.env import HelpEnv
+from embodied.interface import Episode, Observation, Policy, Situation, Step, Task
+from embodied.seeds import stream
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One step of one episode, as it happens."""
+
+    index: int
+    """Which of the tasks."""
+    observation: Observation
+    """What the policy saw."""
+    situation: Situation
+    """What was the case, before the action."""
+    step: Step
+    """What was done."""
+    episode: Episode | None
+    """The whole episode with its last frame, else None."""
+
+
+def rollout(
+    make_env: Callable[[], HelpEnv], policy: Policy, tasks: Iterable[Task], *,
+    seed: int, batch: int = 1, agent: str = "",
+) -> Iterator[Frame]:
+    """Play `tasks`, `batch` at a time; frames of one episode come in order.
+
+    Every episode gets its own generator, stream(seed, 'policy', task id), so what happens in it
+    does not depend on the batch, nor on the order of the tasks.
+
+    Args:
+      make_env: gives a fresh environment; called `batch` times.
+    """
+    envs: list[HelpEnv] = []
+    group: list[tuple[int, Task]] = []
+    for numbered in enumerate(tasks):
+        group.append(numbered)
+        if len(group) == batch:
+            yield from _play(make_env, envs, policy, group, seed, agent)
+            group = []
+    if group:
+        yield from _play(make_env, envs, policy, group, seed, agent)
+
+
+def play(
+    make_env: Callable[[], HelpEnv], policy: Policy, tasks: Iterable[Task], *,
+    seed: int, batch: int = 1, agent: str = "",
+) -> list[Episode]:
+    """The finished episodes of `rollout`, in the order of the tasks."""
+    done = {f.index: f.episode for f in rollout(make_env, policy, tasks, seed=seed, batch=batch, agent=agent)}
+    return [done[i] for i in sorted(done)]
+
+
+def _play(
+    make_env: Callable[[], HelpEnv], envs: list[HelpEnv], policy: Policy,
+    group: Sequence[tuple[int, Task]], seed: int, agent: str,
+) -> Iterator[Frame]:
+    while len(envs) < len(group):
+        envs.append(make_env())
+    observations: list[Observation | None] = [
+        env.reset(task, seed=seed) for env, (_, task) in zip(envs, group)
+    ]
+    rngs = [stream(seed, "policy", task.id) for _, task in group]
+    memory = None
+    while any(o is not None for o in observations):
+        if getattr(policy, "privileged", False):
+            situations = [None if o is None else env.situation for env, o in zip(envs, observations)]
+            actions, memory = policy.act(observations, memory, rngs=rngs, situations=situations)
+        else:
+            actions, memory = policy.act(observations, memory, rngs=rngs)
+        for i, (env, (index, _)) in enumerate(zip(envs, group)):
+            seen = observations[i]
+            if seen is None:
+                continue
+            situation = env.situation
+            observations[i] = env.step(actions[i])
+            episode = env.episode(agent) if observations[i] is None else None
+            yield Frame(index, seen, situation, env.last_step, episode)

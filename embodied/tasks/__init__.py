@@ -1,0 +1,1 @@
+"""Tasks: who is asked to do what, sampled as pure functions of (seed, world, index)."""

@@ -1,0 +1,1 @@
+"""Teachers: see everything, label training data, never speak to the agent."""

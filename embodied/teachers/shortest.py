@@ -1,0 +1,47 @@
+"""The navigation teacher: the next node of the shortest path to the nearest target (4.2.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from embodied.interface import Episode, Label, Move, Pose, Situation, Stop
+
+if TYPE_CHECKING:
+    from embodied.navgraph import NavGraph
+    from embodied.world import World
+
+
+def nearest(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
+    """The target nearest to `node` along the graph; the lowest index of equals."""
+    distance = graph.distance
+    return min(targets, key=lambda g: (distance[node, g], g))
+
+
+def next_node(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
+    """The next node towards the nearest target; `node` itself when it is one."""
+    target = nearest(graph, node, targets)
+    return node if target == node else int(graph.next_hop[node, target])
+
+
+def shortest_action(graph: NavGraph, pose: Pose, targets: Sequence[int], candidate_nodes: Sequence[int]) -> Move | Stop:
+    """The reference action in the panoramic action space; stop at a target."""
+    node = next_node(graph, pose.node, targets)
+    return Stop() if node == pose.node else Move(candidate_nodes.index(node))
+
+
+class ShortestTeacher:
+    """Labels every step with the reference action; has no opinion about asking.
+
+    On a route the reference leads to the departure node by the shortest path, not along the
+    route (originals 3.3).
+    """
+
+    def label(self, situation: Situation) -> Label:
+        s = situation
+        return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
+
+    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+        return tuple(
+            Label(shortest_action(world.graph, s.pose, s.targets, s.candidate_nodes)) for s in episode.steps
+        )

@@ -1,0 +1,113 @@
+"""Tiny worlds by hand for the tests of play: a four-node line and a grid over four rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from embodied.house import House, Opening, Placement, Room, Storey
+
+FINISHES = ("oak_planks/0", "paint_white/0", "paint_white/0", "paint_white/0")
+
+
+@dataclass(frozen=True, eq=False)
+class HandGraph:
+    """A NavGraph made from positions and edges."""
+
+    positions: np.ndarray
+    ids: tuple[str, ...]
+    room_of_node: tuple[str, ...]
+    edges: np.ndarray
+    lengths: np.ndarray
+    distance: np.ndarray
+    next_hop: np.ndarray
+
+    def neighbours(self, node: int) -> tuple[int, ...]:
+        a, b = self.edges.T
+        return tuple(sorted({int(x) for x in np.concatenate([b[a == node], a[b == node]])}))
+
+    def path(self, start: int, goal: int) -> tuple[int, ...]:
+        nodes = [start]
+        while nodes[-1] != goal:
+            nodes.append(int(self.next_hop[nodes[-1], goal]))
+        return tuple(nodes)
+
+
+def hand_graph(positions, edges, rooms) -> HandGraph:
+    positions, edges = np.asarray(positions, dtype=float), np.asarray(edges)
+    lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+    n = len(positions)
+    matrix = csr_matrix((lengths, edges.T), shape=(n, n))
+    distance, before = dijkstra(matrix, directed=False, return_predecessors=True)
+    next_hop = before.T.astype(np.int64).copy()
+    np.fill_diagonal(next_hop, np.arange(n))
+    return HandGraph(positions, tuple(f"n{i}" for i in range(n)), tuple(rooms), edges, lengths, distance, next_hop)
+
+
+@dataclass(frozen=True, eq=False)
+class HandWorld:
+    house: House
+    graph: HandGraph
+
+    def sightings(self, node: int) -> tuple:
+        return ()
+
+
+def room(name: str, kind: str, x0: float, y0: float, x1: float, y1: float) -> Room:
+    return Room(name, kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), *FINISHES)
+
+
+def thing(name: str, number: int, where: str, x: float, y: float) -> Placement:
+    return Placement(f"{name.replace(' ', '_')}_{number}", f"hand/{name}", name, where, (x, y, 0.0), 0.0, (0.2, 0.2, 0.2))
+
+
+def line_world() -> HandWorld:
+    """Nodes 0-1-2-3 two metres apart along +x in one room; a mug beside node 3."""
+    hall = room("hall_1", "hall", 0, 0, 8, 2)
+    door = Opening("front_door_1", "front_door", ("hall_1", None), (0, 1.5), (0, 0.5), 0.0, 2.1)
+    house = House(0, "line", (Storey(0.0, 2.6),), (hall,), (door,), (thing("mug", 1, "hall_1", 7.4, 1.2),), ())
+    positions = [[1 + 2 * i, 1, 1.5] for i in range(4)]
+    return HandWorld(house, hand_graph(positions, [[0, 1], [1, 2], [2, 3]], ["hall_1"] * 4))
+
+
+def grid_world(side: int = 6, spacing: float = 2.0, name: str = "grid") -> HandWorld:
+    """side x side nodes over four equal rooms, doors in the middle of the inner walls, a few things."""
+    half = side * spacing / 2
+    rooms = (
+        room("kitchen_1", "kitchen", 0, 0, half, half),
+        room("bedroom_1", "bedroom", half, 0, 2 * half, half),
+        room("living_room_1", "living_room", 0, half, half, 2 * half),
+        room("bathroom_1", "bathroom", half, half, 2 * half, 2 * half),
+    )
+    m = spacing / 2
+    low, high = m + spacing, half + m + spacing
+    doors = (
+        Opening("door_1", "door", ("kitchen_1", "bedroom_1"), (half, low - 0.4), (half, low + 0.4), 0.0, 2.0),
+        Opening("door_2", "door", ("kitchen_1", "living_room_1"), (low - 0.4, half), (low + 0.4, half), 0.0, 2.0),
+        Opening("door_3", "door", ("living_room_1", "bathroom_1"), (half, high - 0.4), (half, high + 0.4), 0.0, 2.0),
+    )
+    things = (
+        thing("mug", 1, "kitchen_1", 1.2, 0.8), thing("mug", 2, "living_room_1", 0.8, 2 * half - 1.0),
+        thing("bed", 1, "bedroom_1", 2 * half - 1.0, 1.0), thing("towel", 1, "bathroom_1", 2 * half - 1.2, 2 * half - 0.8),
+        thing("sofa", 1, "living_room_1", half - 1.0, half + 1.0), thing("lamp", 1, "bedroom_1", half + 1.0, half - 1.0),
+    )
+    house = House(0, name, (Storey(0.0, 2.6),), rooms, doors, things, ())
+    positions, where, edges = [], [], []
+    for y in range(side):
+        for x in range(side):
+            positions.append([m + x * spacing, m + y * spacing, 1.5])
+            where.append(rooms[2 * (y >= side // 2) + (x >= side // 2)].id)
+    ok = {frozenset(p) for p in (("kitchen_1", "bedroom_1"), ("kitchen_1", "living_room_1"), ("living_room_1", "bathroom_1"))}
+    door_rows = {1, side // 2 + 1}
+    for i in range(side * side):
+        x, y = i % side, i // side
+        for j, along in ((i + 1 if x + 1 < side else None, y), (i + side if y + 1 < side else None, x)):
+            if j is None:
+                continue
+            if where[i] == where[j] or (frozenset((where[i], where[j])) in ok and along in door_rows):
+                edges.append([i, j])
+    jitter = np.array(positions) + 0.05 * np.sin(np.arange(3 * side * side)).reshape(-1, 3)
+    return HandWorld(house, hand_graph(jitter, edges, where))

@@ -1,0 +1,82 @@
+"""Metrics by hand on a four-node line (truth 8): nodes 0-1-2-3, two metres apart."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hand_worlds import line_world
+
+from embodied import metrics
+from embodied.env import HelpEnv
+from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, Task
+
+
+def task(radius: float = 0.0, start: int = 0, goals: tuple[int, ...] = (3,), horizon: int = 9) -> Task:
+    what = FindObject("mug", None, ("mug_1",))
+    return Task("line/find/0", "find", "line", Pose(start), what, goals, "find a mug", radius, horizon)
+
+
+def walk(nodes: list[int], the_task: Task, stop: bool = True):
+    """The episode that visits `nodes` and stops."""
+    env = HelpEnv({"line": line_world()})
+    env.reset(the_task)
+    for node in nodes[1:]:
+        env.step(Move(env.situation.candidate_nodes.index(node)))
+    if stop:
+        env.step(Stop())
+    return env.episode()
+
+
+def test_the_straight_way_scores_one():
+    graph, e = line_world().graph, walk([0, 1, 2, 3], task())
+    assert metrics.success(e, graph) == 1 and metrics.spl(e, graph) == 1
+    assert metrics.navigation_error(e, graph) == 0 and metrics.path_length(e, graph) == 6
+
+
+def test_a_detour_of_four_metres_scores_six_tenths():
+    graph, e = line_world().graph, walk([0, 1, 0, 1, 2, 3], task())
+    assert metrics.spl(e, graph) == pytest.approx(6 / 10)
+
+
+def test_stopping_one_node_short_is_success_only_within_the_radius():
+    graph = line_world().graph
+    short, near = walk([0, 1, 2], task()), walk([0, 1, 2], task(radius=2.0))
+    assert (metrics.success(short, graph), metrics.navigation_error(short, graph)) == (0, 2)
+    assert metrics.success(near, graph) == 1
+    assert metrics.spl(near, graph) == 1, "walked 4 m of 6 m: the ratio is capped at one"
+
+
+def test_passing_the_goal_is_oracle_success_only():
+    graph, e = line_world().graph, walk([1, 2, 3, 2, 1], task(start=1))
+    assert metrics.oracle_success(e, graph) == 1 and metrics.success(e, graph) == 0
+
+
+def test_spl_measures_to_the_goal_nearest_the_final_node():
+    graph, e = line_world().graph, walk([1, 2, 3], task(start=1, goals=(0, 3)))
+    assert metrics.spl(e, graph) == 1, "4 m walked, 4 m to goal 3; goal 0 at 2 m does not count"
+
+
+def test_cut_short_by_the_horizon_is_judged_where_it_stands():
+    graph, e = line_world().graph, walk([0, 1, 2, 3], task(horizon=3), stop=False)
+    assert e.ended == "limit" and metrics.success(e, graph) == 1
+
+
+def test_the_second_wrong_turn_at_a_place_is_a_repeat():
+    graph, e = line_world().graph, walk([1, 0, 1, 0, 1, 2, 3], task(start=1))
+    assert metrics.mistake_repeats(e, graph) == (1, 7)
+
+
+def test_ndtw_of_a_path_one_node_short():
+    graph = line_world().graph
+    assert metrics.dtw((0, 1, 2), (0, 1, 2, 3), graph) == 2
+    assert metrics.ndtw((0, 1, 2), (0, 1, 2, 3), graph) == pytest.approx(math.exp(-2 / (4 * 3)))
+    assert metrics.ndtw((0, 1, 2, 3), (0, 1, 2, 3), graph) == 1
+    assert metrics.sdtw((0, 1), (0, 1, 2, 3), graph) == 0, "4 m from the end is outside 3 m"
+    assert metrics.without_repeats((0, 0, 1, 1, 0)) == (0, 1, 0)
+
+
+def test_a_route_task_is_judged_like_any_other():
+    route = Task("line/vln/0", "vln", "line", Pose(0), FollowRoute("r", (0, 1, 2)), (2,), "go on", 3.0, 9)
+    e = walk([0, 1], route)
+    assert metrics.success(e, line_world().graph) == 1
