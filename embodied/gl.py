@@ -1,4 +1,4 @@
-"""Choosing and owning the off-screen OpenGL context. Import this before mujoco.
+"""Choosing and owning the off-screen OpenGL context. Import it, and call `prepare`, before mujoco.
 
 EGL is preferred (it uses a GPU where one is, Mesa's software rasteriser elsewhere); OSMesa is the
 fall-back. MUJOCO_GL, MuJoCo's own switch, is honoured when the user has set it to either.
@@ -7,6 +7,7 @@ fall-back. MUJOCO_GL, MuJoCo's own switch, is honoured when the user has set it 
 from __future__ import annotations
 
 import atexit
+import contextlib
 import ctypes
 import ctypes.util
 import functools
@@ -55,6 +56,12 @@ def choose() -> str:
     os.environ["MUJOCO_GL"] = backend
     os.environ["PYOPENGL_PLATFORM"] = backend
     return backend
+
+
+def prepare() -> None:
+    """Set MuJoCo's switch before mujoco is imported; that nothing can draw is said only when asked to draw."""
+    with contextlib.suppress(GLError):
+        choose()
 
 
 @functools.cache

@@ -1,0 +1,178 @@
+"""Simple collision shapes: a handful of boxes for every object, and boxes around the openings of walls."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy import ndimage
+
+from assets.records import Asset, MeshPart
+from embodied.house import House, Room
+from embodied.seeds import stream
+
+CELLS = (12, 8, 6, 4, 2)
+"""Cells per axis of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
+MOST_BOXES = 24
+SLAB = 0.02
+"""Thickness in metres of the board under a support surface."""
+THINNEST = 0.002
+"""Half thickness below which a box is thickened, metres."""
+SMALL = 0.35
+"""Objects no larger than this in metres, without support surfaces, are one box."""
+
+DENSITIES = (
+    ("metal", 900.0), ("stone", 2000.0), ("marble", 2000.0), ("ceramic", 1200.0), ("glass", 1200.0),
+    ("wood", 500.0), ("leather", 200.0), ("fabric", 120.0), ("plastic", 300.0), ("paper", 600.0),
+)
+"""Material word to kg per cubic metre of what a box encloses (things are hollow)."""
+DENSITY = 300.0
+
+
+@dataclass(frozen=True)
+class Box:
+    """An upright box; turned about z by `yaw` radians."""
+
+    centre: tuple[float, float, float]
+    half: tuple[float, float, float]
+    """Half extents, metres."""
+    yaw: float = 0.0
+
+
+def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[Box, ...]:
+    """Boxes that cover an object and leave the space under tables and over its support surfaces free.
+
+    Args:
+      asset: gives the support surfaces, in the asset's own size.
+      parts: the object's meshes scaled to `size`, in the asset frame.
+      size: (width, depth, height) of the placed object, metres.
+    """
+    scale = np.asarray(size) / np.asarray(asset.size)
+    slabs, points = [], surface_points(parts)
+    for s in asset.surfaces:
+        low = np.array([s.x0, s.y0, s.z]) * scale
+        high = np.array([s.x1, s.y1, s.z + s.headroom]) * scale
+        inside = np.all((points[:, :2] > low[:2]) & (points[:, :2] < high[:2]), axis=1)
+        points = points[~(inside & (points[:, 2] > low[2] + 0.002) & (points[:, 2] < high[2]))]
+        bottom = max(low[2] - SLAB, 0.0)
+        slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
+    if not len(points):
+        return tuple(_box(low, high) for low, high in slabs)
+    if not slabs and max(size) < SMALL:
+        return (_box(points.min(axis=0), points.max(axis=0)),)
+    cut = sorted({round(float(high[2]), 4) for _, high in slabs})
+    for n in CELLS:
+        bounds = grid_boxes(points, n, cut)
+        if len(bounds) <= MOST_BOXES:
+            break
+    return tuple(_box(low, high) for low, high in (*slabs, *bounds))
+
+
+def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
+    """(k, 3) points spread over the surface of `parts`, always the same ones; vertices included."""
+    corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    if areas.sum() <= 0:
+        return corners.reshape(-1, 3)
+    rng = stream(0, "collision", "surface_points")
+    chosen = corners[np.searchsorted(np.cumsum(areas) / areas.sum(), rng.random(n)).clip(max=len(corners) - 1)]
+    a, b = np.sqrt(rng.random(n))[:, None], rng.random(n)[:, None]
+    spread = (1 - a) * chosen[:, 0] + a * (1 - b) * chosen[:, 1] + a * b * chosen[:, 2]
+    return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
+
+
+def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(low, high) corners of boxes that cover `points` (k, 3), from an n x n x n occupancy grid.
+
+    The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
+    shrunk to the points in it, so a table top stays thin and its height exact.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    edges = [np.linspace(low[i], high[i] + 1e-9, n + 1) for i in range(3)]
+    edges[2] = np.unique(np.concatenate([edges[2], [z + 1e-6 for z in cut if low[2] < z < high[2]]]))
+    cells = [np.clip(np.searchsorted(e, points[:, i], side="right") - 1, 0, len(e) - 2) for i, e in enumerate(edges)]
+    shape = tuple(len(e) - 1 for e in edges)
+    flat = np.ravel_multi_index(cells, shape)
+    lows, highs = np.full((np.prod(shape), 3), np.inf), np.full((np.prod(shape), 3), -np.inf)
+    np.minimum.at(lows, flat, points)
+    np.maximum.at(highs, flat, points)
+    lows, highs = lows.reshape(*shape, 3), highs.reshape(*shape, 3)
+    occupied = np.isfinite(lows[..., 0])
+    filled = ndimage.binary_fill_holes(occupied)
+    boxes = []
+    while (left := np.argwhere(filled)).size:
+        x, y, z = left[0]
+        block = _grow(filled, x, y, z)
+        filled[block] = False
+        if occupied[block].any():
+            boxes.append((lows[block].min(axis=(0, 1, 2)), highs[block].max(axis=(0, 1, 2))))
+    return boxes
+
+
+def _grow(filled: np.ndarray, x: int, y: int, z: int) -> tuple[slice, slice, slice]:
+    """The block of true cells from (x, y, z) on, grown along x, then y, then z."""
+    x1, y1, z1 = x + 1, y + 1, z + 1
+    while x1 < filled.shape[0] and filled[x1, y, z]:
+        x1 += 1
+    while y1 < filled.shape[1] and filled[x:x1, y1, z].all():
+        y1 += 1
+    while z1 < filled.shape[2] and filled[x:x1, y:y1, z1].all():
+        z1 += 1
+    return slice(x, x1), slice(y, y1), slice(z, z1)
+
+
+def _box(low: np.ndarray, high: np.ndarray) -> Box:
+    half = np.maximum((high - low) / 2, THINNEST)
+    centre = (low + high) / 2
+    centre[2] = high[2] - half[2]
+    return Box(tuple(centre.tolist()), tuple(half.tolist()))
+
+
+def density_of(asset: Asset) -> float:
+    """Kilograms per cubic metre of the asset's boxes, from its material words."""
+    return next((d for word, d in DENSITIES if any(word in m for m in asset.materials)), DENSITY)
+
+
+def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[Box, ...]:
+    """Boxes under the floor of `room`; oblique rooms are covered by boxes up to half a metre beyond."""
+    polygon, top = shapely.Polygon(room.polygon), house.storey_of(room).elevation
+    xs, ys = (sorted({round(c[i], 6) for c in room.polygon}) for i in (0, 1))
+    boxes = []
+    for x0, x1 in itertools.pairwise(xs):
+        for y0, y1 in itertools.pairwise(ys):
+            if polygon.intersects(shapely.box(x0 + 1e-3, y0 + 1e-3, x1 - 1e-3, y1 - 1e-3)):
+                boxes.append(_box(np.array([x0, y0, top - thickness]), np.array([x1, y1, top])))
+    return tuple(boxes)
+
+
+def wall_boxes(house: House, room: Room, edge: int) -> tuple[Box, ...]:
+    """Boxes of the wall along polygon edge `edge` of `room`, on the room's side of its centre line."""
+    storey = house.storey_of(room)
+    a, b = (np.array(room.polygon[i % len(room.polygon)]) for i in (edge, edge + 1))
+    length = float(np.linalg.norm(b - a))
+    along = (b - a) / length
+    holes = []
+    for o in house.openings:
+        if room.id in o.rooms:
+            ends = np.array([o.a, o.b]) - a
+            if np.abs(np.cross(np.broadcast_to(along, (2, 2)), ends)).max() < 1e-3:
+                s = np.sort(ends @ along)
+                if s[0] > -1e-3 and s[1] < length + 1e-3:
+                    holes.append((s[0], s[1], o.sill, o.head))
+    thickness, reach = house.inner_wall / 2, house.inner_wall / 2
+    pieces, start = [], -reach
+    for s0, s1, sill, head in sorted(holes):
+        pieces += [(start, s0, 0.0, storey.height), (s0, s1, 0.0, sill), (s0, s1, head, storey.height)]
+        start = s1
+    pieces.append((start, length + reach, 0.0, storey.height))
+    inward, yaw = np.array([-along[1], along[0]]), float(np.arctan2(along[1], along[0]))
+    boxes = []
+    for s0, s1, z0, z1 in pieces:
+        if s1 - s0 > 1e-3 and z1 - z0 > 1e-3:
+            middle = a + along * (s0 + s1) / 2 + inward * thickness / 2
+            centre = (float(middle[0]), float(middle[1]), storey.elevation + (z0 + z1) / 2)
+            boxes.append(Box(centre, ((s1 - s0) / 2, thickness / 2, (z1 - z0) / 2), yaw))
+    return tuple(boxes)

@@ -1,0 +1,340 @@
+"""House to MjSpec to MjModel: the only translation. Every geom knows whose it is.
+
+Visual geoms are in group 2 and touch nothing; collision boxes are in group 3 and are not drawn.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from embodied import gl
+
+gl.prepare()
+
+import cv2
+import mujoco
+import numpy as np
+
+from assets.records import Finish, MeshPart
+from embodied import collision
+from embodied.house import House, Placement
+from embodied.lit import LitPages
+from embodied.parts import Part, house_parts, owners
+
+VISUAL, COLLISION = 2, 3
+"""Geom groups."""
+TEXTURE_SIZE = 512
+"""Largest side of a texture in pixels; larger ones are shrunk when loaded."""
+OFFSCREEN = 1024
+"""Side of the off-screen buffer: the largest picture, pixels."""
+LOOSE = ("floor", "against_wall", "corner", "surface")
+"""Supports under which a freed object can move; what hangs on walls and ceilings stays fixed."""
+UNDERFOOT = 0.03
+"""Things on the floor that are lower than this (rugs, mats) are cloth to walk on and stop nothing, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A compiled house."""
+
+    model: mujoco.MjModel
+    owners: tuple[str, ...]
+    """parts.owners(house): instance id i + 1 belongs to owners[i]."""
+    owner_of_geom: np.ndarray
+    """(ngeom,) int32 instance id of every geom; 0 for geoms that nobody owns."""
+    kind_of_geom: tuple[str, ...]
+    """Part.kind of every geom; 'collision' for collision boxes."""
+    room_of_geom: tuple[str, ...]
+    """Part.room of every geom; '' for the outdoors and for collision boxes of the shell."""
+    free: tuple[str, ...] = ()
+    """Placement ids that have a body and a free joint of the same name."""
+
+
+def compile_scene(house: House, catalogue, *, free: Iterable[str] = (), collisions: bool = True,
+                  lit: LitPages | None = None) -> Scene:
+    """Build and compile `house`.
+
+    Args:
+      free: ids of the placements that physics may move; see `loose`.
+      collisions: False leaves the collision boxes out, which a renderer does not need.
+      lit: draw these pages instead of the house's own materials.
+    """
+    spec = build_spec(house, catalogue, free=frozenset(free), collisions=collisions, lit=lit)
+    return scene_of(house, catalogue, spec, free=free, lit=lit)
+
+
+def scene_of(house: House, catalogue, spec: mujoco.MjSpec, *, free: Iterable[str] = (),
+             lit: LitPages | None = None) -> Scene:
+    """Compile a spec made by `build_spec`, and say whose every geom is."""
+    model = spec.compile()
+    names = owners(house)
+    number = {name: i + 1 for i, name in enumerate(names)}
+    if lit is None:
+        labels = {p.owner: (p.kind, p.room) for p in house_parts(house, catalogue)}
+    else:
+        labels = {m.owner: (m.kind, m.room) for m in lit.meshes}
+    owned, kinds, rooms = np.zeros(model.ngeom, np.int32), [], []
+    for g in range(model.ngeom):
+        owner = owner_of_name(model.geom(g).name)
+        owned[g] = number.get(owner, 0)
+        kind, room = labels.get(owner, ("outdoor", ""))
+        kinds.append(kind if model.geom_group[g] == VISUAL else "collision")
+        rooms.append(room)
+    return Scene(model, names, owned, tuple(kinds), tuple(rooms), tuple(sorted(free)))
+
+
+def owner_of_name(geom: str) -> str:
+    """The owner in a geom's name: '<owner>#<number>' or '<owner>#box<number>'."""
+    return geom.rpartition("#")[0]
+
+
+def loose(house: House, catalogue) -> frozenset[str]:
+    """The placements that physics can move: all that stand or lie, not what is fixed or underfoot."""
+    return frozenset(p.id for p in house.placements
+                     if catalogue.assets[p.asset].support in LOOSE and not is_underfoot(p))
+
+
+def is_underfoot(p: Placement) -> bool:
+    """Whether one walks over it: a rug, a mat."""
+    return p.parent is None and p.size[2] < UNDERFOOT
+
+
+def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), collisions: bool = True,
+               lit: LitPages | None = None) -> mujoco.MjSpec:
+    """The house as an MjSpec.
+
+    Raises:
+      ValueError: `free` names something that is no placement, or is asked for together with `lit`.
+    """
+    if unknown := sorted(free - set(house.placement_by_id)):
+        raise ValueError(f"free names {unknown}, which are no placements of house {house.name!r}")
+    if free and lit is not None:
+        raise ValueError("a lit house is static: its light is painted on; build it without free, or without lit")
+    spec = _empty_spec(house)
+    bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
+    if lit is None:
+        parts = house_parts(house, catalogue)
+        _light(spec)
+        _add_parts(spec, parts, bodies)
+    else:
+        parts = ()
+        spec.visual.headlight.active = 0
+        _add_pages(spec, lit)
+    if collisions:
+        _add_collisions(spec, house, catalogue, bodies)
+    return spec
+
+
+def _empty_spec(house: House) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    spec.modelname = re.sub(r"\W+", "_", house.name) or "house"
+    spec.compiler.degree = False
+    spec.compiler.usethread = True
+    spec.compiler.inertiagrouprange = [COLLISION, COLLISION]
+    spec.option.timestep = 0.004
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    spec.stat.center = [*(low + high) / 2, 1.0]
+    spec.stat.extent = float(np.linalg.norm(high - low))
+    view = spec.visual
+    view.global_.offwidth = view.global_.offheight = OFFSCREEN
+    view.quality.shadowsize = 0
+    view.quality.offsamples = 4
+    view.map.znear, view.map.zfar = 0.02 / spec.stat.extent, 200.0 / spec.stat.extent
+    return spec
+
+
+def _light(spec: mujoco.MjSpec) -> None:
+    """Soft light from all sides without shadows, the same for every camera: cube faces join."""
+    head = spec.visual.headlight
+    head.active, head.ambient, head.diffuse, head.specular = 1, [0.40] * 3, [0.0] * 3, [0.0] * 3
+    for direction, strength in LIGHTS:
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=direction, pos=[0, 0, 3], castshadow=False,
+            ambient=[0, 0, 0], diffuse=[strength, strength * 0.985, strength * 0.95], specular=[0.08] * 3)
+
+
+LIGHTS = (
+    ((0.25, 0.35, -1.0), 0.42), ((0.0, 0.0, 1.0), 0.46), ((1.0, 0.25, -0.15), 0.30), ((-1.0, -0.2, -0.15), 0.22),
+    ((-0.2, 1.0, -0.15), 0.38), ((0.2, -1.0, -0.15), 0.26),
+)
+"""Direction and strength of the fill lights: floor, ceiling and the four ways a wall can face."""
+
+
+def _free_body(spec: mujoco.MjSpec, p: Placement) -> mujoco.MjsBody:
+    body = spec.worldbody.add_body(name=p.id, pos=p.position, quat=yaw_quat(p.yaw))
+    body.add_freejoint(name=p.id)
+    return body
+
+
+def yaw_quat(yaw: float) -> list[float]:
+    """w x y z of a turn about z."""
+    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+
+
+def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, mujoco.MjsBody]) -> None:
+    meshes: dict[str, str] = {}
+    looks = _Looks(spec)
+    count: dict[str, int] = {}
+    for part in parts:
+        if not _is_drawable(part.mesh):
+            continue
+        if part.mesh_key not in meshes:
+            meshes[part.mesh_key] = f"{len(meshes):04d}_{re.sub(r'[^A-Za-z0-9]+', '_', part.mesh_key)[:60]}"
+            uv = part.mesh.uv * [1, -1] + [0, 1]
+            _add_mesh(spec, meshes[part.mesh_key], part.mesh.vertices, part.mesh.normals, uv, part.mesh.faces)
+        k = count[part.owner] = count.get(part.owner, -1) + 1
+        material, rgba = looks.of(part.mesh.finish)
+        body = bodies.get(part.owner)
+        pose = {} if body is not None else {"pos": part.position, "quat": yaw_quat(part.yaw)}
+        (body or spec.worldbody).add_geom(
+            name=f"{part.owner}#{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=meshes[part.mesh_key],
+            material=material, rgba=rgba, group=VISUAL, contype=0, conaffinity=0, mass=0, **pose)
+
+
+def _is_drawable(mesh: MeshPart) -> bool:
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return bool(np.abs(normals).sum() > 1e-7)
+
+
+def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: np.ndarray, normals: np.ndarray | None,
+              uv: np.ndarray, faces: np.ndarray) -> None:
+    """A mesh by way of MuJoCo's binary format, which is much faster than handing over lists."""
+    n = len(vertices)
+    head = np.array([n, 0 if normals is None else n, n, len(faces)], np.int32)
+    arrays = [vertices, *([] if normals is None else [normals]), uv]
+    data = head.tobytes() + b"".join(np.ascontiguousarray(a, np.float32).tobytes() for a in arrays)
+    data += np.ascontiguousarray(faces, np.int32).tobytes()
+    spec.assets[f"{name}.msh"] = data
+    spec.add_mesh(name=name, file=f"{name}.msh", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+
+
+class _Looks:
+    """Materials and textures of a spec, each made once. MuJoCo draws at most 1000 of either."""
+
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        self._spec = spec
+        self._materials: dict[tuple, str] = {}
+        self._textures: dict[str, str] = {}
+
+    def of(self, finish: Finish) -> tuple[str, tuple[float, float, float, float]]:
+        """Material name and geom colour for `finish`; untextured finishes share their materials."""
+        gloss = round(float(np.clip((1 - finish.roughness) * finish.specular, 0, 1)), 1)
+        glow = finish.emission is not None
+        key = (finish.texture, gloss, glow, finish.metallic > 0.5)
+        if key not in self._materials:
+            name = self._materials[key] = f"material_{len(self._materials)}"
+            material = self._spec.add_material(
+                name=name, rgba=[1, 1, 1, 1] if finish.texture else [0.5, 0.5, 0.5, 1], emission=0.9 if glow else 0.0,
+                specular=gloss, shininess=max(0.05, 1 - finish.roughness))
+            if finish.texture:
+                material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = self._texture(finish.texture)
+        alpha = float(finish.color[3])
+        if finish.texture:
+            return self._materials[key], (1.0, 1.0, 1.0, alpha)
+        return self._materials[key], (*(float(c) for c in finish.color[:3]), alpha)
+
+    def _texture(self, path: str) -> str:
+        if path not in self._textures:
+            name = self._textures[path] = f"texture_{len(self._textures)}"
+            image = load_texture(path)
+            add_texture(self._spec, name, image)
+        return self._textures[path]
+
+
+def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
+    """Add (h, w, 3 or 4) uint8 sRGB as a texture of `spec`. The colour space stays at MuJoCo's default:
+    declared as sRGB it would be decoded by the classic renderer and never encoded again."""
+    texture = spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=image.shape[2])
+    texture.height, texture.width = image.shape[:2]
+    texture.data = np.ascontiguousarray(image).tobytes()
+
+
+@functools.lru_cache(maxsize=64)
+def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
+    """(h, w, 3) uint8 RGB, or (h, w, 4) where the picture has holes; at most `largest` pixels a side."""
+    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise FileNotFoundError(f"texture {Path(path).name!r} cannot be read at {path}; run `embodied assets build`")
+    if image.ndim == 2:
+        image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    if image.dtype != np.uint8:
+        image = (image / 257).astype(np.uint8)
+    if (shrink := largest / max(image.shape[:2])) < 1:
+        image = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+    if image.shape[2] == 4:
+        return cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA) if image[..., 3].min() < 250 else image[..., 2::-1].copy()
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def _add_pages(spec: mujoco.MjSpec, lit: LitPages) -> None:
+    for i, page in enumerate(lit.pages):
+        add_texture(spec, f"page_{i}", page)
+        material = spec.add_material(name=f"page_{i}", rgba=[1, 1, 1, 1], emission=1.0, specular=0.0, shininess=0.0)
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"page_{i}"
+    count: dict[str, int] = {}
+    for i, m in enumerate(lit.meshes):
+        if len(m.faces):
+            k = count[m.owner] = count.get(m.owner, -1) + 1
+            name = f"{i:04d}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
+            _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
+            spec.worldbody.add_geom(
+                name=f"{m.owner}#{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=f"page_{m.page}",
+                rgba=[1, 1, 1, m.alpha], group=VISUAL, contype=0, conaffinity=0, mass=0)
+
+
+def _add_collisions(spec: mujoco.MjSpec, house: House, catalogue, bodies: Mapping[str, mujoco.MjsBody]) -> None:
+    for room in house.rooms:
+        _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
+        for i in range(len(room.polygon)):
+            _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
+    for p in house.placements:
+        if is_underfoot(p):
+            continue
+        asset = catalogue.assets[p.asset]
+        boxes = placement_boxes(catalogue, p)
+        if p.id in bodies:
+            _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(asset))
+        else:
+            frame = spec.worldbody.add_frame(pos=p.position, quat=yaw_quat(p.yaw))
+            _add_boxes(spec.worldbody, p.id, boxes, frame=frame)
+
+
+def placement_boxes(catalogue, p: Placement) -> tuple[collision.Box, ...]:
+    """The collision boxes of a placement, in the asset frame."""
+    return collision.object_boxes(catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params), p.size)
+
+
+def _add_boxes(body: mujoco.MjsBody, owner: str, boxes: Sequence[collision.Box], *, density: float = 1000.0,
+               frame: mujoco.MjsFrame | None = None) -> None:
+    for k, box in enumerate(boxes):
+        geom = body.add_geom(
+            name=f"{owner}#box{k}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=box.centre, quat=yaw_quat(box.yaw),
+            size=box.half, group=COLLISION, rgba=[0.6, 0.7, 0.9, 0.4], density=density, friction=[0.9, 0.005, 0.0001])
+        if frame is not None:
+            geom.set_frame(frame)
+
+
+def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:
+    """How far each free object moves in `seconds` of physics, metres.
+
+    Raises:
+      FloatingPointError: the simulation diverged.
+    """
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    bodies = [scene.model.body(name).id for name in scene.free]
+    start = data.xpos[bodies].copy()
+    while data.time < seconds:
+        mujoco.mj_step(scene.model, data)
+    if not np.isfinite(data.qpos).all() or any(w.number for w in data.warning[-3:]):
+        raise FloatingPointError("the freed house explodes; objects interpenetrate deeply")
+    return dict(zip(scene.free, np.linalg.norm(data.xpos[bodies] - start, axis=1).tolist()))

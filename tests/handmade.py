@@ -1,0 +1,77 @@
+"""A catalogue made by hand: boxes of a few colours, so that tests of pictures and physics need no pack."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from assets.records import Asset, Finish, MeshPart, SupportSurface
+from embodied.house import House, Placement
+
+RED, GREEN, BLUE, WOOD = (0.9, 0.05, 0.05, 1.0), (0.05, 0.8, 0.1, 1.0), (0.1, 0.15, 0.9, 1.0), (0.6, 0.4, 0.25, 1.0)
+
+
+def box_mesh(low, high, color) -> MeshPart:
+    """An axis-aligned box with its corners at `low` and `high`."""
+    faces, vertices, normals = [], [], []
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    for axis in range(3):
+        for side in (0, 1):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            quad = np.zeros((4, 3))
+            quad[:, axis] = (low, high)[side][axis]
+            quad[:, u] = [low[u], high[u], high[u], low[u]]
+            quad[:, v] = [low[v], low[v], high[v], high[v]]
+            order = [0, 1, 2, 0, 2, 3] if side else [0, 2, 1, 0, 3, 2]
+            faces.append(np.array(order).reshape(2, 3) + len(vertices) * 4)
+            vertices.append(quad)
+            normals.append(np.tile(np.eye(3)[axis] * (1 if side else -1), (4, 1)))
+    return MeshPart(np.concatenate(vertices).astype(np.float32), np.concatenate(faces).astype(np.int32),
+                    np.concatenate(normals).astype(np.float32), np.zeros((24, 2), np.float32), Finish(color))
+
+
+def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=()) -> Asset:
+    return Asset(key, object_class, object_class, size, support, surfaces=surfaces, materials=("wood",))
+
+
+@dataclass(frozen=True, eq=False)
+class HandCatalogue:
+    """Quacks like assets.catalogue.Catalogue as far as a scene needs it."""
+
+    assets: Mapping[str, Asset] = field(default_factory=lambda: {a.key: a for a in (
+        _asset("hand/red_box", "red box", (0.5, 0.5, 0.8)),
+        _asset("hand/flag", "flag", (0.6, 0.1, 1.0)),
+        _asset("hand/table", "table", (1.2, 0.8, 0.75), surfaces=(SupportSurface("top", 0.75, -0.6, -0.4, 0.6, 0.4, 9.0),)),
+        _asset("hand/mug", "mug", (0.08, 0.08, 0.1), "surface"),
+        _asset("built/rug", "rug", (2.0, 1.4, 0.012)),
+    )})
+
+    def mesh(self, key: str, size, params=()) -> tuple[MeshPart, ...]:
+        w, d, h = size
+        if key == "hand/flag":
+            half = box_mesh((-w / 2, -d / 2, 0), (0, d / 2, h), GREEN)
+            return half, box_mesh((0, -d / 2, 0), (w / 2, d / 2, h), BLUE)
+        if key == "hand/table":
+            legs = [box_mesh((x - 0.03, y - 0.03, 0), (x + 0.03, y + 0.03, h - 0.04), WOOD)
+                    for x in (-w / 2 + 0.05, w / 2 - 0.05) for y in (-d / 2 + 0.05, d / 2 - 0.05)]
+            return (box_mesh((-w / 2, -d / 2, h - 0.04), (w / 2, d / 2, h), WOOD), *legs)
+        color = {"hand/red_box": RED, "hand/mug": BLUE}.get(key, WOOD)
+        return (box_mesh((-w / 2, -d / 2, 0), (w / 2, d / 2, h), color),)
+
+    def finish(self, key: str) -> Finish:
+        return Finish({"oak_planks/0": (0.72, 0.55, 0.38, 1.0)}.get(key, (0.93, 0.92, 0.9, 1.0)))
+
+
+def furnished(house: House) -> House:
+    """The two-room house with a table that carries a mug, a red box to the east and a two-coloured flag."""
+    things = (
+        Placement("red_box_1", "hand/red_box", "red box", "living_room_1", (4.4, 2.6, 0.0), 0.0, (0.5, 0.5, 0.8)),
+        Placement("flag_1", "hand/flag", "flag", "living_room_1", (2.0, 3.8, 0.0), 0.0, (0.6, 0.1, 1.0)),
+        Placement("table_1", "hand/table", "table", "living_room_1", (1.2, 0.9, 0.0), 0.3, (1.2, 0.8, 0.75)),
+        Placement("mug_1", "hand/mug", "mug", "living_room_1", (1.3, 1.0, 0.75), 1.0, (0.08, 0.08, 0.1), "table_1", "top"),
+        Placement("red_box_2", "hand/red_box", "red box", "bedroom_1", (8.5, 3.4, 0.0), 0.0, (0.5, 0.5, 0.8)),
+    )
+    return dataclasses.replace(house, placements=(*house.placements, *things))
