@@ -103,12 +103,12 @@ def _tunnel(hole: _Hole, y0: float, y1: float, floor: bool) -> Shape:
     """Jambs and head (and the floor of the hole) from depth y0 to y1, looking into the hole."""
     w, z0, z1 = hole.length, hole.opening.sill, hole.opening.head
     corners = [
-        [(0, y1, z0), (0, y0, z0), (0, y0, z1), (0, y1, z1)],
-        [(w, y0, z0), (w, y1, z0), (w, y1, z1), (w, y0, z1)],
-        [(0, y0, z1), (w, y0, z1), (w, y1, z1), (0, y1, z1)],
+        [(0, y0, z0), (0, y1, z0), (0, y1, z1), (0, y0, z1)],
+        [(w, y1, z0), (w, y0, z0), (w, y0, z1), (w, y1, z1)],
+        [(0, y0, z1), (0, y1, z1), (w, y1, z1), (w, y0, z1)],
     ]
     if floor:
-        corners.append([(0, y0, z0), (0, y1, z0), (w, y1, z0), (w, y0, z0)][::-1])
+        corners.append([(0, y0, z0), (w, y0, z0), (w, y1, z0), (0, y1, z0)])
     return quads(np.asarray(corners, float))
 
 
