@@ -120,6 +120,7 @@ def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), c
     if lit is None:
         parts = house_parts(house, catalogue)
         _light(spec)
+        _add_sky(spec)
         _add_parts(spec, parts, bodies)
     else:
         parts = ()
@@ -159,6 +160,11 @@ def _light(spec: mujoco.MjSpec) -> None:
         spec.worldbody.add_light(
             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=direction, pos=[0, 0, 3], castshadow=False,
             ambient=[0, 0, 0], diffuse=[strength, strength * 0.985, strength * 0.95], specular=[0.08] * 3)
+
+
+def _add_sky(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+                     rgb1=[0.50, 0.68, 0.90], rgb2=[0.93, 0.95, 0.97], width=128, height=128)
 
 
 LIGHTS = (

@@ -1,0 +1,260 @@
+"""Panorama: what is seen from one point in all directions, as six cube faces, and views resampled from it.
+
+Faces, in order: +x, +y, -x, -y, up, down, each a square picture of 90 degrees as an upright camera
+takes it: row 0 on top, columns to the right. The picture of `up` has -x on top, that of `down` has +x
+on top, as if the camera of face 0 had been tilted. Nothing is mirrored.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from embodied.geometry import yaw_of_heading
+
+FACES = (
+    ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
+    ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
+)
+"""Forward and up direction of every face, world."""
+VFOV36 = math.radians(60.0)
+"""Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
+CREASE = 0.05
+"""Depths that differ by more than this share belong to different things and are not mixed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Panorama:
+    """Six cube faces around a point."""
+
+    rgb: np.ndarray
+    """(6, s, s, 3) uint8 sRGB."""
+    depth: np.ndarray
+    """(6, s, s) float32 metres along each face's optical axis; inf where nothing is."""
+    ids: np.ndarray
+    """(6, s, s) int32: i + 1 for parts.owners(house)[i], 0 where nothing is."""
+
+    @property
+    def size(self) -> int:
+        """Side of a face, pixels."""
+        return self.rgb.shape[1]
+
+    def view(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36,
+             size: tuple[int, int] = (480, 640)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A perspective picture along (yaw, pitch): rgb, depth along its optical axis, ids.
+
+        Args:
+          yaw: radians counter-clockwise from +x.
+          pitch: radians, up is positive.
+          vfov: vertical field of view, radians, below pi.
+          size: (height, width), pixels.
+
+        Returns:
+          (h, w, 3) uint8, (h, w) float32 metres, (h, w) int32.
+        """
+        grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size))
+        return self._rgb(grid), self._depth(grid), self._ids(grid)
+
+    def view_rgb(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36,
+                 size: tuple[int, int] = (480, 640)) -> np.ndarray:
+        """The colours of `view` alone."""
+        return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size)))
+
+    def views36(self, size: int = 224) -> np.ndarray:
+        """(36, size, size, 3) uint8: the views of the VLN literature.
+
+        View i looks at heading 30 (i % 12) degrees, clockwise from +y, and at elevation
+        30 (i // 12 - 1) degrees: 0-11 down, 12-23 level, 24-35 up (Matterport3DSimulator).
+        """
+        _checked(VFOV36, (size, size))
+        return self._rgb(grid36(self.size, size)).reshape(36, size, size, 3)
+
+    def ids36(self, size: int = 56) -> np.ndarray:
+        """(36, size, size) int32: the ids seen in the views of `views36`."""
+        return self._ids(grid36(self.size, size)).reshape(36, size, size)
+
+    def equirect(self, height: int = 512) -> np.ndarray:
+        """(height, 2 height, 3) uint8: all directions; +x (yaw 0) in the middle column, +y left of it, up on top."""
+        return self._rgb(equirect_grid(self.size, _checked(1.0, (height, height))[0]))
+
+    def equirect_depth(self, height: int = 512) -> np.ndarray:
+        """(height, 2 height) float32: metres along the ray, in the layout of `equirect`."""
+        return self._depth(equirect_grid(self.size, height))
+
+    def equirect_ids(self, height: int = 512) -> np.ndarray:
+        """(height, 2 height) int32, in the layout of `equirect`."""
+        return self._ids(equirect_grid(self.size, height))
+
+    def ray_lengths(self) -> np.ndarray:
+        """(6, s, s) float32: metres along the ray through every pixel."""
+        return self.depth * ray_stretch(self.size)
+
+    @functools.cached_property
+    def _padded_rgb(self) -> np.ndarray:
+        """(6 (s + 2), s + 2, 3): the faces below each other, each with a border taken from its neighbours."""
+        s, pad = self.size, pad_grid(self.size)
+        padded = np.empty((6, s + 2, s + 2, 3), np.uint8)
+        padded[:, 1:-1, 1:-1] = self.rgb
+        border = cv2.remap(self.rgb.reshape(6 * s, s, 3), pad.x, pad.y, cv2.INTER_LINEAR)
+        padded[pad.face, pad.row, pad.column] = border.reshape(-1, 3)
+        return padded.reshape(6 * (s + 2), s + 2, 3)
+
+    @functools.cached_property
+    def _padded_nearness(self) -> np.ndarray:
+        """(6 (s + 2), s + 2) float32: 1 / depth, which is linear over a plane, with borders as above."""
+        s, pad = self.size, pad_grid(self.size)
+        padded = np.empty((6, s + 2, s + 2), np.float32)
+        nearness = (1.0 / self.depth).astype(np.float32)
+        padded[:, 1:-1, 1:-1] = nearness
+        border = cv2.remap(nearness.reshape(6 * s, s), pad.x, pad.y, cv2.INTER_NEAREST).reshape(-1)
+        padded[pad.face, pad.row, pad.column] = border * pad.ratio
+        return padded.reshape(6 * (s + 2), s + 2)
+
+    def _rgb(self, grid: Grid) -> np.ndarray:
+        return cv2.remap(self._padded_rgb, grid.fixed, grid.fraction, cv2.INTER_LINEAR)
+
+    def _ids(self, grid: Grid) -> np.ndarray:
+        return self.ids.reshape(-1)[grid.nearest]
+
+    def _depth(self, grid: Grid) -> np.ndarray:
+        smooth = cv2.remap(self._padded_nearness, grid.fixed, grid.fraction, cv2.INTER_LINEAR)
+        nearest = (1.0 / self.depth.reshape(-1)[grid.nearest]).astype(np.float32)
+        mixed = np.abs(smooth - nearest) > CREASE * nearest
+        with np.errstate(divide="ignore"):
+            return (grid.stretch / np.where(mixed, nearest, smooth)).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where the pixels of a picture lie on the faces. (h, w) arrays."""
+
+    fixed: np.ndarray
+    fraction: np.ndarray
+    """The two maps of cv2.remap (16-bit fixed point) into the padded faces."""
+    nearest: np.ndarray
+    """int32 index into the flat (6, s, s) faces."""
+    stretch: np.ndarray
+    """float32 depth in this picture per depth in the face."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pad:
+    """The border pixels of all padded faces, and where their values lie. (n,) arrays; x and y are (n, 1)."""
+
+    face: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    ratio: np.ndarray
+    """float32 1 / depth in this face per 1 / depth in the neighbour."""
+
+
+@functools.lru_cache(maxsize=96)
+def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> Grid:
+    """The grid of an upright perspective picture on faces of side `s`."""
+    return _grid(s, *_pinhole_rays(yaw, pitch, vfov, height, width))
+
+
+@functools.lru_cache(maxsize=4)
+def grid36(s: int, size: int) -> Grid:
+    """The 36 views of `Panorama.views36`, below each other."""
+    rays = [_pinhole_rays(float(yaw_of_heading(math.radians(30 * (i % 12)))), math.radians(30 * (i // 12 - 1)),
+                          VFOV36, size, size) for i in range(36)]
+    return _grid(s, np.concatenate([r[0] for r in rays]), np.concatenate([r[1] for r in rays]))
+
+
+@functools.lru_cache(maxsize=4)
+def equirect_grid(s: int, height: int) -> Grid:
+    """The grid of an equirectangular picture of (height, 2 height) pixels."""
+    yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
+    pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
+    rays = np.empty((height, 2 * height, 3))
+    rays[..., 0] = np.cos(pitch)[:, None] * np.cos(yaw)
+    rays[..., 1] = np.cos(pitch)[:, None] * np.sin(yaw)
+    rays[..., 2] = np.sin(pitch)[:, None]
+    return _grid(s, rays, np.ones(rays.shape[:2]))
+
+
+def _pinhole_rays(yaw: float, pitch: float, vfov: float, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """(h, w, 3) unit rays through the pixel centres, and (h, w) cosines with the optical axis."""
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    forward, right, up = np.array([cy * cp, sy * cp, sp]), np.array([sy, -cy, 0.0]), np.array([-cy * sp, -sy * sp, cp])
+    tall = math.tan(vfov / 2)
+    y = tall * (1 - 2 * (np.arange(height) + 0.5) / height)
+    x = tall * width / height * (2 * (np.arange(width) + 0.5) / width - 1)
+    rays = forward + x[None, :, None] * right + y[:, None, None] * up
+    lengths = np.linalg.norm(rays, axis=-1)
+    return rays / lengths[..., None], 1.0 / lengths
+
+
+def _grid(s: int, rays: np.ndarray, cosines: np.ndarray) -> Grid:
+    """Where unit `rays` (h, w, 3) meet the faces; cosines (h, w) turn ray lengths into depths of the picture."""
+    face, u, v, along = _face_coordinates(rays)
+    x, y = (u + 1) / 2 * s - 0.5, (v + 1) / 2 * s - 0.5
+    map_x, map_y = (x + 1).astype(np.float32), (y + 1 + face * (s + 2)).astype(np.float32)
+    fixed, fraction = cv2.convertMaps(map_x, map_y, cv2.CV_16SC2)
+    column, row = np.clip(np.rint(x), 0, s - 1).astype(np.int32), np.clip(np.rint(y), 0, s - 1).astype(np.int32)
+    nearest = ((face * s + row) * s + column).astype(np.int32)
+    return Grid(fixed, fraction, nearest, (cosines / along).astype(np.float32))
+
+
+def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Face index, u (right) and v (down) in [-1, 1], and the part of each unit ray along the face's axis."""
+    forward, up = (np.array([f[i] for f in FACES]) for i in (0, 1))
+    right = np.cross(forward, up)
+    face = np.argmax(rays @ forward.T, axis=-1)
+    along, u, v = (np.sum(rays * axes[face], axis=-1) for axes in (forward, right, -up))
+    return face, u / along, v / along, along
+
+
+@functools.lru_cache(maxsize=8)
+def pad_grid(s: int) -> Pad:
+    """The one-pixel borders of faces of side `s`."""
+    rim = np.ones((s + 2, s + 2), bool)
+    rim[1:-1, 1:-1] = False
+    row, column = np.nonzero(rim)
+    face = np.repeat(np.arange(6), len(row))
+    row, column = np.tile(row, 6), np.tile(column, 6)
+    u, v = (column - 0.5) / s * 2 - 1, (row - 0.5) / s * 2 - 1
+    forward, up = (np.array([f[i] for f in FACES])[face] for i in (0, 1))
+    rays = forward + u[:, None] * np.cross(forward, up) - v[:, None] * up
+    lengths = np.linalg.norm(rays, axis=-1)
+    other, ou, ov, along = _face_coordinates(rays / lengths[:, None])
+    x, y = (np.clip((w + 1) / 2 * s - 0.5, 0, s - 1) for w in (ou, ov))
+    return Pad(face, row, column, x.astype(np.float32)[:, None], (y + other * s).astype(np.float32)[:, None],
+               (along * lengths).astype(np.float32))
+
+
+@functools.lru_cache(maxsize=8)
+def ray_stretch(s: int) -> np.ndarray:
+    """(s, s) float32: length of the ray through each pixel of a face per metre of depth."""
+    u = (np.arange(s) + 0.5) / s * 2 - 1
+    return np.sqrt(1 + u[None] ** 2 + u[:, None] ** 2).astype(np.float32)
+
+
+@functools.lru_cache(maxsize=8)
+def face_rays(s: int) -> np.ndarray:
+    """(6, s, s, 3) float32 unit directions, world, of every pixel."""
+    u = (np.arange(s) + 0.5) / s * 2 - 1
+    forward, up = (np.array([f[i] for f in FACES])[:, None, None] for i in (0, 1))
+    rays = forward + u[None, None, :, None] * np.cross(forward, up) - u[None, :, None, None] * up
+    return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def _checked(vfov: float, size: tuple[int, int]) -> tuple[int, int]:
+    """`size` as (height, width), refused where no picture can have it."""
+    height, width = int(size[0]), int(size[1])
+    if not (0 < height <= 8192 and 0 < width <= 16384):
+        raise ValueError(f"size is {size}; a picture needs (height, width) from 1 to 8192 and 16384 pixels")
+    if not 0 < vfov < math.pi:
+        raise ValueError(f"vfov is {vfov} radians; a perspective picture needs more than 0 and less than pi")
+    return height, width

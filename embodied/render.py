@@ -1,0 +1,282 @@
+"""The classic renderer: a house drawn off-screen by OpenGL into rgb, depth and instance ids.
+
+The house is uploaded once. To move the camera is to write six vectors; what cannot be seen (rooms
+behind walls, things outside the field of view) is left out of the list of geoms to draw.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+from embodied import gl
+
+gl.prepare()
+
+import mujoco
+import numpy as np
+
+from embodied import visibility
+from embodied.house import House
+from embodied.lit import LitPages
+from embodied.panorama import FACES, Panorama
+from embodied.scene import COLLISION, VISUAL, Scene, compile_scene
+
+QUALITIES = ("unlit", "baked")
+BACKENDS = ("classic",)
+NEAR, FAR = 0.03, 200.0
+"""Clipping planes, metres."""
+HIDDEN = 5
+"""Geom group of what is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One perspective picture."""
+
+    rgb: np.ndarray
+    """(h, w, 3) uint8 sRGB, top row first."""
+    depth: np.ndarray
+    """(h, w) float32 metres along the optical axis; inf where nothing is."""
+    ids: np.ndarray
+    """(h, w) int32: i + 1 for parts.owners(house)[i], 0 where nothing is."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera in world metres."""
+
+    position: tuple[float, float, float]
+    forward: tuple[float, float, float]
+    up: tuple[float, float, float]
+    vfov: float = math.pi / 2
+    """Vertical field of view, radians."""
+
+
+def camera_at(position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2) -> Camera:
+    """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    return Camera(tuple(float(x) for x in position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
+
+
+class Renderer:
+    """Draws one house. Owns textures and display lists on the graphics side until `close`.
+
+    All renderers of a process share its one OpenGL context (embodied.gl) and must be used from the
+    thread that made them.
+    """
+
+    def __init__(self, house: House, catalogue, *, quality: str = "unlit", backend: str = "classic", size: int = 256,
+                 lit: LitPages | None = None, scene: Scene | None = None) -> None:
+        """Compile `house`, open OpenGL and upload.
+
+        Args:
+          quality: 'unlit' (even light from all sides) or 'baked' (needs `lit`).
+          backend: 'classic'.
+          size: side of a cube face of `panorama`, pixels.
+          lit: the baked pages that 'baked' shows.
+          scene: a scene compiled before from the same house and pages, to save compiling again.
+
+        Raises:
+          ValueError: unknown quality or backend, impossible size, 'baked' without pages.
+          GLError: no OpenGL context can be opened.
+        """
+        _check(house, quality, backend, size, lit)
+        self.house, self.size, self.quality = house, size, quality
+        self._mjr = None
+        self.scene = scene or compile_scene(house, catalogue, collisions=False, lit=lit)
+        model = self.scene.model
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        gl.make_current()
+        model.vis.global_.offwidth = model.vis.global_.offheight = size
+        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
+        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._buffer = (size, size)
+        self._drawn = _empty_scene(model, lit is not None)
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[VISUAL] = 1
+        self._camera, self._perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
+        self._is_visual = np.array([k != "collision" for k in self.scene.kind_of_geom])
+        self._portals = visibility.portals_of(house)
+        self._geoms_of_room = _geoms_by_room(house, self.scene)
+        self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
+
+    def view(self, position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 3,
+             size: tuple[int, int] = (480, 640), *, cull: bool = True) -> View:
+        """The picture from `position` (x, y, z) along (yaw, pitch).
+
+        Args:
+          vfov: vertical field of view, radians.
+          size: (height, width), pixels.
+          cull: False draws everything, for comparison.
+        """
+        camera = camera_at(position, yaw, pitch, vfov)
+        drawn = self._choose(camera, size, cull)
+        rgb = self._rgb(camera, size)
+        depth, ids = self._depth_and_ids(camera, size, drawn)
+        return View(rgb, depth, ids)
+
+    def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        """(h, w, 3) uint8: colours alone."""
+        self._choose(camera, size, True)
+        return self._rgb(camera, size)
+
+    def panorama(self, position, size: int | None = None) -> Panorama:
+        """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
+        s = size or self.size
+        rgb = np.empty((6, s, s, 3), np.uint8)
+        depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
+        for k, camera in enumerate(face_cameras(position)):
+            drawn = self._choose(camera, (s, s), True)
+            rgb[k] = self._rgb(camera, (s, s))
+            depth[k], ids[k] = self._depth_and_ids(camera, (s, s), drawn)
+        return Panorama(rgb, depth, ids)
+
+    def seen(self, position, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
+        """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
+        depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
+        for k, camera in enumerate(face_cameras(position)):
+            drawn = self._choose(camera, (size, size), True)
+            depth[k], ids[k] = self._depth_and_ids(camera, (size, size), drawn)
+        return depth, ids
+
+    def close(self) -> None:
+        """Free what lies on the graphics side; the renderer cannot be used afterwards."""
+        if self._mjr is not None:
+            gl.make_current()
+            self._mjr.free()
+            self._mjr = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _choose(self, camera: Camera, size: tuple[int, int], cull: bool) -> np.ndarray:
+        """Prepare OpenGL and the list of geoms to draw; returns their indices, in drawing order."""
+        if self._mjr is None:
+            raise RuntimeError("the renderer is closed; make a new one")
+        gl.make_current()
+        if size[0] > self._buffer[0] or size[1] > self._buffer[1]:
+            self._buffer = (max(size[0], self._buffer[0]), max(size[1], self._buffer[1]))
+            mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
+        mask = self._is_visual
+        if cull:
+            mask = self._seen_around(camera.position) & self._in_frustum(camera, size)
+        model = self.scene.model
+        model.geom_group[:] = np.where(mask, VISUAL, HIDDEN)
+        mujoco.mjv_updateScene(model, self._data, self._option, self._perturb, self._camera,
+                               mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn)
+        model.geom_group[:] = np.where(self._is_visual, VISUAL, COLLISION)
+        _aim(self._drawn, camera, size)
+        return np.flatnonzero(mask)
+
+    def _seen_around(self, position: tuple[float, float, float]) -> np.ndarray:
+        """(ngeom,) bool: what may be seen from `position` in any direction; remembered for the last one."""
+        if self._seen_from is None or self._seen_from[0] != position:
+            mask, data, model = np.zeros_like(self._is_visual), self._data, self.scene.model
+            rooms = visibility.visible_rooms(self.house, self._portals, position)
+            if rooms is None:
+                mask = self._is_visual
+            else:
+                for room, sectors in rooms.items():
+                    g = self._geoms_of_room.get(room, np.zeros(0, int))
+                    mask[g] |= visibility.within(sectors, np.array(position[:2]), data.geom_xpos[g, :2], model.geom_rbound[g])
+            self._seen_from = (position, mask)
+        return self._seen_from[1]
+
+    def _in_frustum(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        """(ngeom,) bool: whose bounding sphere reaches into the field of view."""
+        forward, up = np.array(camera.forward), np.array(camera.up)
+        right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
+        wide = tall * size[1] / size[0]
+        planes = np.stack([forward * wide - right, forward * wide + right, forward * tall - up, forward * tall + up])
+        planes /= np.linalg.norm(planes, axis=1, keepdims=True)
+        apart = self._data.geom_xpos - np.array(camera.position)
+        return np.all(apart @ planes.T >= -self.scene.model.geom_rbound[:, None] - 1e-3, axis=1)
+
+    def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        rect, rgb = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
+        mujoco.mjr_render(rect, self._drawn, self._mjr)
+        mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        return rgb[::-1]
+
+    def _depth_and_ids(self, camera: Camera, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A second pass that paints every geom in its number's colour."""
+        flags = self._drawn.flags
+        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
+        rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
+        reversed_z = np.empty(size, np.float32)
+        mujoco.mjr_render(rect, self._drawn, self._mjr)
+        mujoco.mjr_readPixels(numbers, reversed_z, rect, self._mjr)
+        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
+        owner_of_number = np.zeros(len(drawn) + 1, np.int32)
+        owner_of_number[1:] = self.scene.owner_of_geom[drawn]
+        packed = np.zeros((*size, 4), np.uint8)
+        packed[..., :3] = numbers
+        ids = owner_of_number[packed.view("<u4")[..., 0]]
+        return depth_of_reversed_z(reversed_z)[::-1], ids[::-1]
+
+
+def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> np.ndarray:
+    """Metres along the optical axis (float32) from a depth buffer that is 1 at `near` and 0 at `far`; inf at 0.
+
+    Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
+    """
+    depth = near * far / (near + z.astype(np.float64) * (far - near))
+    return np.where(z > 0, depth, np.inf).astype(np.float32)
+
+
+def face_cameras(position) -> list[Camera]:
+    """The cameras of the six cube faces, in the order of panorama.FACES."""
+    at = tuple(float(x) for x in position)
+    return [Camera(at, forward, up) for forward, up in FACES]
+
+
+def _check(house: House, quality: str, backend: str, size: int, lit: LitPages | None) -> None:
+    if quality not in QUALITIES:
+        raise ValueError(f"quality {quality!r} is unknown to this renderer; use one of {QUALITIES}")
+    if backend not in BACKENDS:
+        raise ValueError(f"backend {backend!r} is unknown to this renderer; use one of {BACKENDS}")
+    if not 8 <= size <= 4096:
+        raise ValueError(f"size is {size} pixels; a cube face needs 8 to 4096")
+    if (quality == "baked") != (lit is not None):
+        raise ValueError("quality 'baked' needs lit=..., the pages of embodied.light; 'unlit' takes none")
+
+
+def _empty_scene(model: mujoco.MjModel, lit: bool) -> mujoco.MjvScene:
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
+    off = ("SHADOW", "REFLECTION", "FOG", "HAZE", *(() if lit else ("CULL_FACE",)))
+    for name in off:
+        scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
+    return scene
+
+
+def _aim(scene: mujoco.MjvScene, camera: Camera, size: tuple[int, int]) -> None:
+    """Write `camera` into both eyes of `scene`."""
+    top = NEAR * math.tan(camera.vfov / 2)
+    for eye in scene.camera:
+        eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
+        eye.frustum_near, eye.frustum_far = NEAR, FAR
+        eye.frustum_bottom, eye.frustum_top = -top, top
+        eye.frustum_center, eye.frustum_width = 0.0, top * size[1] / size[0]
+
+
+def _geoms_by_room(house: House, scene: Scene) -> dict[str, np.ndarray]:
+    """Room id to the geoms seen when that room is seen; joinery and stairs belong to both their rooms."""
+    sides = {o.id: tuple(r or visibility.OUTDOORS for r in o.rooms) for o in house.openings}
+    sides |= {s.id: s.rooms for s in house.stairs}
+    geoms: dict[str, list[int]] = {}
+    for g, kind in enumerate(scene.kind_of_geom):
+        if kind == "collision":
+            continue
+        owner = scene.owners[scene.owner_of_geom[g] - 1] if scene.owner_of_geom[g] else ""
+        rooms = sides.get(owner.partition("/")[0], (scene.room_of_geom[g],))
+        for room in rooms:
+            geoms.setdefault(room, []).append(g)
+    return {room: np.array(list_of, int) for room, list_of in geoms.items()}

@@ -1,0 +1,160 @@
+"""Which rooms, and which directions in them, can be seen from a point: looking through doors and windows.
+
+Everything errs on the safe side (furniture, wall thickness, lintels and closed doors hide nothing), so
+what is left out is never missed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from embodied.geometry import TWO_PI
+from embodied.house import House, Opening
+
+OUTDOORS = ""
+FULL = (-math.pi, math.pi)
+NEAR = 0.25
+"""Closer than this to an opening, in metres, one sees all around through it."""
+DEEPEST = 16
+"""Openings looked through one behind another before the search calls everything behind visible."""
+
+Sector = tuple[float, float]
+"""Directions from low to high, radians counter-clockwise; high - low is at most 2 pi."""
+
+
+@dataclass(frozen=True, eq=False)
+class Portal:
+    """An opening as seen from inside the room `leaves`."""
+
+    opening: str
+    leaves: str
+    enters: str
+    a: np.ndarray
+    b: np.ndarray
+    """(2,) jambs, metres."""
+    normal: np.ndarray
+    """(2,) unit, out of the room `leaves`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Portals:
+    """The openings of a house by the room that one looks out of; OUTDOORS is a room too."""
+
+    of_room: Mapping[str, tuple[Portal, ...]]
+    stairs: Mapping[str, tuple[str, ...]]
+    """Rooms joined to a room by a staircase: seen together with it."""
+
+
+def portals_of(house: House) -> Portals:
+    """All openings of `house`, each once per side."""
+    of_room: dict[str, list[Portal]] = {r.id: [] for r in house.rooms} | {OUTDOORS: []}
+    for o in house.openings:
+        a, b, out = np.array(o.a), np.array(o.b), _outward(house, o)
+        first, second = o.rooms[0], o.rooms[1] or OUTDOORS
+        of_room[first].append(Portal(o.id, first, second, a, b, out))
+        of_room[second].append(Portal(o.id, second, first, a, b, -out))
+    stairs: dict[str, list[str]] = {r.id: [] for r in house.rooms}
+    for s in house.stairs:
+        stairs[s.rooms[0]].append(s.rooms[1])
+        stairs[s.rooms[1]].append(s.rooms[0])
+    return Portals({k: tuple(v) for k, v in of_room.items()}, {k: tuple(v) for k, v in stairs.items()})
+
+
+def _outward(house: House, o: Opening) -> np.ndarray:
+    """(2,) unit normal of opening `o`, out of its first room."""
+    along = np.subtract(o.b, o.a) / math.dist(o.a, o.b)
+    normal = np.array([along[1], -along[0]])
+    probe = np.add(o.a, o.b) / 2 + 0.05 * normal
+    return -normal if shapely.Polygon(house.room_by_id[o.rooms[0]].polygon).contains(shapely.Point(probe)) else normal
+
+
+def room_at(house: House, position) -> str | None:
+    """The room that the point (x, y, z) is in; None outdoors."""
+    for room in house.rooms:
+        storey = house.storey_of(room)
+        level = storey.elevation - 0.3 <= position[2] < storey.elevation + storey.height + 0.3
+        if level and shapely.Polygon(room.polygon).intersects(shapely.Point(position[:2])):
+            return room.id
+    return None
+
+
+def visible_rooms(house: House, portals: Portals, position) -> dict[str, list[Sector]] | None:
+    """Rooms that may be seen from `position`, each with the directions in which it may be seen.
+
+    Returns:
+      Room id (OUTDOORS for the outside) to sectors; None when the point is in no room: see all.
+    """
+    start = room_at(house, position)
+    if start is None:
+        return None
+    seen: dict[str, list[Sector]] = {}
+    complete = _look(portals, np.asarray(position[:2], float), start, FULL, (), seen)
+    return seen if complete else None
+
+
+def _look(portals: Portals, eye: np.ndarray, room: str, sector: Sector, path: tuple[str, ...],
+          seen: dict[str, list[Sector]]) -> bool:
+    if any(s[0] <= sector[0] and sector[1] <= s[1] for s in seen.get(room, ())):
+        return True
+    seen.setdefault(room, []).append(sector)
+    if len(path) > DEEPEST:
+        return False
+    for portal in portals.of_room[room]:
+        if portal.opening in path:
+            continue
+        through = _through(eye, portal, sector)
+        for part in through:
+            if not _look(portals, eye, portal.enters, part, (*path, portal.opening), seen):
+                return False
+    return all(_look(portals, eye, other, FULL, path, seen) for other in portals.stairs.get(room, ()))
+
+
+def _through(eye: np.ndarray, portal: Portal, sector: Sector) -> list[Sector]:
+    """The parts of `sector` that go out through `portal`."""
+    to_a, to_b = portal.a - eye, portal.b - eye
+    away = float(to_a @ portal.normal)
+    along = (portal.b - portal.a) / np.linalg.norm(portal.b - portal.a)
+    reach = np.clip(-to_a @ along, 0, np.linalg.norm(portal.b - portal.a))
+    if np.linalg.norm(to_a + reach * along) < NEAR:
+        return [sector]
+    if away < 0:
+        return []
+    first, second = math.atan2(to_a[1], to_a[0]), math.atan2(to_b[1], to_b[0])
+    low, width = first, (second - first) % TWO_PI
+    if width > math.pi:
+        low, width = second, TWO_PI - width
+    return overlap(sector, (low, low + width))
+
+
+def overlap(one: Sector, other: Sector) -> list[Sector]:
+    """What two sectors share, as none, one or two sectors."""
+    shared = []
+    for turn in (-TWO_PI, 0.0, TWO_PI):
+        low, high = max(one[0], other[0] + turn), min(one[1], other[1] + turn)
+        if high > low:
+            shared.append((low, high))
+    return shared
+
+
+def within(sectors: list[Sector], eye: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """(n,) bool: which spheres reach into one of the sectors around `eye`.
+
+    Args:
+      eye: (2,) metres.
+      centres: (n, 2) metres.
+      radii: (n,) metres.
+    """
+    apart = centres - eye
+    distance = np.hypot(apart[:, 0], apart[:, 1])
+    angle = np.arctan2(apart[:, 1], apart[:, 0])
+    spread = np.arcsin(np.clip(radii / np.maximum(distance, 1e-9), 0, 1))
+    inside = distance <= radii
+    for low, high in sectors:
+        off = np.abs((angle - (low + high) / 2 + np.pi) % TWO_PI - np.pi)
+        inside |= off <= (high - low) / 2 + spread
+    return inside
