@@ -21,13 +21,11 @@ from embodied.interface import (
     Mode,
     Move,
     Observation,
-    Pose,
     Reply,
     Sight,
     Situation,
     Step,
     Stop,
-    Subtask,
     Task,
 )
 from embodied.moves import Moves, PanoramicMoves
@@ -100,7 +98,8 @@ class HelpEnv:
         self._check(action)
         before, situation = self.observation, self.situation
         mode, instruction, targets, subtask = self.mode, self.instruction, self.targets, self.subtask
-        clock, reply, cost = self.time, None, self._cost(action)
+        reply, cost = None, self._cost(action)
+        self.time_on_task += 1
         if isinstance(action, Move):
             self.pose = self._reach[1][action.candidate]
             self._moved()
@@ -111,10 +110,8 @@ class HelpEnv:
             self._replied(reply)
         else:
             self._stopped()
-        changed = (self.instruction, self.target) != (instruction, before.target) or self.mode is not mode
-        self.time_on_task = 0 if changed else self.time_on_task + 1
         if self.asking_takes_time or not isinstance(action, Ask):
-            self.time = clock + 1
+            self.time += 1
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
             cost += self._cost_of_limit()
@@ -145,7 +142,7 @@ class HelpEnv:
         """Set up what the rule needs beyond the common state."""
 
     def _replied(self, reply: Reply) -> None:
-        """Take in what the assistant said."""
+        """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
         raise NotImplementedError
 
     def _stopped(self) -> None:
@@ -229,6 +226,7 @@ class HannaEnv(HelpEnv):
         self.target = reply.image  # line 12: I^depart
         self.subtask, self.targets = subtask, (subtask.target,)
         self.pose = subtask.start  # line 13: step to the start of the route and look along it
+        self.time_on_task = 0
 
     def _stopped(self) -> None:
         if self.mode is Mode.MAIN:  # lines 17-18
@@ -238,6 +236,7 @@ class HannaEnv(HelpEnv):
         self.instruction = self.task.request  # line 21
         self.target = Sight(self.task.world, self.subtask.goal)  # line 22: I^{g*}, Eq 4.7
         self.targets, self.subtask = (self.subtask.goal,), None  # the program's teacher, originals 3.1
+        self.time_on_task = 0
 
 
 def check_task(task: Task, worlds: Mapping[str, World]) -> None:

@@ -6,6 +6,7 @@ its world; tables over many episodes are in embodied.tables.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ def oracle_success(episode: Episode, graph: NavGraph) -> float:
 def path_length(episode: Episode, graph: NavGraph) -> float:
     """Metres walked: the sum of graph distances between consecutive nodes (originals 3.7)."""
     nodes = episode.nodes
-    return float(sum(graph.distance[a, b] for a, b in zip(nodes, nodes[1:])))
+    return float(sum(graph.distance[a, b] for a, b in itertools.pairwise(nodes)))
 
 
 def spl(episode: Episode, graph: NavGraph) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ class PlainLanguage:
         """'turn left and go to the hall . go straight . stop .'; `yaw` is the walker's first direction, radians."""
         positions = np.asarray(world.graph.positions)
         parts = []
-        for a, b in zip(path, path[1:]):
+        for a, b in itertools.pairwise(path):
             offset = positions[b] - positions[a]
             direction = math.atan2(offset[1], offset[0])
             room = world.graph.room_of_node[b]

@@ -1,0 +1,178 @@
+"""ANNA's route system Xi: which stretches of a house people can talk about (dissertation 4.2.2)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.interface import TURNS, Language, Route
+from embodied.seeds import stream
+from embodied.tasks.goals import count_hops
+
+if TYPE_CHECKING:
+    from embodied.navgraph import NavGraph
+    from embodied.world import World
+
+TRIES = 12
+"""How often a wording is asked for again when the house already has it."""
+
+WORDINGS: Mapping[str, tuple[str, ...]] = {
+    "train": ("train_seen", "train_seen", "train_unseen"),
+    "val": ("val", "val", "val"),
+    "test": ("test", "test", "test"),
+}
+"""Splits of a path's three wordings, by the split of its house. In training houses one wording of
+every path is held out, which is what Table 4.2's 8,586 : 4,287 amounts to (originals 2.5)."""
+
+
+@dataclass(frozen=True)
+class RouteConfig:
+    """How routes are sampled; the defaults are those of Room-to-Room."""
+
+    routes_per_node: float = 211 / 125
+    """211 routes connect 125 locations per environment (4.2.2); a route is a path with one wording."""
+    fewest_edges: int = 4
+    most_edges: int = 6
+    shortest: float = 5.0
+    """Metres."""
+
+
+def sampled_paths(graph: NavGraph, count: int, *, rng: np.random.Generator, config: RouteConfig) -> list[tuple[int, ...]]:
+    """`count` different shortest paths of 4 to 6 edges between random nodes, as in Room-to-Room.
+
+    Fewer when the house has fewer; in a house too small for any, the longest paths it has.
+    """
+    hops = count_hops(graph.next_hop)
+    fits = (hops >= config.fewest_edges) & (hops <= config.most_edges) & (np.asarray(graph.distance) >= config.shortest)
+    if not fits.any():
+        fits = hops == hops.max()
+    pairs = np.argwhere(fits)
+    chosen = rng.permutation(len(pairs))[:count]
+    return [tuple(int(v) for v in graph.path(int(pairs[i, 0]), int(pairs[i, 1]))) for i in chosen]
+
+
+def spanning_parents(graph: NavGraph) -> tuple[np.ndarray, np.ndarray]:
+    """A shortest-path tree from the most central node: (n,) parent (the root its own) and (n,) depth in edges."""
+    distance = np.asarray(graph.distance)
+    root = int(np.argmin(distance.max(axis=1)))
+    parent = np.asarray(graph.next_hop)[:, root].astype(np.int64).copy()
+    parent[root] = root
+    return parent, count_hops(graph.next_hop)[:, root]
+
+
+def ancestors(parent: np.ndarray, node: int) -> list[int]:
+    """`node` and its ancestors up to the root."""
+    line = [node]
+    while parent[line[-1]] != line[-1]:
+        line.append(int(parent[line[-1]]))
+    return line
+
+
+def spanning_paths(graph: NavGraph) -> list[tuple[int, ...]]:
+    """The O(N log N) paths of Lemma 2: from each node to its 2^i-th ancestors, and back.
+
+    i runs to floor(log2 d(v)). The proof's "- 1" would leave nodes one step below the root (and
+    every 2^k-th ancestor that is the root) without any instruction, so it is read as a slip.
+    """
+    parent, depth = spanning_parents(graph)
+    paths = []
+    for v in range(len(parent)):
+        line = ancestors(parent, v)
+        for i in range(int(math.log2(depth[v])) + 1 if depth[v] else 0):
+            up = tuple(line[: 2**i + 1])
+            paths += [up, up[::-1]]
+    return paths
+
+
+def guide(graph: NavGraph, start: int, goal: int) -> list[tuple[int, ...]]:
+    """Lemma 2: the O(log N) spanning paths that lead from `start` to `goal` by their common ancestor."""
+    parent, _ = spanning_parents(graph)
+    up, down = ancestors(parent, start), ancestors(parent, goal)
+    below = set(down)
+    common = next(v for v in up if v in below)
+    climb = _jumps(up[: up.index(common) + 1])
+    descent = [p[::-1] for p in _jumps(down[: down.index(common) + 1])[::-1]]
+    return climb + descent
+
+
+def _jumps(line: list[int]) -> list[tuple[int, ...]]:
+    """A line of ancestors cut into pieces of 2^i edges, the longest first."""
+    pieces, at = [], 0
+    while at < len(line) - 1:
+        length = 2 ** int(math.log2(len(line) - 1 - at))
+        pieces.append(tuple(line[at : at + length + 1]))
+        at += length
+    return pieces
+
+
+@dataclass(frozen=True)
+class Lemma2:
+    """What Lemma 2 promises, counted in one graph."""
+
+    nodes: int
+    instructions: int
+    """Distinct (start, end) pairs that need an instruction: O(N log N)."""
+    bound: float
+    """2 N log2 N."""
+    most: int
+    """Most instructions between any two nodes: O(log N)."""
+    mean: float
+    detour: float
+    """Mean ratio of the guided walk to the shortest path, both in metres."""
+
+
+def benchmark_lemma2(graph: NavGraph, *, rng: np.random.Generator, pairs: int | None = None) -> Lemma2:
+    """Guide between all ordered pairs of different nodes (or `pairs` random ones) and count."""
+    n = len(graph.positions)
+    every = [(a, b) for a in range(n) for b in range(n) if a != b]
+    if pairs is not None and pairs < len(every):
+        every = [every[i] for i in sorted(rng.choice(len(every), pairs, replace=False))]
+    known = {(p[0], p[-1]) for p in spanning_paths(graph)}
+    counts, detours = [], []
+    for a, b in every:
+        legs = guide(graph, a, b)
+        assert all((leg[0], leg[-1]) in known for leg in legs), "a leg has no instruction"
+        walked = sum(float(graph.distance[u, v]) for leg in legs for u, v in itertools.pairwise(leg))
+        counts.append(len(legs))
+        detours.append(walked / float(graph.distance[a, b]))
+    return Lemma2(n, len(known), 2 * n * math.log2(n), max(counts), float(np.mean(counts)), float(np.mean(detours)))
+
+
+def build_routes(
+    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig()
+) -> tuple[Route, ...]:
+    """The sampled route system of one house, each path worded three times."""
+    rng = stream(seed, "routes", world.house.name)
+    wordings = WORDINGS[house_split]
+    count = max(1, round(config.routes_per_node * len(world.graph.positions) / len(wordings)))
+    return worded(world, sampled_paths(world.graph, count, rng=rng, config=config), wordings, seed=seed, language=language)
+
+
+def build_spanning_routes(world: World, *, seed: int, language: Language, house_split: str) -> tuple[Route, ...]:
+    """The route system of Lemma 2, each path worded once per split."""
+    wordings = tuple(dict.fromkeys(WORDINGS[house_split]))
+    return worded(world, spanning_paths(world.graph), wordings, seed=seed, language=language)
+
+
+def worded(
+    world: World, paths: list[tuple[int, ...]], wordings: tuple[str, ...], *, seed: int, language: Language
+) -> tuple[Route, ...]:
+    """Routes along `paths`: a random first heading, and a text per wording, no two alike if it can be helped."""
+    used: set[str] = set()
+    routes = []
+    for p, path in enumerate(paths):
+        turn = int(stream(seed, "route", world.house.name, p).integers(TURNS))
+        for k, split in enumerate(wordings):
+            rng = stream(seed, "route", world.house.name, p, k)
+            for _ in range(TRIES):
+                text = language.route(world, path, turn * 2 * math.pi / TURNS, rng=rng)
+                if text not in used:
+                    break
+            used.add(text)
+            routes.append(Route(f"{world.house.name}_{p}_{k}", path, turn, 0, text, split))
+    return tuple(routes)

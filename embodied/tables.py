@@ -1,0 +1,147 @@
+"""Tables of agents over episodes, with 95 % confidence intervals, as Markdown, CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from assets.cache import write_bytes
+from embodied import metrics
+from embodied.interface import Episode
+
+if TYPE_CHECKING:
+    from embodied.navgraph import NavGraph
+
+PERCENT = ("success", "spl", "oracle success", "room success", "subtask success", "mistake repeat", "request repeat")
+"""Columns shown in per cent."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    mean: float
+    half: float
+    """Half the width of the 95 % confidence interval."""
+    n: int
+    """Episodes that count."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One agent on one split."""
+
+    agent: str
+    split: str
+    seed: int
+    episodes: int
+    houses: int
+    values: Mapping[str, Estimate]
+
+
+def estimate(values: Sequence[float], groups: Sequence[str]) -> Estimate:
+    """Mean with a normal 95 % interval whose standard error is clustered by house.
+
+    Episodes of one house share its rooms and its routes, so they are not independent; with a
+    single house the interval treats them as if they were. NaN values do not count.
+    """
+    kept = [(v, g) for v, g in zip(values, groups, strict=True) if not math.isnan(v)]
+    n = len(kept)
+    if n == 0:
+        return Estimate(float("nan"), float("nan"), 0)
+    mean = math.fsum(v for v, _ in kept) / n
+    sums: dict[str, float] = {}
+    for i, (v, g) in enumerate(kept):
+        key = g if len(set(groups)) > 1 else str(i)
+        sums[key] = sums.get(key, 0.0) + (v - mean)
+    k = len(sums)
+    variance = math.fsum(s * s for s in sums.values()) / n**2 * (k / (k - 1) if k > 1 else 0.0)
+    return Estimate(mean, 1.96 * math.sqrt(variance), n)
+
+
+def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str]) -> Estimate:
+    """Sum of firsts over sum of seconds (the repeat rates of Table 4.6), clustered likewise."""
+    total = sum(b for _, b in pairs)
+    if total == 0:
+        return Estimate(float("nan"), float("nan"), 0)
+    mean = sum(a for a, _ in pairs) / total
+    scale = len(pairs) / total
+    residuals = estimate([(a - mean * b) * scale for a, b in pairs], groups)
+    return Estimate(mean, residuals.half, total)
+
+
+def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
+    """Every metric of PER_EPISODE and the repeat rates, over the episodes of one agent."""
+    groups = [e.task.world for e in episodes]
+    values = {
+        name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups)
+        for name, f in metrics.PER_EPISODE.items()
+    }
+    for name, f in (("mistake repeat", metrics.mistake_repeats), ("request repeat", metrics.request_repeats)):
+        values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups)
+    return Row(agent, split, seed, len(episodes), len(set(groups)), values)
+
+
+def shown(name: str, value: Estimate) -> str:
+    """'45.4 ± 1.2', in per cent where the column is one; '–' where nothing counts."""
+    if value.n == 0 or math.isnan(value.mean):
+        return "–"
+    k = 100.0 if name in PERCENT else 1.0
+    digits = 1 if name in PERCENT else 2
+    return f"{k * value.mean:.{digits}f} ± {k * value.half:.{digits}f}"
+
+
+def heading(name: str) -> str:
+    return f"{name} (%)" if name in PERCENT else name
+
+
+def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
+    """One line per row, with the episode and house counts and the seed."""
+    columns = list(columns or rows[0].values)
+    head = ["agent", "split", *(heading(c) for c in columns), "episodes", "houses", "seed"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for r in rows:
+        cells = [r.agent, r.split, *(shown(c, r.values[c]) for c in columns), r.episodes, r.houses, r.seed]
+        lines.append("| " + " | ".join(str(c) for c in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """Long form: one line per row and metric."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["agent", "split", "seed", "episodes", "houses", "metric", "mean", "half_width_95", "n"])
+    for r in rows:
+        for name, v in r.values.items():
+            writer.writerow([r.agent, r.split, r.seed, r.episodes, r.houses, name, _number(v.mean), _number(v.half), v.n])
+    return out.getvalue()
+
+
+def as_json(rows: Sequence[Row]) -> str:
+    body = [
+        {
+            "agent": r.agent, "split": r.split, "seed": r.seed, "episodes": r.episodes, "houses": r.houses,
+            "values": {k: {"mean": _number(v.mean), "half_width_95": _number(v.half), "n": v.n} for k, v in r.values.items()},
+        }
+        for r in rows
+    ]
+    return json.dumps(body, indent=1) + "\n"
+
+
+def _number(x: float) -> float | None:
+    return None if math.isnan(x) else float(np.round(x, 9))
+
+
+def save(rows: Sequence[Row], folder: Path, name: str) -> tuple[Path, Path, Path]:
+    """Write name.md, name.csv and name.json into `folder`."""
+    folder = Path(folder)
+    paths = tuple(folder / f"{name}{suffix}" for suffix in (".md", ".csv", ".json"))
+    for path, text in zip(paths, (markdown(rows), as_csv(rows), as_json(rows)), strict=True):
+        write_bytes(path, text.encode())
+    return paths

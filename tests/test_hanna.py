@@ -1,0 +1,314 @@
+"""HANNA: ANNA's equations, Algorithm 7, routes and Lemma 2, the retrospective teacher."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hand_worlds import grid_world, line_world
+
+from embodied import metrics
+from embodied.assistants.anna import Anna, AssistantError
+from embodied.assistants.routes import (
+    RouteConfig,
+    benchmark_lemma2,
+    build_routes,
+    build_spanning_routes,
+    guide,
+    sampled_paths,
+    spanning_paths,
+)
+from embodied.env import ActionError, HannaEnv
+from embodied.interface import (
+    VIEWS,
+    Ask,
+    FindObject,
+    Intention,
+    Mode,
+    Move,
+    Pose,
+    Route,
+    Sight,
+    Step,
+    Stop,
+    Task,
+    Thought,
+)
+from embodied.language.plain import PlainLanguage
+from embodied.moves import PanoramicMoves
+from embodied.policies import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
+from embodied.rollout import play
+from embodied.seeds import stream
+from embodied.tasks.goals import count_hops
+from embodied.tasks.hanna import hanna_pool, hanna_task
+from embodied.teachers.hanna import (
+    HannaTeacher,
+    base37_entropy,
+    lost_as_programmed,
+    lost_as_written,
+    segments,
+)
+
+LINE_TASK = Task(
+    "line/hanna/0", "hanna", "line", Pose(0), FindObject("mug", None, ("mug_1",)), (3,), "find a mug", 0.0, 20
+)
+LINE_ROUTES = (
+    Route("short", (1, 2), 0, 0, "go one", "test"),
+    Route("long", (1, 2, 3), 3, 1, "go two", "test"),
+    Route("away", (3, 2, 1), 6, 0, "come back", "test"),
+)
+
+
+def line_env(routes=LINE_ROUTES) -> HannaEnv:
+    world = line_world()
+    return HannaEnv({"line": world}, Anna({"line": world.graph}, {"line": routes}, split="test"))
+
+
+def grid_setup(n: int = 40, seed: int = 1):
+    world = grid_world(8)
+    routes = build_routes(world, seed=seed, language=PlainLanguage(), house_split="test")
+    pool = hanna_pool(world, seed=seed)
+    tasks = [hanna_task(pool, i, seed=seed, language=PlainLanguage()) for i in range(min(n, len(pool)))]
+
+    def make() -> HannaEnv:
+        return HannaEnv({"grid": world}, Anna({"grid": world.graph}, {"grid": routes}, split="test"))
+
+    return world, routes, tasks, make
+
+
+# ANNA
+
+
+def test_help_is_near_route_starts_only_and_asking_elsewhere_is_an_error():
+    env = line_env(LINE_ROUTES[:2])
+    can = []
+    for node in range(4):
+        env.reset(dataclasses.replace(LINE_TASK, start=Pose(node)))
+        can.append(bool(env.observation.can_ask))
+    assert can == [True, True, True, False], "routes start at node 1, whose neighbours are 2 m away"
+    with pytest.raises(ActionError, match="can_ask"):
+        env.step(Ask())
+    with pytest.raises(AssistantError, match="nobody"):
+        env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
+
+
+def test_the_reply_is_the_route_that_ends_nearest_the_goal():
+    env = line_env()
+    env.reset(LINE_TASK)
+    reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
+    assert (reply.text, reply.image) == ("go two", Sight("line", 3))
+    assert (reply.subtask.target, reply.subtask.goal, reply.subtask.start) == (3, 3, Pose(1, 3, 1))
+
+
+def test_the_departure_node_is_the_nearest_to_a_goal_not_the_end_of_the_route():
+    env = line_env((Route("through", (1, 2, 3), 0, 0, "go on", "test"),))
+    env.reset(dataclasses.replace(LINE_TASK, goal_nodes=(2,)))
+    reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
+    assert reply.subtask.target == 2 and reply.subtask.path == (1, 2)
+
+
+def test_every_path_needs_a_wording_in_the_split():
+    world = line_world()
+    with pytest.raises(AssistantError, match="no wording"):
+        Anna({"line": world.graph}, {"line": LINE_ROUTES}, split="val")
+
+
+def test_brute_force_agrees_with_equations_4_4_to_4_7():
+    world, routes, tasks, make = grid_setup()
+    env, distance = make(), world.graph.distance
+    for task in tasks:
+        env.reset(task)
+        if not env.observation.can_ask:
+            continue
+        reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
+        v = task.start.node
+        zone = [r for r in routes if r.path[0] == v or (
+            r.path[0] in world.graph.neighbours(v) and distance[v, r.path[0]] <= 2.0)]
+        best = min(distance[u, g] for r in zone for u in r.path for g in task.goal_nodes)
+        assert distance[reply.subtask.target, reply.subtask.goal] == pytest.approx(best)
+
+
+# Algorithm 7
+
+
+def test_an_episode_follows_algorithm_7_line_by_line():
+    env = line_env()
+    o = env.reset(LINE_TASK)
+    assert (o.mode, o.instruction, o.target, o.time, o.time_on_task) == (Mode.MAIN, "find a mug", None, 0, 0)
+    o = env.step(Ask())
+    assert (o.mode, o.instruction, o.target) == (Mode.SUB, "go two", Sight("line", 3))
+    assert (env.pose, o.time, o.time_on_task) == (Pose(1, 3, 1), 1, 0), "entered the route, looking along its angles"
+    o = env.step(Move(env.situation.candidate_nodes.index(2)))
+    assert (o.mode, o.time_on_task, env.pose.node) == (Mode.SUB, 1, 2)
+    o = env.step(Stop())
+    assert (o.mode, o.instruction, o.target) == (Mode.MAIN, "find a mug", Sight("line", 3)), "departed early: image of g*"
+    assert (env.pose.node, o.time, o.time_on_task, env.situation.targets) == (2, 3, 0, (3,))
+    o = env.step(Move(env.situation.candidate_nodes.index(3)))
+    assert env.step(Stop()) is None
+    e = env.episode()
+    assert (e.ended, e.requests, e.nodes) == ("stop", 1, (0, 1, 2, 2, 3, 3))
+    assert metrics.success(e, line_world().graph) == 1 and metrics.spl(e, line_world().graph) == 1
+    assert metrics.subtask_success(e, line_world().graph) == 1, "left within 2 m of the target"
+
+
+def test_asking_again_on_a_route_replaces_the_message():
+    env = line_env()
+    env.reset(LINE_TASK)
+    env.step(Ask())
+    o = env.step(Ask())
+    assert o.mode is Mode.SUB and o.time_on_task == 0 and env.pose.node == 1
+
+
+def test_the_goal_shows_only_after_help():
+    """Truth 4: equal observations under equal actions until an assistant speaks."""
+    _world, _, tasks, make = grid_setup()
+    one = tasks[0]
+    two = next(t for t in tasks if t.goal_nodes != one.goal_nodes)
+    two = dataclasses.replace(two, start=one.start, request=one.request)
+    a, b, rng = make(), make(), np.random.default_rng(1)
+    x, y = a.reset(one), b.reset(two)
+    for _ in range(30):
+        assert x == y
+        move = Move(int(rng.integers(len(x.candidates))))
+        x, y = a.step(move), b.step(move)
+    assert any(s.can_ask for s in a._steps), "the walk met somebody, and still nothing differed"
+
+
+# Agents
+
+
+def test_teacher_navigation_solves_everything_however_it_asks():
+    world, _, tasks, make = grid_setup()
+    for rule in (never_ask, ask_at_random, ask_every_5):
+        episodes = play(make, Asking(Shortest(), rule), tasks, seed=2)
+        assert all(metrics.success(e, world.graph) for e in episodes)
+    assert np.mean([e.requests for e in episodes]) > 0.2
+    alone = play(make, Shortest(), tasks, seed=2)
+    assert all(metrics.spl(e, world.graph) == pytest.approx(1) for e in alone)
+
+
+def test_perfect_interpretation_beats_chance_by_far():
+    world, _, tasks, make = grid_setup(60)
+    rates = [np.mean([metrics.success(e, world.graph) for e in play(make, p, tasks, seed=0)])
+             for p in (PerfectInterpreter(), RandomWalk())]
+    assert rates[0] > 0.7 and rates[1] < 0.2
+
+
+def test_help_does_not_depend_on_the_batch_around_it():
+    _, _, tasks, make = grid_setup(33)
+    policy = Asking(Shortest(), ask_at_random)
+    alone = play(make, policy, tasks, seed=4)
+    assert alone == play(make, policy, tasks, seed=4, batch=32)
+    assert alone == play(make, policy, tasks[::-1], seed=4, batch=5)[::-1]
+    assert sum(e.requests for e in alone) > 0
+
+
+# Routes
+
+
+def test_sampled_routes_are_shortest_paths_of_4_to_6_edges_without_repeats():
+    world = grid_world(8)
+    paths = sampled_paths(world.graph, 50, rng=stream(0), config=RouteConfig())
+    hops = count_hops(world.graph.next_hop)
+    assert len(set(paths)) == 50
+    assert all(4 <= len(p) - 1 <= 6 and hops[p[0], p[-1]] == len(p) - 1 for p in paths)
+
+
+def test_training_houses_hold_out_one_wording_of_every_path():
+    routes = build_routes(grid_world(8), seed=0, language=PlainLanguage(), house_split="train")
+    by_path: dict = {}
+    for r in routes:
+        by_path.setdefault(r.path, []).append(r.split)
+    assert all(sorted(s) == ["train_seen", "train_seen", "train_unseen"] for s in by_path.values())
+    assert len(by_path) == round(211 / 125 * 64 / 3)
+
+
+def test_lemma_2_guides_between_all_pairs_with_few_instructions():
+    for side in (4, 8):
+        graph = grid_world(side).graph
+        result = benchmark_lemma2(graph, rng=stream(0))
+        assert result.instructions <= result.bound
+        assert result.most <= 2 * (math.log2(result.nodes) + 1)
+
+
+def test_guided_legs_join_up():
+    graph = grid_world(6).graph
+    known = {(p[0], p[-1]) for p in spanning_paths(graph)}
+    for a, b in ((0, 35), (7, 7), (30, 5), (12, 13)):
+        legs = guide(graph, a, b)
+        stops = [a, *(leg[-1] for leg in legs)]
+        assert stops[-1] == b and all(leg[0] == s and (leg[0], leg[-1]) in known for leg, s in zip(legs, stops))
+
+
+def test_with_spanning_routes_there_is_help_everywhere():
+    world = grid_world(6)
+    routes = build_spanning_routes(world, seed=0, language=PlainLanguage(), house_split="test")
+    assert {r.path[0] for r in routes} == set(range(36))
+
+
+# The retrospective teacher
+
+
+def test_the_two_readings_of_lost_differ_as_documented():
+    assert lost_as_written([5, 3, 6, 5, 4]) == [False, True, False, False, True]
+    assert lost_as_programmed([5, 3, 6, 5, 4]) == [False, False, True, True, True]
+    assert lost_as_programmed([3, 2, 2, 1]) == [False] * 4
+
+
+def thought(env, best: int, p: float) -> Thought:
+    n = len(env.observation.candidates)
+    moves = np.full(n + 1, (1 - p) / n if n else 0.0)
+    moves[best] = p
+    return Thought(moves)
+
+
+def test_reasons_and_labels_by_hand():
+    """0 -> 1 -> 0 (lost, sure), ask, depart at once, on to the goal."""
+    env = line_env()
+    env.reset(dataclasses.replace(LINE_TASK, start=Pose(1)))
+
+    def to(node: int) -> int:
+        return env.situation.candidate_nodes.index(node)
+
+    env.step(Move(to(0), thought(env, to(0), 0.4)))  # wrong and unsure, at the closest approach
+    env.step(Move(to(1), thought(env, to(1), 1.0)))  # right and sure, but farther than before
+    env.step(Ask(thought=thought(env, to(2), 0.9)))  # back at the closest distance, but later
+    env.step(Stop())  # departs at node 1: wrong
+    env.step(Move(to(0), thought(env, to(0), 0.9)))  # the same mistake as in the first step
+    env.step(Move(to(1)))
+    env.step(Move(to(2)))
+    env.step(Move(to(3)))
+    env.step(Stop())
+    labels = HannaTeacher().relabel(env.episode(), line_world())
+    assert [x.reasons for x in labels[:3]] == [(False, True, True), (True, False, True), (True, False, True)]
+    assert [x.ask for x in labels[:5]] == [True, True, True, False, False], "node 1 has been asked at"
+    assert labels[2].move is None, "a step that asked teaches no navigation"
+    assert isinstance(labels[8].move, Stop)
+    (again,) = labels[4].negatives
+    assert env.episode().steps[4].candidate_nodes[again.candidate] == 0, "curiosity remembers across the help (4.12)"
+    assert labels[3].negatives == (), "another instruction, another memory"
+
+
+def test_steps_outside_a_zone_teach_nothing_about_asking():
+    env = line_env(LINE_ROUTES[:1])
+    env.reset(dataclasses.replace(LINE_TASK, start=Pose(3)))
+    env.step(Stop())
+    (label,) = HannaTeacher().relabel(env.episode(), line_world())
+    assert label.ask is None and label.reasons is None
+
+
+def test_segments_are_cut_after_requests_and_stops():
+    def step(action) -> Step:
+        return Step(Pose(0), Mode.MAIN, "", (3,), "none", (), (1,), action, None, Pose(0))
+
+    pieces = segments([step(a) for a in (Move(0), Ask(), Move(0), Move(0), Stop(), Stop())])
+    assert [len(p) for p in pieces] == [2, 3, 1]
+
+
+def test_entropy_in_base_37_spans_zero_to_one():
+    candidates, _ = PanoramicMoves().at(line_world(), Pose(1))
+    sure, even = np.array([1.0, 0, 0]), np.full(3, 1 / 3)
+    assert base37_entropy(sure, candidates) == 0
+    assert base37_entropy(even, candidates) == pytest.approx(math.log(3) / math.log(VIEWS + 1))
