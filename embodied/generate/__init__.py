@@ -1,0 +1,165 @@
+"""From a seed to a House: named stages, each a function from Draft to Draft that can be replaced.
+
+    house = generate_house(7)
+    house = generate_house(7, HouseConfig(area=(300, 340), shape="U"))
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from embodied.generate.config import HouseConfig
+from embodied.generate.finishes import Palette, draw_palette
+from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
+from embodied.generate.layout import Plan, draw_plan, turned
+from embodied.generate.openings import draw_openings
+from embodied.generate.program import Space, draw_area, draw_program
+from embodied.house import House, HouseError, Room, Sky, Storey, check
+from embodied.seeds import stream
+
+__all__ = ["Draft", "HouseConfig", "STAGES", "generate_house"]
+
+TRIES = 900
+"""Candidate plans per attempt."""
+ATTEMPTS = 12
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A house in the making; each stage fills in its field."""
+
+    seed: int
+    config: HouseConfig
+    catalogue: object | None
+    area: float = 0.0
+    shape: str = "rectangle"
+    footprints: tuple[Footprint, ...] = ()
+    """Alternatives of one shape and area, among which the rooms stage chooses."""
+    spaces: tuple[Space, ...] = ()
+    plan: Plan | None = None
+    palette: Palette = Palette()
+    house: House | None = None
+
+
+def footprint(draft: Draft) -> Draft:
+    """Total area, shape and a dozen footprints of it."""
+    area = draw_area(draft.config, rng=stream(draft.seed, "house", "area"))
+    rng = stream(draft.seed, "house", "footprint")
+    shape = draw_shape(area, draft.config, rng=rng)
+    return dataclasses.replace(
+        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(12)))
+
+
+def program(draft: Draft) -> Draft:
+    """The rooms wanted."""
+    return dataclasses.replace(
+        draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program")))
+
+
+def rooms(draft: Draft) -> Draft:
+    """The best of many plans."""
+    for attempt in range(ATTEMPTS):
+        rng = stream(draft.seed, "house", "rooms", attempt)
+        footprints, spaces = draft.footprints, draft.spaces
+        if attempt:
+            footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
+            spaces = draw_program(draft.area, draft.config, rng=rng)
+        plan = draw_plan(footprints, spaces, TRIES, rng=rng)
+        if plan is not None:
+            return dataclasses.replace(draft, plan=turned(plan, rng=rng), spaces=spaces)
+    raise HouseError(f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
+                     f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms")
+
+
+def openings(draft: Draft) -> Draft:
+    """The bare house: rooms with ids, doors and windows."""
+    rng = stream(draft.seed, "house", "openings")
+    palette = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette"))
+    counts: dict[str, int] = {}
+    names = []
+    for c in draft.plan.cells:
+        counts[c.kind] = counts.get(c.kind, 0) + 1
+        names.append(f"{c.kind}_{counts[c.kind]}")
+    height = round(float(rng.choice([2.45, 2.5, 2.6, 2.7, 2.9, 3.0], p=[0.15, 0.25, 0.3, 0.17, 0.08, 0.05])), 2)
+    open_plan = draft.config.open_plan
+    if open_plan is None:
+        open_plan = bool(rng.random() < 0.6)
+    made = []
+    for c, name in zip(draft.plan.cells, names):
+        x0, y0, x1, y1 = (v / 10 for v in c.rect)
+        made.append(Room(name, c.kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), PLAIN_FLOOR, PLAIN_WALL, PLAIN_WALL,
+                         PLAIN_WALL))
+    doors = draw_openings(draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height,
+                          open_plan, rng=rng)
+    house = House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), ())
+    return dataclasses.replace(draft, palette=palette, house=house)
+
+
+PLAIN_FLOOR, PLAIN_WALL = "oak_planks/0", "paint_white/0"
+
+
+def finishes(draft: Draft) -> Draft:
+    """What every room wears, and the weather outside."""
+    sky = draw_sky(draft.config, stream(draft.seed, "house", "sky"))
+    return dataclasses.replace(draft, house=dataclasses.replace(draft.house, sky=sky))
+
+
+def draw_sky(config: HouseConfig, rng) -> Sky:
+    """Daytime mostly; `config` may fix hour and weather."""
+    hour = config.hour if config.hour is not None else round(float(rng.triangular(8.0, 12.0, 18.0)), 2)
+    weather = config.weather or str(rng.choice(["clear", "hazy", "overcast"], p=[0.55, 0.25, 0.2]))
+    return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4))
+
+
+def furnishing(draft: Draft) -> Draft:
+    """Furniture, wall and ceiling things, small things and lights."""
+    if importlib.util.find_spec("embodied.generate.furnish") is None:
+        return draft
+    from embodied.generate import furnish
+
+    if not hasattr(furnish, "furnish"):
+        return draft
+    house = furnish.furnish(draft.house, draft.catalogue, seed=draft.seed)
+    return dataclasses.replace(draft, house=house)
+
+
+def checking(draft: Draft) -> Draft:
+    """Refuse what cannot be."""
+    check(draft.house)
+    return draft
+
+
+STAGES: Mapping[str, Callable[[Draft], Draft]] = {
+    "footprint": footprint, "program": program, "rooms": rooms, "openings": openings, "finishes": finishes,
+    "furnish": furnishing, "check": checking,
+}
+
+
+def generate_house(seed: int, config: HouseConfig = HouseConfig(), catalogue: object | None = None,
+                   stages: Mapping[str, Callable[[Draft], Draft]] = STAGES) -> House:
+    """The house that belongs to `seed`: the same in every process and on every machine.
+
+    Args:
+      seed: any integer.
+      config: what to fix; the rest is drawn.
+      catalogue: assets to furnish with; the reviewed one by default.
+      stages: name to stage, run in order; replace one with {**STAGES, "rooms": mine}.
+
+    Raises:
+      HouseError: the configuration cannot be built.
+    """
+    draft = Draft(seed, config, catalogue)
+    for stage in stages.values():
+        draft = stage(draft)
+    return draft.house
+
+
+def _title(draft: Draft) -> str:
+    beds = sum(s.kind in ("main_bedroom", "bedroom", "kids_room", "guest_room") for s in draft.spaces)
+    shape = "" if draft.shape == "rectangle" else f"{draft.shape}-shaped "
+    what = "flat" if draft.area < 75 else "house"
+    return f"{shape}{what} with {beds} bedroom{'s' if beds > 1 else ''}, {draft.area:.0f} m2"

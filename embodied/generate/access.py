@@ -1,0 +1,163 @@
+"""Who opens into whom: the doors and open joins that make a plan walkable without crossing private rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from embodied.generate.modules import Cell
+from embodied.generate.program import BEDROOMS
+
+Wall = tuple[str, int, int, int]
+"""A shared wall: the axis it runs along, its coordinate across, and its interval, decimetres."""
+
+THROUGH = ("hall", "corridor", "living_room", "dining_room", "kitchen", "family_room")
+"""Kinds one may cross on the way to another room."""
+_BED = {"corridor": 0.0, "hall": 0.4, "living_room": 5.0, "family_room": 6.0, "dining_room": 7.0}
+_OTHER = {"corridor": 0.0, "hall": 0.0, "living_room": 0.8, "family_room": 0.8, "dining_room": 1.6, "kitchen": 3.0}
+ENTERED_FROM: dict[str, dict[str, float]] = {
+    **{k: _BED for k in BEDROOMS},
+    "bathroom": {"corridor": 0.0, "hall": 0.4, "living_room": 6.0, "dining_room": 8.0, "family_room": 7.0},
+    "toilet": {"hall": 0.0, "corridor": 0.2, "living_room": 6.0, "family_room": 6.0, "dining_room": 8.0},
+    "kitchen": {"dining_room": 0.0, "living_room": 0.3, "family_room": 0.6, "hall": 0.8, "corridor": 1.0},
+    "dining_room": {"living_room": 0.0, "kitchen": 0.4, "hall": 0.6, "family_room": 0.6, "corridor": 0.8},
+    "living_room": {"hall": 0.0, "corridor": 0.3, "dining_room": 1.2, "family_room": 1.5, "kitchen": 3.0},
+    "family_room": {"corridor": 0.3, "hall": 0.3, "kitchen": 0.4, "dining_room": 0.4, "living_room": 0.5},
+    **{k: _OTHER for k in ("study", "library", "gym", "playroom")},
+    "workshop": {"garage": 0.3, "corridor": 0.0, "hall": 0.3, "laundry_room": 0.3, "kitchen": 2.0, "family_room": 2.0},
+    "laundry_room": {"corridor": 0.0, "kitchen": 0.2, "hall": 0.4, "dining_room": 4.0},
+    "pantry": {"kitchen": 0.0, "corridor": 1.0, "hall": 1.5, "dining_room": 2.5},
+    "closet": {"hall": 0.0, "corridor": 0.0, "living_room": 3.0, "study": 2.0, "family_room": 3.0},
+    "garage": {"laundry_room": 0.1, "hall": 0.2, "corridor": 0.2, "kitchen": 0.8, "workshop": 0.5},
+    "sun_room": {"living_room": 0.0, "dining_room": 0.2, "family_room": 0.2, "kitchen": 0.8, "corridor": 0.8,
+                 "hall": 1.0, "library": 1.0},
+    "corridor": {"hall": 0.0, "corridor": 0.0, "living_room": 1.5, "family_room": 2.0, "dining_room": 2.5, "kitchen": 5.0},
+    "hall": {"corridor": 0.0, "living_room": 1.0},
+}
+"""Room kind to the kinds it may be entered from, with a cost; an owned room is entered from its owner."""
+JOINS = {("kitchen", "dining_room"): 16, ("dining_room", "living_room"): 16, ("kitchen", "living_room"): 16,
+         ("family_room", "kitchen"): 16, ("family_room", "dining_room"): 16, ("hall", "living_room"): 12,
+         ("living_room", "sun_room"): 14, ("dining_room", "sun_room"): 14, ("hall", "corridor"): 9,
+         ("corridor", "corridor"): 9, ("family_room", "sun_room"): 14, ("library", "living_room"): 18}
+"""Kinds joined wherever their shared wall is at least so long, decimetres."""
+NEEDED = {"toilet": 11, "closet": 11, "pantry": 11}
+"""Shortest shared wall, decimetres, that holds the kind's door; 12 for the others."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A way between two cells."""
+
+    child: int
+    parent: int
+    wall: Wall
+    tree: bool
+    """Whether the child is entered this way; otherwise it is a further join."""
+
+
+def shared_wall(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> Wall | None:
+    """The wall two rectangles share, None where they do not touch along more than a point."""
+    if a[2] == b[0] or b[2] == a[0]:
+        low, high = max(a[1], b[1]), min(a[3], b[3])
+        return ("y", a[2] if a[2] == b[0] else a[0], low, high) if high > low else None
+    if a[3] == b[1] or b[3] == a[1]:
+        low, high = max(a[0], b[0]), min(a[2], b[2])
+        return ("x", a[3] if a[3] == b[1] else a[1], low, high) if high > low else None
+    return None
+
+
+def walls_between(cells: list[Cell]) -> dict[tuple[int, int], Wall]:
+    """(i, j) with i < j to the wall they share."""
+    found = {}
+    for i, a in enumerate(cells):
+        x0, y0, x1, y1 = a.rect
+        for j in range(i + 1, len(cells)):
+            p0, q0, p1, q1 = cells[j].rect
+            if p0 <= x1 and p1 >= x0 and q0 <= y1 and q1 >= y0 and (wall := shared_wall(a.rect, cells[j].rect)):
+                found[i, j] = wall
+    return found
+
+
+def outer_stretches(cells: list[Cell], walls: dict[tuple[int, int], Wall], i: int) -> list[tuple[Wall, int]]:
+    """Stretches of the edges of cell i that look outdoors, each with the sense of its outward normal, longest first."""
+    x0, y0, x1, y1 = cells[i].rect
+    taken = [w for pair, w in walls.items() if i in pair]
+    found = []
+    for axis, across, low, high, side in (("x", y0, x0, x1, -1), ("y", x1, y0, y1, 1), ("x", y1, x0, x1, 1),
+                                          ("y", x0, y0, y1, -1)):
+        at = low
+        for _, _, p, q in sorted(w for w in taken if w[0] == axis and w[1] == across):
+            if p > at:
+                found.append(((axis, across, at, p), side))
+            at = max(at, q)
+        if high > at:
+            found.append(((axis, across, at, high), side))
+    return sorted(found, key=lambda f: (f[0][2] - f[0][3], f[0]))
+
+
+def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> bool:
+    """Whether the hall has room for a front door and every garage for a car to drive in."""
+    need = {"hall": 14, "garage": 29}
+    for i, c in enumerate(cells):
+        if c.kind in need:
+            stretches = outer_stretches(cells, walls, i)
+            if not stretches or stretches[0][0][3] - stretches[0][0][2] < need[c.kind]:
+                return False
+    return True
+
+
+def connect(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> tuple[list[Link], float] | None:
+    """The cheapest set of entrances that reaches every cell from the hall, and its cost.
+
+    Grows a tree from the hall (Prim's algorithm) over the permitted entrances, then adds joins.
+
+    Returns:
+      None where some cell cannot be reached.
+    """
+    start = next((i for i, c in enumerate(cells) if c.kind == "hall"), None)
+    if start is None:
+        return None
+    options: list[list[tuple[float, int, Wall]]] = [[] for _ in cells]
+    for (i, j), wall in walls.items():
+        for child, parent in ((i, j), (j, i)):
+            cost = _cost(cells, child, parent)
+            if cost is not None and wall[3] - wall[2] >= _needed(cells, child, parent):
+                options[parent].append((cost, child, wall))
+    links: list[Link] = []
+    reached = {start}
+    frontier = [(cost, child, start, wall) for cost, child, wall in options[start]]
+    total = 0.0
+    while frontier:
+        best = min(frontier, key=lambda f: (f[0], f[1], f[2]))
+        frontier.remove(best)
+        cost, child, parent, wall = best
+        if child in reached:
+            continue
+        reached.add(child)
+        total += cost
+        links.append(Link(child, parent, wall, True))
+        frontier += [(c, k, child, w) for c, k, w in options[child] if k not in reached]
+    if len(reached) < len(cells):
+        return None
+    tree = {(min(k.child, k.parent), max(k.child, k.parent)) for k in links}
+    for (i, j), wall in walls.items():
+        least = JOINS.get((cells[i].kind, cells[j].kind)) or JOINS.get((cells[j].kind, cells[i].kind))
+        if least and (i, j) not in tree and wall[3] - wall[2] >= least:
+            links.append(Link(i, j, wall, False))
+    return links, total
+
+
+def _needed(cells: list[Cell], child: int, parent: int) -> int:
+    if {cells[child].kind, cells[parent].kind} <= {"hall", "corridor"}:
+        return 9
+    return NEEDED.get(cells[child].kind, 12)
+
+
+def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
+    c, p = cells[child], cells[parent]
+    if c.owner is not None:
+        return 0.0 if c.owner == parent else None
+    if p.kind not in THROUGH and (p.kind, c.kind) not in (
+            ("laundry_room", "garage"), ("garage", "workshop"), ("workshop", "garage"), ("laundry_room", "workshop"),
+            ("library", "sun_room")):
+        return None
+    return ENTERED_FROM[c.kind].get(p.kind)

@@ -1,0 +1,80 @@
+"""HouseConfig: what a caller may fix about a house; everything left out is drawn from the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from embodied.house import HouseError
+
+SHAPES = ("rectangle", "L", "T", "U")
+AREAS = (32.0, 700.0)
+"""Smallest and largest total area, square metres."""
+
+
+@dataclass(frozen=True)
+class HouseConfig:
+    """The knobs of the generator. None means: draw it from the seed."""
+
+    area: tuple[float, float] | None = None
+    """Lowest and highest total area, square metres, drawn uniformly between them."""
+    rooms: int | None = None
+    """Number of main rooms as flats are advertised: kitchen, wet rooms, storage, garage and circulation
+    do not count. 2 to 20."""
+    bedrooms: int | None = None
+    """Bedrooms of every sort (main, children's, guest), 1 to 12."""
+    shape: str | None = None
+    """Footprint: one of SHAPES."""
+    storeys: int = 1
+    """Only 1 is built so far."""
+    open_plan: bool | None = None
+    """Whether kitchen, dining and living flow into each other through wide openings."""
+    style: str | None = None
+    """Name of a palette of embodied.generate.finishes.STYLES."""
+    disorder: float | None = None
+    """0 is tidy, 1 is thoroughly lived in; read by the furnishing stages."""
+    hour: float | None = None
+    """Local solar time, hours in [0, 24)."""
+    weather: str | None = None
+    """'clear', 'hazy' or 'overcast'."""
+
+    def __post_init__(self) -> None:
+        if self.area is not None:
+            low, high = self.area
+            if not AREAS[0] <= low <= high <= AREAS[1]:
+                raise HouseError(f"area should be (low, high) within {AREAS} m2, got {self.area}")
+        _within("rooms", self.rooms, 2, 20)
+        _within("bedrooms", self.bedrooms, 1, 12)
+        _within("disorder", self.disorder, 0, 1)
+        if self.hour is not None and not 0 <= self.hour < 24:
+            raise HouseError(f"hour should lie in [0, 24), got {self.hour}")
+        if self.weather not in (None, "clear", "hazy", "overcast"):
+            raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
+        if self.shape not in (None, *SHAPES):
+            raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
+        if self.storeys != 1:
+            raise HouseError(f"storeys={self.storeys} cannot be built yet: the generator draws single-storey houses; "
+                             "use storeys=1")
+        if self.rooms is not None and self.bedrooms is not None and self.bedrooms > self.rooms - 1:
+            raise HouseError(f"{self.bedrooms} bedrooms do not fit in {self.rooms} main rooms, one of which is "
+                             "the living room; raise rooms or lower bedrooms")
+        needed = self.least_area()
+        if self.area is not None and self.area[1] < needed:
+            raise HouseError(f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r} need at least "
+                             f"{needed:.0f} m2, area allows {self.area[1]:.0f}; raise area or ask for fewer rooms")
+        if self.area is not None and self.rooms is not None and self.area[0] > self.most_area():
+            raise HouseError(f"rooms={self.rooms} fill at most {self.most_area():.0f} m2, area asks for "
+                             f"{self.area[0]:.0f}; lower area or ask for more rooms")
+
+    def least_area(self) -> float:
+        """The smallest total area, square metres, that holds what is asked for."""
+        rooms = max(self.rooms or 2, (self.bedrooms or 1) + 1)
+        return max(AREAS[0] + 17.0 * (rooms - 2), {"L": 75.0, "T": 95.0, "U": 150.0}.get(self.shape or "", 0.0))
+
+    def most_area(self) -> float:
+        """The largest total area, square metres, that the asked number of main rooms can fill sensibly."""
+        return AREAS[1] if self.rooms is None else 45.0 * self.rooms + 10.0
+
+
+def _within(name: str, value: float | None, low: float, high: float) -> None:
+    if value is not None and not low <= value <= high:
+        raise HouseError(f"{name} should lie between {low} and {high}, got {value}")

@@ -1,0 +1,263 @@
+"""The footprint: one to three wings along a corridor spine, on a grid of 0.1 m.
+
+A house is drawn in a canonical pose, the first wing running along +x from the public end and the
+others hanging down from it; `generate.layout` mirrors and turns the finished plan. Lengths here
+are integers in decimetres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.generate.config import HouseConfig
+
+Rect = tuple[int, int, int, int]
+"""x0, y0, x1, y1 in decimetres."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A row of rooms on one side of a corridor; u runs along it from the public end, v away from the corridor."""
+
+    axis: str
+    """'x' or 'y': the world axis u runs along."""
+    start: int
+    """World coordinate on `axis` where u = 0."""
+    way: int
+    """+1 or -1: the sense of u on `axis`."""
+    length: int
+    base: int
+    """World coordinate, across, of the corridor's edge, v = 0."""
+    out: int
+    """+1 or -1: the sense of v."""
+    depth: int
+    rank: float
+    """Spine distance of its start from the public end."""
+    band: int
+    """Index of the corridor band it lies along."""
+    u_band: int
+    """Spine coordinate, on that band, of u = 0."""
+
+    def rect(self, u0: int, u1: int, v0: int, v1: int) -> Rect:
+        a, b = sorted((self.start + self.way * u0, self.start + self.way * u1))
+        c, d = sorted((self.base + self.out * v0, self.base + self.out * v1))
+        return (a, c, b, d) if self.axis == "x" else (c, a, d, b)
+
+
+@dataclass(frozen=True)
+class Band:
+    """The corridor of one wing: a strip of its own along the spine."""
+
+    axis: str
+    start: int
+    way: int
+    length: int
+    low: int
+    high: int
+    """World coordinates across."""
+    free: tuple[bool, bool]
+    """Whether its start and its end lie on an outer wall, so that a room may take them over."""
+
+    def rect(self, s0: int, s1: int) -> Rect:
+        a, b = sorted((self.start + self.way * s0, self.start + self.way * s1))
+        return (a, self.low, b, self.high) if self.axis == "x" else (self.low, a, self.high, b)
+
+
+@dataclass(frozen=True)
+class Cap:
+    """The full depth of a wing's free end, for one or two rooms that the corridor runs into."""
+
+    band: int
+    at_start: bool
+    axis: str
+    """The axis across the wing, along which rooms are stacked."""
+    rect: Rect
+    passage: tuple[int, int]
+    """World interval on `axis` where the corridor arrives."""
+
+
+@dataclass(frozen=True)
+class Footprint:
+    shape: str
+    strips: tuple[Strip, ...]
+    bands: tuple[Band, ...]
+    caps: tuple[Cap, ...]
+    corridor: int
+    """Corridor width between wall centre lines; 0 for flats whose hall reaches every room."""
+
+
+def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) -> str:
+    """One of config.SHAPES, larger houses being less often plain rectangles."""
+    if config.shape is not None:
+        return config.shape
+    if area < 75:
+        return "rectangle"
+    x = float(np.interp(area, (75, 160, 300), (0, 0.5, 1)))
+    p = np.array([0.62 - 0.5 * x, 0.3 + 0.05 * x, 0.08 + 0.17 * x, 0.28 * x if area > 150 else 0.0])
+    return str(rng.choice(["rectangle", "L", "T", "U"], p=p / p.sum()))
+
+
+def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Footprint:
+    """A footprint of `area` square metres with the corridors of its wings."""
+    if shape == "rectangle":
+        return _flat(area, rng) if area < 62 else _bar(area, rng)
+    return _bumped(area, shape, rng) if area < 150 and shape != "U" or (shape == "U" and area < 190) else (
+        _winged(area, shape, rng))
+
+
+def _depths(rng: np.random.Generator, low: int, high: int) -> tuple[int, int]:
+    """Depths of the two rows of a wing; often one serves and is shallower."""
+    a = int(rng.integers(low, high + 1))
+    b = int(rng.integers(max(24, low - 12), low + 1)) if rng.random() < 0.6 else int(rng.integers(low, high + 1))
+    return (a, b) if rng.random() < 0.5 else (b, a)
+
+
+def _flat(area: float, rng: np.random.Generator) -> Footprint:
+    """Two rows back to back, no corridor."""
+    top, bottom = int(rng.integers(35, 44)), int(rng.integers(20, 29))
+    length = round(area * 100 / (top + bottom))
+    strips = (
+        Strip("x", 0, 1, length, bottom, 1, top, 0.0, 0, 0),
+        Strip("x", 0, 1, length, bottom, -1, bottom, 0.0, 0, 0),
+    )
+    return Footprint("rectangle", strips, (), (), 0)
+
+
+def _bar(area: float, rng: np.random.Generator) -> Footprint:
+    """One wing with a corridor between two rows."""
+    corridor = int(rng.integers(12, 15)) + (area > 180)
+    scale = float(np.interp(area, (60, 110, 200, 400, 600), (0, 0.35, 0.8, 1.5, 2.0)))
+    top, bottom = _depths(rng, int(30 + 9 * scale), int(36 + 12 * scale))
+    depth = top + corridor + bottom
+    length = round(area * 100 / depth)
+    return _one_wing("rectangle", length, top, bottom, corridor, (), area, rng)
+
+
+def _one_wing(shape, length, top, bottom, corridor, bumps, area, rng) -> Footprint:
+    """A wing along x; `bumps` are (x0, x1, extra depth) of the bottom row, sorted."""
+    left = right = 0
+    depth = top + corridor + bottom
+    if rng.random() < 0.65 and not any(b[0] == 0 for b in bumps):
+        left = round(float(np.clip(rng.uniform(0.22, 0.34) * area, 20, 60)) * 100 / depth)
+    if area > 100 and rng.random() < 0.35 and not any(b[1] == length for b in bumps):
+        right = round(float(np.clip(rng.uniform(0.13, 0.2) * area, 17, 34)) * 100 / depth)
+    if length - left - right < 35:
+        right = 0
+    left, right = (0 if w and w < 30 else w for w in (left, right))
+    strips = [Strip("x", left, 1, length - left - right, bottom + corridor, 1, top, left, 0, 0)]
+    edges = [left]
+    for x0, x1, _ in bumps:
+        edges += [x0, x1]
+    edges = sorted({*(min(max(e, left), length - right) for e in edges), length - right})
+    for x0, x1 in zip(edges, edges[1:]):
+        extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
+        strips.append(Strip("x", x0, 1, x1 - x0, bottom, -1, bottom + extra, x0, 0, x0 - left))
+    band = Band("x", left, 1, length - left - right, bottom, bottom + corridor, (left == 0, right == 0))
+    caps = []
+    if left:
+        caps.append(Cap(0, True, "y", (0, 0, left, depth), (bottom, bottom + corridor)))
+    if right:
+        caps.append(Cap(0, False, "y", (length - right, 0, length, depth), (bottom, bottom + corridor)))
+    return Footprint(shape, tuple(strips), (band,), tuple(caps), corridor)
+
+
+def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
+    """One wing whose front row steps out: at one end (L), in the middle (T) or at both ends (U)."""
+    corridor = int(rng.integers(12, 15))
+    scale = float(np.interp(area, (60, 110, 200), (0, 0.35, 0.8)))
+    top, bottom = _depths(rng, int(30 + 9 * scale), int(35 + 11 * scale))
+    extra = int(rng.integers(15, 27))
+    wide = int(rng.integers(38, 56))
+    count = 2 if shape == "U" else 1
+    depth = top + corridor + bottom
+    length = round((area * 100 - count * extra * wide) / depth)
+    if shape == "L":
+        bumps = ((0, wide, extra),) if rng.random() < 0.6 else ((length - wide, length, extra),)
+    elif shape == "T":
+        x0 = int(rng.integers(24, max(25, length - wide - 24)))
+        bumps = ((x0, x0 + wide, extra),)
+    else:
+        bumps = ((0, wide, extra), (length - wide, length, extra))
+    return _one_wing(shape, length, top, bottom, corridor, bumps, area, rng)
+
+
+def _winged(area: float, shape: str, rng: np.random.Generator) -> Footprint:
+    """Wings with corridors of their own: L (one at the end), T (one in the middle), U (one at each end)."""
+    corridor = int(rng.integers(13, 16))
+    scale = float(np.interp(area, (130, 200, 400, 600), (0.4, 0.7, 1.2, 1.6)))
+    low, high = int(30 + 9 * scale), int(36 + 11 * scale)
+    top, bottom = _depths(rng, low, high)
+    deep = top + corridor + bottom
+    left, right = _depths(rng, low, high)
+    wing = left + corridor + right
+    if shape == "U":
+        out, inner = _depths(rng, low, high)
+        other = out + corridor + inner
+        gap = int(rng.integers(55, 100))
+        long = wing + other + gap
+        rest = area * 100 - long * deep
+        if rest < 45 * (wing + other):
+            gap = 50
+            long = wing + other + gap
+            rest = max(area * 100 - long * deep, 35 * (wing + other))
+        share = rng.uniform(0.4, 0.6)
+        return _u(long, top, bottom, corridor, (out, inner, round(rest * share / other)),
+                  (left, right, round(rest * (1 - share) / wing)))
+    share = float(rng.uniform(0.6, 0.72))
+    long = max(round(area * 100 * share / deep), wing + 35)
+    drop = max(30, round((area * 100 - long * deep) / wing))
+    return _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng)
+
+
+def _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng) -> Footprint:
+    wing = left + corridor + right
+    deep = top + corridor + bottom
+    x0 = long - wing if shape == "L" else int(rng.integers(30, max(31, long - wing - 30)))
+    xb = x0 + left
+    cap = round(float(np.clip(rng.uniform(0.18, 0.26) * area, 24, 60)) * 100 / deep) if rng.random() < 0.6 else 0
+    cap = cap if 30 <= cap <= xb - 25 else 0
+    foot = round(float(np.clip(rng.uniform(0.08, 0.14) * area, 18, 34)) * 100 / wing) if rng.random() < 0.4 else 0
+    foot = foot if 30 <= foot <= drop - 25 else 0
+    end = xb + corridor if shape == "L" else long
+    band_a = Band("x", cap, 1, end - cap, bottom, bottom + corridor, (cap == 0, shape == "T"))
+    band_b = Band("y", bottom, -1, drop + bottom - foot, xb, xb + corridor, (False, foot == 0))
+    a_top = Strip("x", cap, 1, long - cap, bottom + corridor, 1, top, cap, 0, 0)
+    a_left = Strip("x", cap, 1, xb - cap, bottom, -1, bottom, cap, 0, 0)
+    b_left = Strip("y", 0, -1, drop - foot, xb, -1, left, xb + bottom, 1, bottom)
+    if shape == "L":
+        b_right = Strip("y", bottom + corridor, -1, drop + bottom + corridor - foot, xb + corridor, 1, right, xb, 1,
+                        -corridor)
+        strips = (a_top, a_left, b_left, b_right)
+    else:
+        a_right = Strip("x", xb + corridor, 1, long - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - cap)
+        b_right = Strip("y", 0, -1, drop - foot, xb + corridor, 1, right, xb + bottom, 1, bottom)
+        strips = (a_top, a_left, a_right, b_left, b_right)
+    caps = []
+    if cap:
+        caps.append(Cap(0, True, "y", (0, 0, cap, deep), (bottom, bottom + corridor)))
+    if foot:
+        caps.append(Cap(1, False, "x", (x0, -drop, x0 + wing, foot - drop), (xb, xb + corridor)))
+    return Footprint(shape, strips, (band_a, band_b), tuple(caps), corridor)
+
+
+def _u(long, top, bottom, corridor, public, private) -> Footprint:
+    """`public` and `private` wings as (outer row, inner row, length below the first wing)."""
+    out, inner, drop = public
+    left, right, fall = private
+    xa = out
+    xb = long - right - corridor
+    band_p = Band("y", -drop, 1, drop + bottom, xa, xa + corridor, (True, False))
+    band_a = Band("x", xa, 1, xb + corridor - xa, bottom, bottom + corridor, (False, False))
+    band_q = Band("y", bottom, -1, fall + bottom, xb, xb + corridor, (False, True))
+    far = drop + bottom
+    strips = (
+        Strip("y", -drop, 1, drop + bottom + corridor, xa, -1, out, 0.0, 0, 0),
+        Strip("y", -drop, 1, drop, xa + corridor, 1, inner, 0.0, 0, 0),
+        Strip("x", 0, 1, long, bottom + corridor, 1, top, far - xa, 1, -xa),
+        Strip("x", xa + corridor, 1, xb - xa - corridor, bottom, -1, bottom, far, 1, corridor),
+        Strip("y", 0, -1, fall, xb, -1, left, far + xb - xa + bottom, 2, bottom),
+        Strip("y", bottom + corridor, -1, fall + bottom + corridor, xb + corridor, 1, right, far + xb - xa, 2, -corridor),
+    )
+    return Footprint("U", strips, (band_p, band_a, band_q), (), corridor)

@@ -1,0 +1,245 @@
+"""The rooms: many candidate plans per house, drawn along the corridors, scored, the best one kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.generate.access import Link, connect, has_outer_doors, walls_between
+from embodied.generate.footprint import Cap, Footprint, Rect
+from embodied.generate.modules import Cell, Module, arrange, draw_modules, width
+from embodied.generate.program import Space
+from embodied.generate.score import score
+
+ZONE = {
+    "living_room": 0.0, "sun_room": 0.2, "family_room": 0.6, "dining_room": 0.5, "kitchen": 0.9, "hall": 1.2,
+    "garage": 1.2, "library": 1.3, "toilet": 1.4, "workshop": 1.5, "pantry": 1.0, "laundry_room": 1.7, "study": 1.9,
+    "gym": 2.2, "guest_room": 2.5, "playroom": 2.6, "bathroom": 3.0, "kids_room": 3.2, "bedroom": 3.1, "closet": 3.0,
+    "main_bedroom": 3.7,
+}
+"""How private a room kind is: 0 at the public end of the spine."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A plan on the 0.1 m grid: cells, the walls they share, and the ways between them."""
+
+    cells: tuple[Cell, ...]
+    links: tuple[Link, ...]
+    score: float
+
+
+def draw_plan(footprints: list[Footprint], spaces: tuple[Space, ...], tries: int, *, rng: np.random.Generator) -> Plan | None:
+    """The best of `tries` candidates over `footprints`; None where none is walkable."""
+    best: Plan | None = None
+    for k in range(tries):
+        cells = _candidate(footprints[k % len(footprints)], spaces, rng)
+        if cells is None:
+            continue
+        walls = walls_between(cells)
+        value = score(cells, walls)
+        if best is not None and value <= best.score:
+            continue
+        if not has_outer_doors(cells, walls):
+            continue
+        linked = connect(cells, walls)
+        if linked is None:
+            continue
+        value -= linked[1]
+        if best is None or value > best.score:
+            best = Plan(tuple(cells), tuple(linked[0]), value)
+    return best
+
+
+def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
+    """The plan mirrored and turned at random, its lower left corner at the origin."""
+    flip_x, flip_y, swap = (bool(b) for b in rng.integers(0, 2, 3))
+
+    def move(r: Rect) -> Rect:
+        x0, y0, x1, y1 = r
+        if flip_x:
+            x0, x1 = -x1, -x0
+        if flip_y:
+            y0, y1 = -y1, -y0
+        return (y0, x0, y1, x1) if swap else (x0, y0, x1, y1)
+
+    rects = [move(c.rect) for c in plan.cells]
+    dx, dy = min(r[0] for r in rects), min(r[1] for r in rects)
+    cells = tuple(
+        Cell(c.kind, (r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy), c.area, c.owner) for c, r in zip(plan.cells, rects))
+    walls = walls_between(list(cells))
+    links = tuple(
+        Link(k.child, k.parent, walls[min(k.child, k.parent), max(k.child, k.parent)], k.tree) for k in plan.links)
+    return Plan(cells, links, plan.score)
+
+
+def _candidate(footprint: Footprint, spaces: tuple[Space, ...], rng: np.random.Generator) -> list[Cell] | None:
+    modules = draw_modules(spaces, rng=rng)
+    cells: list[Cell] = []
+    for cap in footprint.caps:
+        chosen = _fill_cap(cap, modules, cells, rng)
+        if chosen is None:
+            return None
+        modules = [m for m in modules if m not in chosen]
+    rows = _assign(footprint, modules, rng)
+    if rows is None:
+        return None
+    return _lay(footprint, rows, cells, rng)
+
+
+def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random.Generator) -> list[Module] | None:
+    """Fill a wing's end with living rooms (start) or a main suite (end); returns the modules used."""
+    x0, y0, x1, y1 = cap.rect
+    area = (x1 - x0) * (y1 - y0) / 100
+    by_kind = {m.main.kind: m for m in reversed(modules)}
+    if cap.at_start:
+        options = [("living_room",), ("living_room", "dining_room"), ("living_room", "kitchen"),
+                   ("family_room", "living_room"), ("living_room", "library"), ("garage", "kitchen"), ("garage",)]
+    else:
+        options = [("main_bedroom",), ("main_bedroom", "bathroom"), ("gym",), ("bedroom", "bedroom"), ("living_room",),
+                   ("family_room",), ("guest_room",), ("library",), ("playroom",)]
+    fits = []
+    for option in options:
+        if option == ("main_bedroom", "bathroom"):
+            main = by_kind.get("main_bedroom")
+            parts = [main.main, *main.owned] if main and main.owned else None
+            used = [main]
+        else:
+            used = [by_kind[k] for k in option if k in by_kind and not by_kind[k].owned and by_kind[k].guest is None]
+            parts = [m.main for m in used] if len(used) == len(option) and len(set(option)) == len(option) else None
+        if parts:
+            ratio = area / sum(s.area for s in parts)
+            if 0.7 < ratio < 1.45:
+                fits.append((abs(np.log(ratio)) + rng.exponential(0.2), parts, used))
+    if not fits:
+        return None
+    _, parts, used = min(fits, key=lambda f: f[0])
+    cells += _stack(cap, parts, bool(used[0].owned), len(cells), rng)
+    return used
+
+
+def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random.Generator) -> list[Cell]:
+    """`parts` side by side across the wing's end, the first one where the corridor arrives if it owns the rest."""
+    x0, y0, x1, y1 = cap.rect
+    low, high = (y0, y1) if cap.axis == "y" else (x0, x1)
+    across = (x1 - x0) if cap.axis == "y" else (y1 - y0)
+    total = sum(s.area for s in parts)
+
+    def rect(a: int, b: int) -> Rect:
+        return (x0, a, x1, b) if cap.axis == "y" else (a, y0, b, y1)
+
+    if len(parts) == 1:
+        return [Cell(parts[0].kind, cap.rect, parts[0].area)]
+    deep = round((high - low) * parts[0].area / total)
+    below = rng.random() < 0.5
+    cut = low + deep if below else high - deep
+    cut = max(cut, cap.passage[1]) if below else min(cut, cap.passage[0])
+    main = rect(low, cut) if below else rect(cut, high)
+    rest = (cut, high) if below else (low, cut)
+    cells = [Cell(parts[0].kind, main, parts[0].area)]
+    owner = first if owned else None
+    if len(parts) == 2:
+        return [*cells, Cell(parts[1].kind, rect(*rest), parts[1].area, owner)]
+    a, b = (x0, x1) if cap.axis == "y" else (y0, y1)
+    mid = a + round(across * parts[1].area / (parts[1].area + parts[2].area))
+    for s, (p, q) in zip(parts[1:], ((a, mid), (mid, b))):
+        cells.append(Cell(s.kind, (p, rest[0], q, rest[1]) if cap.axis == "y" else (rest[0], p, rest[1], q), s.area, owner))
+    return cells
+
+
+def _assign(footprint: Footprint, modules: list[Module], rng: np.random.Generator) -> list[list[Module]] | None:
+    """Modules to rows, from the public end to the private one."""
+    keys = [ZONE[m.main.kind] + rng.normal(0, 0.45) for m in modules]
+    order = sorted(range(len(modules)), key=lambda k: keys[k])
+    rows: list[list[Module]] = [[] for _ in footprint.strips]
+    used = [0.0] * len(rows)
+    strips = footprint.strips
+    for k in order:
+        m = modules[k]
+        best, least = None, 1e9
+        for i, s in enumerate(strips):
+            w = width(m, s.depth, footprint.corridor)
+            left = s.length - used[i]
+            if left < 0.7 * w:
+                continue
+            deep = s.depth + (footprint.corridor if m.main.kind == "hall" else 0)
+            own = m.main.area * 100 / deep
+            tall = max(deep / own, own / deep) if m.main.kind != "hall" else 1.0
+            cost = s.rank + used[i] + rng.exponential(14.0) + 45 * max(0.0, tall - 1.7) + max(0.0, w - left)
+            if cost < least:
+                best, least = i, cost
+        if best is None:
+            best = int(np.argmax([s.length - u for s, u in zip(strips, used)]))
+            if strips[best].length - used[best] < 8:
+                return None
+        rows[best].append(m)
+        used[best] += width(m, strips[best].depth, footprint.corridor)
+    for s, row, u in zip(strips, rows, used):
+        if (not row and s.length > 0) or (row and not 0.68 < s.length / u < 1.5):
+            return None
+    return rows
+
+
+def _lay(footprint: Footprint, rows: list[list[Module]], cells: list[Cell], rng: np.random.Generator) -> list[Cell] | None:
+    """Cut the rows into rooms, let end rooms take the corridor's ends, and cut the corridor by the hall."""
+    corridor = footprint.corridor
+    cuts: list[list[tuple[int, int]]] = []
+    for s, row in zip(footprint.strips, rows):
+        wanted = np.array([width(m, s.depth, corridor) for m in row], dtype=float)
+        edges = [0, *np.round(np.cumsum(wanted) / wanted.sum() * s.length).astype(int).tolist()]
+        cuts.append(list(zip(edges, edges[1:])))
+    reach: dict[tuple[int, int], int] = {}
+    limits = []
+    for b, band in enumerate(footprint.bands):
+        limits.append([0, band.length])
+        for end in (0, 1):
+            if band.free[end]:
+                _take_end(footprint, rows, cuts, b, end, reach, limits[b], rng)
+    halls: list[tuple[int, int, int]] = []
+    for i, (s, row) in enumerate(zip(footprint.strips, rows)):
+        for k, m in enumerate(row):
+            made = arrange(m, s, *cuts[i][k], corridor, mirrored=bool(rng.random() < 0.5),
+                           inner=reach.get((i, k), 0), first=len(cells))
+            if made is None:
+                return None
+            if m.main.kind == "hall" and corridor:
+                r = made[0].rect
+                a, b = (r[0], r[2]) if s.axis == "x" else (r[1], r[3])
+                band = footprint.bands[s.band]
+                p, q = sorted(((a - band.start) * band.way, (b - band.start) * band.way))
+                if p < limits[s.band][0] or q > limits[s.band][1]:
+                    return None
+                halls.append((s.band, p, q))
+            cells += made
+    for b, band in enumerate(footprint.bands):
+        pieces = [tuple(limits[b])]
+        for hb, p, q in halls:
+            if hb == b:
+                pieces = [x for s, e in pieces for x in ((s, min(e, p)), (max(s, q), e)) if x[1] > x[0]]
+        for s, e in pieces:
+            if e - s < 9:
+                return None
+            cells.append(Cell("corridor", band.rect(s, e), (e - s) * corridor / 100))
+    return cells
+
+
+def _take_end(footprint, rows, cuts, b: int, end: int, reach, limits: list[int], rng: np.random.Generator) -> None:
+    """Let the shorter of the two rooms at a free corridor end reach across it, if the other keeps its door."""
+    band = footprint.bands[b]
+    ends = []
+    for i, s in enumerate(footprint.strips):
+        at = s.u_band == 0 if end == 0 else s.u_band + s.length == band.length
+        if s.band == b and at:
+            k = 0 if end == 0 else len(rows[i]) - 1
+            a, z = cuts[i][k]
+            ends.append((z - a, i, k))
+    if len(ends) < 2 or rng.random() < 0.1 or any(rows[i][k].main.kind == "hall" for _, i, k in ends):
+        return
+    ends.sort()
+    (short, i, k), (long, _, _) = ends[0], ends[1]
+    m = rows[i][k]
+    if long - short < 12 or m.owned or m.guest or m.main.kind in ("toilet", "closet"):
+        return
+    reach[i, k] = footprint.corridor
+    limits[end] = short if end == 0 else band.length - short

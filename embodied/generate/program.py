@@ -1,0 +1,149 @@
+"""The room program: which rooms a house of a given area has, how large each, and who owns whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from embodied.generate.config import HouseConfig
+
+SIZES: dict[str, tuple[float, float, float]] = {
+    # kind: smallest and largest usual area (m2), smallest usual side (m)
+    "living_room": (15, 42, 3.4), "kitchen": (6, 20, 2.1), "dining_room": (9, 21, 2.7),
+    "main_bedroom": (11, 24, 2.9), "bedroom": (8.5, 16, 2.5), "kids_room": (9, 16, 2.5),
+    "guest_room": (9, 16, 2.6), "bathroom": (4, 9.5, 1.7), "toilet": (1.5, 3, 1.0), "hall": (3, 14, 1.3),
+    "corridor": (1.5, 14, 1.1), "study": (6.5, 15, 2.2), "laundry_room": (3.5, 9, 1.6), "pantry": (1.8, 4.5, 1.1),
+    "closet": (2.2, 7, 1.3), "library": (11, 22, 2.8), "playroom": (11, 20, 2.8), "gym": (11, 24, 2.8),
+    "garage": (17, 38, 3.0), "family_room": (13, 28, 3.2), "sun_room": (8.5, 18, 2.5), "workshop": (8.5, 18, 2.4),
+}
+BEDROOMS = ("main_bedroom", "bedroom", "kids_room", "guest_room")
+MINOR = ("kitchen", "bathroom", "toilet", "hall", "corridor", "laundry_room", "pantry", "closet", "garage")
+"""Kinds that do not count as main rooms."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """One room wanted."""
+
+    kind: str
+    area: float
+    """Wanted area, square metres."""
+    owner: int | None = None
+    """Index of the space it belongs to and is entered from: an ensuite's bedroom, a pantry's kitchen."""
+
+
+def draw_area(config: HouseConfig, *, rng: np.random.Generator) -> float:
+    """Total area, square metres: flats, a broad hump at 110-160, a tail of large houses."""
+    if config.area is not None:
+        low, high = config.area
+        low = min(max(low, config.least_area()), high)
+        return float(rng.uniform(low, high))
+    area = float(np.exp(rng.normal(np.log(135.0), 0.45)))
+    if rng.random() < 0.12:
+        area = float(rng.uniform(35, 75))
+    if rng.random() < 0.08:
+        area = float(rng.uniform(280, 600))
+    if config.rooms is not None:
+        area = float(np.clip(area, 23.0 * config.rooms, 34.0 * config.rooms))
+    elif config.bedrooms is not None:
+        area = float(np.clip(area, 36.0 * config.bedrooms, 90.0 * config.bedrooms))
+    return float(np.clip(area, max(35.0, config.least_area()), 600.0))
+
+
+def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) -> tuple[Space, ...]:
+    """The rooms of a house of `area` square metres (corridors come with the layout).
+
+    Returns:
+      Spaces whose areas sum to `area` less the circulation that a corridor will take.
+    """
+    bedrooms = config.bedrooms or _bedrooms(area, config, rng)
+    spaces = [Space("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
+    living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, 38))
+    spaces.append(Space("living_room", living))
+    spaces.append(Space("kitchen", float(np.clip(rng.normal(0.1, 0.012) * area, 5.2, 18))))
+    if area > rng.uniform(78, 105) and (config.rooms is None or config.rooms > bedrooms + 1):
+        spaces.append(Space("dining_room", float(np.clip(0.105 * area, 9.5, 18))))
+    spaces += _sleeping(bedrooms, area, rng)
+    wet = _bathrooms(area, bedrooms, rng)
+    beds = [i for i, s in enumerate(spaces) if s.kind in BEDROOMS]
+    suites = min(max(wet - 1 - (bedrooms > 4), 0), len(beds))
+    for k in range(wet):
+        owner = beds[k] if k < suites else None
+        size = float(np.clip(rng.normal(5.6, 0.5) + (area - 100) * 0.006, 4.0, 9.0))
+        spaces.append(Space("bathroom", min(size, 0.12 * area), owner))
+    if area > rng.uniform(70, 140):
+        spaces.append(Space("toilet", 1.9, 0 if rng.random() < 0.7 else None))
+    if area > rng.uniform(95, 190) and beds:
+        spaces.append(Space("closet", float(np.clip(0.03 * area, 3.0, 6.5)), beds[0]))
+    if area > rng.uniform(90, 230):
+        spaces.append(Space("pantry", 2.6, 2))
+    if area > rng.uniform(75, 150):
+        spaces.append(Space("laundry_room", float(np.clip(0.04 * area, 3.8, 8))))
+    spaces = _extras(spaces, area, config, rng)
+    return _scaled(spaces, 0.925 * area if area > 62 else area)
+
+
+def _bedrooms(area: float, config: HouseConfig, rng: np.random.Generator) -> int:
+    wanted = float(np.interp(area, (35, 60, 85, 115, 160, 240, 350, 600), (1, 1.2, 2, 2.8, 3.5, 4.3, 5.4, 7.5)))
+    count = max(1, round(wanted + rng.normal(0, 0.35)))
+    if config.rooms is not None:
+        count = min(count, config.rooms - 1)
+    return count
+
+
+def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[Space]:
+    main = float(np.clip(rng.normal(0.11, 0.01) * area, 11.0, 20.0)) if area > 45 else 0.3 * area
+    spaces = [Space("main_bedroom", main)]
+    for k in range(1, count):
+        kind = str(rng.choice(["bedroom", "kids_room", "guest_room"], p=[0.45, 0.4, 0.15] if k < 3 else [0.4, 0.3, 0.3]))
+        spaces.append(Space(kind, float(np.clip(rng.normal(11.0, 0.8) + (area - 120) * 0.008, 9.0, 15.0))))
+    return spaces
+
+
+def _bathrooms(area: float, bedrooms: int, rng: np.random.Generator) -> int:
+    wanted = float(np.interp(area, (60, 85, 120, 200, 300, 600), (1, 1.2, 1.9, 2.5, 3.4, 5.2)))
+    return max(1, min(round(wanted + rng.normal(0, 0.3)), bedrooms + 1))
+
+
+def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.random.Generator) -> list[Space]:
+    """`spaces` and further rooms until the area is used (or the asked number of main rooms is there)."""
+    least = {"study": 80, "garage": 105, "sun_room": 120, "family_room": 150, "workshop": 130, "playroom": 150,
+             "library": 165, "gym": 175}
+    size = {"study": 9, "garage": 19, "sun_room": 11, "family_room": 17, "workshop": 11, "playroom": 13,
+            "library": 14, "gym": 14}
+    likely = {"study": 3.0, "garage": 1.6, "sun_room": 0.8, "family_room": 1.0, "workshop": 0.6, "playroom": 0.8,
+              "library": 0.8, "gym": 0.7}
+    budget = 0.925 * area
+    grow = float(np.clip((area - 150) / 450, 0, 1))
+    open_kinds = [k for k in least]
+    while True:
+        main = sum(s.kind not in MINOR for s in spaces)
+        if config.rooms is not None and main >= config.rooms:
+            return spaces
+        free = budget - sum(s.area for s in spaces)
+        fits = [k for k in open_kinds if (config.rooms is not None or area >= least[k]) and
+                (size[k] * 0.8 <= free or (config.rooms is not None and k != "garage"))]
+        if config.rooms is None and free < 7.0:
+            return spaces
+        if not fits:
+            if config.rooms is not None or free > 12.0:
+                spaces.append(Space("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow))
+                continue
+            return spaces
+        p = np.array([likely[k] for k in fits])
+        kind = str(rng.choice(fits, p=p / p.sum()))
+        spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))
+        if kind == "garage" and area > 220 and rng.random() < 0.6:
+            spaces[-1] = Space("garage", 33.0)
+        open_kinds.remove(kind)
+
+
+def _scaled(spaces: list[Space], total: float) -> tuple[Space, ...]:
+    """The same rooms stretched to sum to `total`, none beyond its usual range while that can be met."""
+    factor = 1.0
+    for _ in range(12):
+        areas = [float(np.clip(s.area * factor, 0.9 * SIZES[s.kind][0], 1.1 * SIZES[s.kind][1])) for s in spaces]
+        factor *= (total / sum(areas)) ** 1.2
+    rest = total / sum(areas)
+    return tuple(replace(s, area=a * rest) for s, a in zip(spaces, areas))

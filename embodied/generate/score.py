@@ -1,0 +1,76 @@
+"""How well a plan would please an architect: one number from areas, proportions, daylight and neighbours."""
+
+from __future__ import annotations
+
+import math
+
+from embodied.generate.access import Wall
+from embodied.generate.modules import Cell
+from embodied.generate.program import BEDROOMS, SIZES
+
+DAYLIT = (*BEDROOMS, "living_room", "dining_room", "kitchen", "family_room", "study", "library", "playroom", "sun_room",
+          "gym", "workshop")
+WET = ("bathroom", "toilet", "laundry_room", "kitchen")
+NEAR = {
+    ("dining_room", "kitchen"): 1.6, ("dining_room", "living_room"): 1.3, ("kitchen", "living_room"): 0.7,
+    ("hall", "living_room"): 1.0, ("garage", "hall"): 0.6, ("garage", "laundry_room"): 0.8, ("garage", "kitchen"): 0.5,
+    ("kitchen", "laundry_room"): 0.4, ("family_room", "kitchen"): 0.7, ("garage", "workshop"): 0.8,
+    ("living_room", "sun_room"): 0.8, ("hall", "toilet"): 0.6, ("library", "living_room"): 0.3,
+    ("hall", "study"): 0.2, ("kitchen", "pantry"): 0.5,
+    **{tuple(sorted((k, "bathroom"))): 0.35 for k in BEDROOMS},
+    **{tuple(sorted((k, "kitchen"))): -0.7 for k in BEDROOMS},
+    **{tuple(sorted((k, "garage"))): -0.6 for k in BEDROOMS},
+    **{tuple(sorted((k, "living_room"))): -0.15 for k in BEDROOMS},
+}
+"""What a shared wall between two kinds is worth."""
+
+
+def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
+    """Higher is better; entrances are judged by access.connect."""
+    inner = [0] * len(cells)
+    value = 0.0
+    joined: dict[int, float] = {}
+    for (i, j), (_, _, low, high) in walls.items():
+        n = high - low
+        inner[i] += n
+        inner[j] += n
+        a, b = cells[i].kind, cells[j].kind
+        worth = NEAR.get((a, b) if a < b else (b, a))
+        if worth and n >= 12:
+            value += worth
+        if a in WET and b in WET:
+            joined[i] = joined[j] = 0.3
+    value += sum(joined.values())
+    total = 0
+    moving = 0
+    for i, c in enumerate(cells):
+        x0, y0, x1, y1 = c.rect
+        w, h = x1 - x0, y1 - y0
+        area = w * h / 100
+        total += area
+        short, long = min(w, h), max(w, h)
+        outer = 2 * (w + h) - inner[i]
+        if c.kind == "corridor":
+            moving += area
+            value -= 0.04 * max(0, long - 80) + 0.15 * (long / 10 > 3)
+            continue
+        low, high, least = SIZES[c.kind]
+        if c.kind == "hall":
+            moving += 0.5 * area
+        value -= 0.3 * max(0.0, least * 10 - short) if c.kind != "hall" else 0.5 * max(0, 14 - short)
+        if area < low:
+            value -= 5.0 * math.log(low / area)
+        elif area > high:
+            value -= 5.0 * math.log(area / high)
+        value -= 0.7 * abs(math.log(area / c.area))
+        limit = 1.7 if c.kind not in ("hall", "toilet", "closet", "pantry", "bathroom") else 2.2
+        value -= 2.2 * max(0.0, long / short - limit)
+        if c.kind in DAYLIT and outer < max(14, 0.22 * 2 * (w + h) * 0.6):
+            value -= 6.0
+        if c.kind in ("hall", "garage") and outer < (13 if c.kind == "hall" else 26):
+            value -= 12.0
+        if c.kind == "bathroom" and outer >= 10:
+            value += 0.3
+        if c.kind in ("living_room", "family_room", "sun_room"):
+            value += 0.4 * min(outer / 60, 2.0)
+    return value - 18.0 * max(0.0, moving / total - 0.1)
