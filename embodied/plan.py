@@ -1,0 +1,350 @@
+"""The floor plan as a picture: walls with thickness, door swings, windows, furniture, names and areas, scale and north.
+
+    draw_plan(house).save("plan.png")
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import shapely
+from PIL import Image, ImageDraw, ImageFont
+
+from embodied.geometry import rectangle
+from embodied.house import House, Opening, Placement, Room
+
+PAPER, INK, SOFT = (250, 248, 243), (52, 50, 56), (128, 124, 122)
+ROOM_COLOURS = {
+    "living_room": (250, 236, 208), "family_room": (248, 232, 205), "dining_room": (249, 228, 200),
+    "kitchen": (247, 220, 196), "sun_room": (253, 243, 205), "library": (236, 224, 205),
+    "main_bedroom": (214, 225, 238), "bedroom": (220, 230, 241), "kids_room": (226, 225, 243),
+    "guest_room": (221, 228, 236), "bathroom": (204, 231, 232), "toilet": (204, 231, 232),
+    "laundry_room": (214, 232, 226), "hall": (240, 237, 230), "corridor": (240, 237, 230), "study": (224, 234, 214),
+    "playroom": (232, 226, 240), "gym": (226, 232, 220), "garage": (228, 227, 226), "workshop": (230, 226, 218),
+    "pantry": (236, 228, 214), "closet": (228, 226, 232), "stairwell": (240, 237, 230),
+}
+SMALL = 3
+"""Draw at this many times the final resolution, then shrink: smooth lines."""
+
+
+def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, furniture: bool = True, graph=None,
+              path: tuple[int, ...] = (), titles: bool = True) -> Image.Image:
+    """A plan of one storey.
+
+    Args:
+      pixels_per_metre: scale of the returned image.
+      furniture: draw the placements.
+      graph: a NavGraph to lay over the plan.
+      path: node indices of `graph` to draw as a walk.
+    """
+    rooms = [r for r in house.rooms if r.storey == storey]
+    if not rooms:
+        raise ValueError(f"house {house.name!r} has no rooms on storey {storey}; it has {len(house.storeys)} storeys")
+    sheet = _Sheet(rooms, pixels_per_metre * SMALL, house.outer_wall)
+    ids = {r.id for r in rooms}
+    for room in rooms:
+        sheet.polygon(room.polygon, fill=ROOM_COLOURS.get(room.kind, PAPER))
+        if room.kind in ("bathroom", "toilet", "laundry_room", "kitchen"):
+            sheet.hatch(room)
+    if furniture:
+        _draw_furniture(sheet, house, ids)
+    _draw_walls(sheet, house, rooms)
+    for o in house.openings:
+        if o.rooms[0] in ids:
+            _draw_opening(sheet, house, o)
+    for s in house.stairs:
+        _draw_stair(sheet, s)
+    if graph is not None:
+        _draw_graph(sheet, graph, path)
+    image = sheet.image.resize((sheet.image.width // SMALL, sheet.image.height // SMALL), Image.LANCZOS)
+    out = _Sheet(rooms, pixels_per_metre, house.outer_wall, image)
+    for room in rooms:
+        _label(out, house, room)
+    _legend(out, house, titles)
+    return out.image
+
+
+def save_plan(house: House, path: Path, **options) -> None:
+    """Write the plan of the ground floor as a PNG; options as for `draw_plan`."""
+    draw_plan(house, **options).save(path, format="PNG")
+
+
+def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Pillow's own scalable face, so that pictures agree between machines."""
+    return ImageFont.load_default(size=max(6.0, size))
+
+
+class _Sheet:
+    """An image with a metre-to-pixel map; y up in metres, down in pixels."""
+
+    def __init__(self, rooms: list[Room], scale: float, margin: float, image: Image.Image | None = None) -> None:
+        corners = np.concatenate([np.asarray(r.polygon) for r in rooms])
+        self.low = corners.min(0) - margin - 0.9
+        self.high = corners.max(0) + margin + 0.9
+        self.low[1] -= 1.0
+        self.scale = scale
+        size = (np.ceil((self.high - self.low) * scale / SMALL) * SMALL).astype(int)
+        self.image = image if image is not None else Image.new("RGB", (int(size[0]), int(size[1])), PAPER)
+        self.draw = ImageDraw.Draw(self.image)
+
+    def xy(self, point) -> tuple[float, float]:
+        return ((point[0] - self.low[0]) * self.scale, (self.high[1] - point[1]) * self.scale)
+
+    def polygon(self, points, **style) -> None:
+        self.draw.polygon([self.xy(p) for p in points], **style)
+
+    def line(self, points, metres: float, colour=INK) -> None:
+        self.draw.line([self.xy(p) for p in points], fill=colour, width=max(1, round(metres * self.scale)), joint="curve")
+
+    def shape(self, shape, fill) -> None:
+        """Fill a shapely polygon with holes."""
+        for g in getattr(shape, "geoms", [shape]):
+            if g.is_empty:
+                continue
+            mask = Image.new("1", self.image.size, 0)
+            pen = ImageDraw.Draw(mask)
+            pen.polygon([self.xy(p) for p in g.exterior.coords], fill=1)
+            for hole in g.interiors:
+                pen.polygon([self.xy(p) for p in hole.coords], fill=0)
+            self.image.paste(fill, (0, 0), mask)
+
+    def hatch(self, room: Room) -> None:
+        """Faint tiles."""
+        base = ROOM_COLOURS.get(room.kind, PAPER)
+        pale = tuple(max(0, c - 9) for c in base)
+        x0, y0, x1, y1 = shapely.Polygon(room.polygon).bounds
+        inside = shapely.Polygon(room.polygon)
+        for k in range(1, math.ceil((x1 - x0) / 0.4)):
+            self._clipped(((x0 + 0.4 * k, y0), (x0 + 0.4 * k, y1)), inside, pale)
+        for k in range(1, math.ceil((y1 - y0) / 0.4)):
+            self._clipped(((x0, y0 + 0.4 * k), (x1, y0 + 0.4 * k)), inside, pale)
+
+    def _clipped(self, line, inside, colour) -> None:
+        cut = inside.intersection(shapely.LineString(line))
+        for g in getattr(cut, "geoms", [cut]):
+            if g.geom_type == "LineString" and not g.is_empty:
+                self.line(g.coords, 0.015, colour)
+
+
+def walls_of(house: House, rooms: list[Room]) -> shapely.Geometry:
+    """The walls' cross-section, openings not cut, metres."""
+    cells = [shapely.Polygon(r.polygon) for r in rooms]
+    inside = shapely.union_all([c.buffer(-house.inner_wall / 2, join_style="mitre") for c in cells])
+    hull = shapely.union_all(cells).buffer(house.outer_wall - house.inner_wall / 2, join_style="mitre")
+    return hull.difference(inside)
+
+
+def _draw_walls(sheet: _Sheet, house: House, rooms: list[Room]) -> None:
+    sheet.shape(walls_of(house, rooms), INK)
+
+
+def _frame(house: House, o: Opening) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
+    """Jambs a and b, the unit normal into the first room, and the wall's extent along it."""
+    a, b = np.asarray(o.a, float), np.asarray(o.b, float)
+    along = (b - a) / np.linalg.norm(b - a)
+    normal = np.array([-along[1], along[0]])
+    room = shapely.Polygon(house.room_by_id[o.rooms[0]].polygon)
+    if not room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)):
+        normal = -normal
+    half = house.inner_wall / 2
+    return a, b, normal, -(half if o.rooms[1] is not None else house.outer_wall - half), half
+
+
+def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
+    a, b, n, low, high = _frame(house, o)
+    rooms = [house.room_by_id[r] for r in o.rooms if r is not None]
+    colour = ROOM_COLOURS.get(rooms[0].kind, PAPER)
+    hole = [a + low * n, b + low * n, b + high * n, a + high * n]
+    sheet.polygon(hole, fill=PAPER if o.kind in ("window", "french_window") else colour)
+    if o.kind in ("window", "french_window"):
+        for v in (low, high):
+            sheet.line((a + v * n, b + v * n), 0.03)
+        for v in (low * 0.45 + high * 0.55,):
+            sheet.line((a + v * n, b + v * n), 0.05 if o.kind == "window" else 0.03, (96, 140, 168))
+        if o.kind == "french_window":
+            mid = (a + b) / 2
+            sheet.line((mid + low * n, mid + high * n), 0.03)
+            for end, sign in ((a, 1), (b, -1)):
+                _arc(sheet, end + high * n, (b - a) / np.linalg.norm(b - a) * sign, n, np.linalg.norm(b - a) / 2, 1.4,
+                     (150, 175, 190))
+    elif o.kind == "garage_door":
+        for v in np.linspace(low, high, 4):
+            sheet.line((a + v * n, b + v * n), 0.02, SOFT)
+    elif o.kind in ("door", "front_door", "back_door"):
+        hinge, other = (a, b) if o.hinge == "a" else (b, a)
+        across = (other - hinge) / np.linalg.norm(other - hinge)
+        width = float(np.linalg.norm(other - hinge))
+        shown = o.angle if o.kind == "door" else math.pi / 2
+        _arc(sheet, hinge + high * n, across, n, width, max(shown, math.radians(60)), SOFT)
+        leaf = math.cos(shown) * across + math.sin(shown) * n
+        sheet.line((hinge + high * n, hinge + high * n + width * leaf), 0.045)
+        if o.kind != "door":
+            sheet.line((a + low * n, b + low * n), 0.05)
+
+
+def _arc(sheet: _Sheet, centre, start, normal, radius: float, angle: float, colour) -> None:
+    t = np.linspace(0, angle, 24)[:, None]
+    sheet.line(centre + radius * (np.cos(t) * start + np.sin(t) * normal), 0.018, colour)
+
+
+def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
+    """Footprints from low to high; floor coverings pale, small things tiny."""
+    mine = [p for p in house.placements if p.room in ids and p.position[2] < 1.7]
+    for p in sorted(mine, key=lambda p: (p.position[2] + p.size[2], p.id)):
+        corners = rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)
+        flat = p.size[2] < 0.04
+        fill = _tint(p.object_class, 0.5 if flat else 0.0)
+        sheet.polygon(corners, fill=fill)
+        sheet.line([*corners, corners[0]], 0.016, tuple(max(0, c - (28 if flat else 95)) for c in fill))
+        _glyph(sheet, p, corners, fill)
+
+
+TINTS = (
+    (("bed", "sofa", "couch", "armchair", "ottoman", "pouf"), (188, 200, 222)),
+    (("chair", "stool", "bench"), (214, 192, 164)),
+    (("table", "desk", "cabinet", "dresser", "wardrobe", "book", "shel", "sideboard", "chest", "stand", "console"),
+     (208, 182, 148)),
+    (("rug", "carpet", "mat"), (222, 205, 205)),
+    (("plant", "flower", "tree"), (172, 204, 162)),
+    (("bath", "toilet", "basin", "sink", "shower", "bidet", "washing", "dryer", "fridge", "refrigerator", "cooker", "oven",
+      "stove", "dishwasher"), (238, 240, 242)),
+    (("lamp", "light"), (250, 226, 140)),
+    (("television", "screen", "computer", "laptop"), (110, 112, 120)),
+)
+
+
+def _tint(name: str, pale: float) -> tuple[int, int, int]:
+    base = next((c for words, c in TINTS if any(w in name for w in words)), (216, 210, 202))
+    return tuple(round(c + (255 - c) * pale * 0.6) for c in base)
+
+
+def _glyph(sheet: _Sheet, p: Placement, corners: np.ndarray, fill) -> None:
+    """A stroke or two that make the common things readable."""
+    dark = tuple(max(0, c - 60) for c in fill)
+    # corners: back runs from corner 3 to 2 (the front looks along -y of the asset)
+    front_left, front_right, back_right, back_left = corners
+
+    def at(u: float, v: float) -> np.ndarray:
+        """u from left to right, v from front to back, both 0..1."""
+        return (front_left * (1 - u) + front_right * u) * (1 - v) + (back_left * (1 - u) + back_right * u) * v
+
+    name = p.object_class
+    if name.endswith("bed") and p.size[1] > 1.4:
+        sheet.line((at(0, 0.66), at(1, 0.66)), 0.016, dark)
+        pillows = ((0.08, 0.92),) if p.size[0] < 1.25 else ((0.07, 0.47), (0.53, 0.93))
+        for a, b in pillows:
+            box = [at(a, 0.76), at(b, 0.76), at(b, 0.94), at(a, 0.94)]
+            sheet.polygon(box, fill=(246, 246, 248))
+            sheet.line([*box, box[0]], 0.014, dark)
+    elif "sofa" in name or "armchair" in name:
+        arm = min(0.2, 0.17 / p.size[0])
+        sheet.line((at(arm, 0.0), at(arm, 0.72), at(1 - arm, 0.72), at(1 - arm, 0.0)), 0.016, dark)
+    elif "chair" in name and "armchair" not in name:
+        sheet.line((at(0.05, 0.85), at(0.95, 0.85)), 0.03, dark)
+    elif name in ("wardrobe", "closet"):
+        sheet.line((at(0.5, 0), at(0.5, 1)), 0.014, dark)
+
+
+def _draw_stair(sheet: _Sheet, stair) -> None:
+    path = np.asarray(stair.path)[:, :2]
+    line = shapely.LineString(path)
+    for k in range(1, stair.risers):
+        p = np.asarray(line.interpolate(k / stair.risers, normalized=True).coords[0])
+        q = np.asarray(line.interpolate(min(1.0, (k + 0.1) / stair.risers), normalized=True).coords[0])
+        d = (q - p) / max(1e-9, np.linalg.norm(q - p))
+        n = np.array([-d[1], d[0]]) * stair.width / 2
+        sheet.line((p - n, p + n), 0.02, SOFT)
+    sheet.line(path, 0.025, SOFT)
+
+
+def _draw_graph(sheet: _Sheet, graph, path: tuple[int, ...]) -> None:
+    for i, j in graph.edges:
+        sheet.line((graph.positions[i][:2], graph.positions[j][:2]), 0.025, (196, 118, 88))
+    for a, b in zip(path, path[1:]):
+        sheet.line((graph.positions[a][:2], graph.positions[b][:2]), 0.08, (200, 60, 50))
+    for k, p in enumerate(graph.positions):
+        x, y = sheet.xy(p)
+        r = (0.11 if k in path else 0.075) * sheet.scale
+        sheet.draw.ellipse((x - r, y - r, x + r, y + r), fill=(186, 84, 56), outline=(255, 255, 255), width=SMALL)
+
+
+def _label(sheet: _Sheet, house: House, room: Room) -> None:
+    """Name and area in the room's freest spot, on a pale plate where furniture lies below."""
+    inside = house.floor(room)
+    name, area = room.kind.replace("_", " "), f"{inside.area:.1f} m²"
+    x0, y0, x1, y1 = inside.bounds
+    centre = _calm_spot(house, room, inside)
+    size = float(np.clip(0.24 * sheet.scale, 9, 20))
+    turned = False
+    for _ in range(12):
+        face = font(size)
+        width = max(sheet.draw.textlength(name, font=face), 0.8 * sheet.draw.textlength(area, font=face))
+        if width < 0.94 * (x1 - x0) * sheet.scale:
+            break
+        if y1 - y0 > 1.5 * (x1 - x0) and width < 0.94 * (y1 - y0) * sheet.scale and 2.4 * size < (x1 - x0) * sheet.scale:
+            turned = True
+            break
+        size *= 0.92
+    show_area = inside.area > 2.2 and (x1 - x0 if turned else y1 - y0) * sheet.scale > 2.6 * size
+    lines = [(name, font(size), INK)] + ([(area, font(size * 0.82), SOFT)] if show_area else [])
+    width = max(sheet.draw.textlength(t, font=f) for t, f, _ in lines)
+    height = sum(f.size * 1.15 for _, f, _ in lines)
+    tile = Image.new("RGBA", (math.ceil(width) + 6, math.ceil(height) + 4), (*ROOM_COLOURS.get(room.kind, PAPER), 190))
+    pen = ImageDraw.Draw(tile)
+    y = 1.0
+    for text, face, colour in lines:
+        pen.text((tile.width / 2, y), text, font=face, fill=colour, anchor="ma")
+        y += face.size * 1.15
+    if turned:
+        tile = tile.rotate(90, expand=True)
+    x, y = sheet.xy(centre)
+    x = float(np.clip(x, sheet.xy((x0, 0))[0] + tile.width / 2, sheet.xy((x1, 0))[0] - tile.width / 2)) if (
+        tile.width < (x1 - x0) * sheet.scale) else sheet.xy(((x0 + x1) / 2, 0))[0]
+    sheet.image.paste(tile, (round(x - tile.width / 2), round(y - tile.height / 2)), tile)
+
+
+def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float, float]:
+    """Near the middle, but off furniture where the room leaves a choice."""
+    things = shapely.union_all([
+        shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
+        for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7
+    ] or [shapely.Point(1e6, 1e6)])
+    x0, y0, x1, y1 = inside.bounds
+    best, least = ((x0 + x1) / 2, (y0 + y1) / 2), math.inf
+    for u in np.linspace(0.5, 0.15, 5):
+        for v in np.linspace(0.5, 0.15, 5):
+            for x, y in ((x0 + u * (x1 - x0), y0 + v * (y1 - y0)), (x1 - u * (x1 - x0), y1 - v * (y1 - y0))):
+                plate = shapely.box(x - 0.7, y - 0.25, x + 0.7, y + 0.25)
+                cost = 3.0 * plate.intersection(things).area + 0.12 * math.dist((x, y), ((x0 + x1) / 2, (y0 + y1) / 2))
+                if inside.contains(shapely.Point(x, y)) and cost < least - 1e-9:
+                    best, least = (float(x), float(y)), cost
+    return best
+
+
+def _legend(sheet: _Sheet, house: House, titles: bool) -> None:
+    """Title, scale bar of metres, north arrow."""
+    width, height = sheet.image.size
+    s = sheet.scale
+    face = font(float(np.clip(0.3 * s, 10, 22)))
+    small = font(float(np.clip(0.22 * s, 8, 16)))
+    base = height - 0.55 * s
+    length = 5 if (sheet.high - sheet.low)[0] > 9 else 2
+    for k in range(length):
+        sheet.draw.rectangle((0.6 * s + k * s, base, 0.6 * s + (k + 1) * s, base + 0.1 * s),
+                             fill=INK if k % 2 == 0 else PAPER, outline=INK)
+    for k in (0, length):
+        sheet.draw.text((0.6 * s + k * s, base - 0.08 * s), f"{k}" + (" m" if k else ""), font=small, fill=INK, anchor="md")
+    x, y, r = width - 1.0 * s, height - 0.85 * s, 0.5 * s
+    d = np.array([math.cos(house.sky.north), -math.sin(house.sky.north)])
+    n = np.array([-d[1], d[0]])
+    c = np.array([x, y])
+    sheet.draw.polygon([tuple(c + r * d), tuple(c - 0.6 * r * d + 0.45 * r * n), tuple(c - 0.3 * r * d)], fill=INK)
+    sheet.draw.polygon([tuple(c + r * d), tuple(c - 0.6 * r * d - 0.45 * r * n), tuple(c - 0.3 * r * d)], outline=INK,
+                       fill=PAPER)
+    sheet.draw.text(tuple(c + 1.35 * r * d), "N", font=small, fill=INK, anchor="mm")
+    if titles:
+        floor = sum(house.floor(r).area for r in house.rooms)
+        text = f"{house.name}  ·  {floor:.0f} m² floor  ·  seed {house.seed}"
+        sheet.draw.text((0.6 * s, 0.25 * s), text, font=face, fill=INK)
