@@ -8,6 +8,7 @@ first use.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib
 import json
@@ -16,18 +17,22 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from tqdm import tqdm
 
 from assets.cache import default_cache
-from assets.records import ROOM_KINDS, SUPPORTS, Asset, SupportSurface
+from assets.importer import Recipe, import_model, scaled
+from assets.packs import pack_of
+from assets.records import ROOM_KINDS, SUPPORTS, Asset, Finish, MeshPart, SupportSurface
 
 DATA = Path(__file__).parent / "data"
 
 CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
 MODEL_FIELDS = (
     "class", "name", "size", "support", "rooms", "synonyms", "on", "clearance", "tags", "elevation",
-    "colours", "materials", "surfaces", "emits", "yaw", "creator", "licence", "glow",
+    "colours", "materials", "surfaces", "emits", "yaw", "creator", "licence", "lamp",
+    "glow", "two_sided", "flipped", "dropped", "faces",
 )
-"""What a line of catalogue.json may hold; `yaw` (degrees) turns a model's front to -y."""
+"""What a line of catalogue.json may hold; the last row and `yaw` go into the importer's Recipe."""
 
 
 class CatalogueError(ValueError):
@@ -37,10 +42,15 @@ class CatalogueError(ValueError):
 class Catalogue:
     """All assets by key, and their meshes on demand."""
 
-    def __init__(self, assets: Mapping[str, Asset], cache: Path, packs: Sequence[Path] = ()):
+    def __init__(
+        self, assets: Mapping[str, Asset], recipes: Mapping[str, Recipe], cache: Path, packs: Sequence[Path] = ()
+    ):
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
         self.cache = Path(cache)
         self.packs = tuple(packs)
+        self._recipes = dict(recipes)
+        self._imported = functools.lru_cache(maxsize=512)(self._import)
+        self._scaled = functools.lru_cache(maxsize=1024)(self._scale)
 
     @functools.cached_property
     def classes(self) -> tuple[str, ...]:
@@ -58,6 +68,45 @@ class Catalogue:
         """The assets of one class in key order; empty for a class that has none."""
         return self._by_class.get(name, ())
 
+    def mesh(
+        self, key: str, size: tuple[float, float, float] | None = None, params: tuple[tuple[str, str | float], ...] = ()
+    ) -> tuple[MeshPart, ...]:
+        """The parts of an asset at `size` (its own if None); the caller must not change the arrays.
+
+        Raises:
+          CatalogueError: unknown key.
+          PackError, MeshError: the model's pack is missing or damaged.
+        """
+        asset = self._asset(key)
+        return self._scaled(key, tuple(asset.size if size is None else size), tuple(params))
+
+    def build(self, keys: Sequence[str] = ()) -> None:
+        """Import the models `keys` (all if none) into the cache, with a progress bar; what is
+        there already is only checked, so an interrupted run goes on where it stopped."""
+        chosen = [k for k in (keys or self.assets) if k in self._recipes]
+        for key in tqdm(chosen, desc="importing models", unit="model"):
+            self._import(key)
+
+    def _asset(self, key: str) -> Asset:
+        if key not in self.assets:
+            raise CatalogueError(f"no asset {key!r} among {len(self.assets)}; `embodied assets list` names them all")
+        return self.assets[key]
+
+    def _import(self, key: str) -> tuple[MeshPart, ...]:
+        recipe = self._recipes[key]
+        pack = pack_of(key, self.packs)
+        return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[key].rotation), self.cache)
+
+    def _scale(self, key: str, size: tuple[float, float, float], params: tuple) -> tuple[MeshPart, ...]:
+        if key not in self._recipes:
+            return _makers()[key].make(size, params, self.finish)
+        own = self.assets[key].size
+        return scaled(self._imported(key), tuple(s / o for s, o in zip(size, own)))
+
+    def finish(self, material_key: str) -> Finish:
+        """The finish of a procedural material; its maps are written to the cache on first use."""
+        return importlib.import_module("assets.materials").finish(material_key, self.cache)
+
 
 def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
@@ -68,9 +117,9 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
     classes = read_classes(DATA / "classes.json")
-    assets = read_models(DATA / "catalogue.json", classes, read_json(DATA / "packs.json"))
-    assets |= _built()
-    return Catalogue(assets, cache or default_cache(), packs)
+    assets, recipes = read_models(DATA / "catalogue.json", classes, read_json(DATA / "packs.json"))
+    assets |= {key: maker.asset for key, maker in sorted(_makers().items())}
+    return Catalogue(assets, recipes, cache or default_cache(), packs)
 
 
 def read_json(path: Path) -> dict:
@@ -98,9 +147,11 @@ def read_classes(path: Path) -> dict[str, dict]:
     return classes
 
 
-def read_models(path: Path, classes: Mapping[str, dict], packs: Mapping[str, dict]) -> dict[str, Asset]:
-    """The assets of one catalogue file over the classes it names."""
-    assets = {}
+def read_models(
+    path: Path, classes: Mapping[str, dict], packs: Mapping[str, dict]
+) -> tuple[dict[str, Asset], dict[str, Recipe]]:
+    """The assets of one catalogue file over the classes it names, and how to import each."""
+    assets, recipes = {}, {}
     for key, row in read_json(path).items():
         where = f"{path.name}: model {key!r}"
         _check_row(where, row, MODEL_FIELDS)
@@ -108,7 +159,15 @@ def read_models(path: Path, classes: Mapping[str, dict], packs: Mapping[str, dic
             raise CatalogueError(f"{where} has the unknown class {row.get('class')!r}; use one of data/classes.json")
         pack = packs.get(key.split("/")[0], {})
         assets[key] = _asset(where, key, classes[row["class"]] | row, classes[row["class"]], pack)
-    return assets
+        recipes[key] = _recipe(assets[key], row)
+    return assets, recipes
+
+
+def _recipe(asset: Asset, row: Mapping) -> Recipe:
+    lists = {name: tuple(row.get(name, ())) for name in ("two_sided", "flipped", "glow", "dropped")}
+    return Recipe(
+        asset.key, asset.size, yaw=float(row.get("yaw", 0.0)), emits=asset.emits, faces=int(row.get("faces", 0)), **lists
+    )
 
 
 def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -> Asset:
@@ -148,10 +207,9 @@ def _check_row(where: str, row: object, fields: tuple[str, ...]) -> None:
         raise CatalogueError(f"{where} names the unknown room kinds {unknown}; use {ROOM_KINDS}")
 
 
-def _built() -> dict[str, Asset]:
-    """The assets of the makers of built things, under their keys."""
+def _makers() -> Mapping:
+    """The makers of built things by key."""
     try:
-        makers = getattr(importlib.import_module("assets.built"), "MAKERS", {})
+        return getattr(importlib.import_module("assets.built"), "MAKERS", {})
     except ModuleNotFoundError:
         return {}
-    return {key: makers[key].asset for key in sorted(makers)}

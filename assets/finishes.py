@@ -1,0 +1,57 @@
+"""What an imported material looks like to a physically based renderer: guesses from names and numbers."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from assets.obj import Material
+from assets.records import Finish
+
+MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
+METAL = re.compile(
+    r"metal|chrom|steel|inox|alumin|\balu\b|brass|bronze|copper|gold|silver|iron|nickel|acero|laton|hierro|"
+    r"cromo|zinc|platin", re.IGNORECASE,
+)
+CLOTH = re.compile(
+    r"cloth|fabric|tissu|tela|textil|cushion|pillow|almohad|coj[ií]n|sheet|sabana|blanket|towel|toalla|carpet|"
+    r"wool|cotton|mattress|colch|coussin|drap|matelas|rug|felt|velvet|shirt|pants|jean|hair|skin|curtain", re.IGNORECASE,
+)
+GLASS = re.compile(r"glass|vidrio|cristal|verre|glas\b|crystal", re.IGNORECASE)
+SHINY = re.compile(r"ceramic|porcelain|enamel|lacquer|varnish|gloss|plastic|acryl|leather|cuero|cuir", re.IGNORECASE)
+WHITEST = 0.92
+"""Largest sRGB value kept: white paint reflects about 0.83 of the light, never all of it."""
+
+
+def finish_of(material: Material, has_texture: bool) -> Finish:
+    """The Finish of an MTL material, its texture apart.
+
+    Roughness follows Blinn-Phong's exponent n by alpha = sqrt(2 / (n + 2)) (Walter et al. 2007,
+    section 5.2: Phong lobes match a Beckmann lobe of that width), faded to matt where Ks is dark;
+    exporters' default of Ns 96, Ks 0.5 thereby comes out as satin.
+    """
+    name = material.name
+    color = np.minimum(np.array(material.diffuse), WHITEST)
+    strength = float(max(material.specular)) if material.illum >= 2 else 0.0
+    lobe = float(np.sqrt(np.sqrt(2.0 / (max(material.shininess, 0.0) + 2.0))))
+    roughness = float(np.clip(0.88 + min(1.0, strength) * (lobe - 0.88), 0.12, 0.95))
+    specular, metallic, alpha = 0.5, 0.0, material.opacity
+    if MIRROR.search(name) and not has_texture:
+        return Finish((0.9, 0.9, 0.9, 1.0), roughness=0.03, metallic=1.0, mirror=True)
+    if CLOTH.search(name):
+        roughness, specular = max(roughness, 0.9), 0.1
+    elif METAL.search(name) and not has_texture:
+        if color.max() > 0.3:
+            metallic, roughness = 1.0, min(max(roughness, 0.2), 0.4)
+            color = np.maximum(color, 0.45 * color / color.max())
+        else:
+            roughness = min(roughness, 0.45)
+    elif alpha < 0.95 and not has_texture:
+        roughness, alpha = min(roughness, 0.08), max(alpha, 0.12)
+        if GLASS.search(name):
+            alpha = min(alpha, 0.35)
+    elif SHINY.search(name):
+        roughness = min(roughness, 0.4)
+    return Finish((*(round(float(c), 4) for c in color), round(max(alpha, 0.1), 3)), roughness=round(roughness, 3),
+                  metallic=metallic, specular=specular)

@@ -1,0 +1,286 @@
+"""From a pack's model to MeshParts of real size, cached on disk under a checksum.
+
+The models of Sweet Home 3D are y up with their front towards +z, of any unit: `modelRotation`
+turns them, then the bounding box is stretched to the catalogue's width, height and depth, as
+Sweet Home 3D does itself. The asset frame (assets.records.MeshPart) is (x, -z, y) of that.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+import zipfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+from PIL import Image
+
+from assets.cache import atomic_path, digest, write_bytes, write_json
+from assets.finishes import finish_of
+from assets.meshing import crease_normals, decimate, indexed, sound_faces, weld
+from assets.obj import Material, MeshError, parse_mtl, parse_obj
+from assets.records import Finish, MeshPart
+from assets.sh3f import IDENTITY, Pack, PackError
+
+VERSION = 1
+"""Part of every cache key; raise it when the import changes."""
+MAX_TEXTURE = 512
+MAX_PIXELS = 64_000_000
+FACE_BUDGETS = ((0.3, 2_500), (0.8, 5_000), (30.0, 10_000))
+"""Faces a model keeps, by its longest side in metres."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that decides what an import gives, beside the pack itself."""
+
+    key: str
+    size: tuple[float, float, float]
+    """Width, depth, height, metres."""
+    yaw: float = 0.0
+    """Degrees counter-clockwise that bring the model's front to -y."""
+    rotation: tuple[float, ...] = IDENTITY
+    two_sided: tuple[str, ...] = ()
+    """Materials whose faces are also seen from behind: leaves, sheets; '*' is all of them."""
+    flipped: tuple[str, ...] = ()
+    """Materials whose faces the pack winds inside out."""
+    glow: tuple[str, ...] = ()
+    """Materials that glow when the lamp is on."""
+    emits: tuple[float, float, float] | None = None
+    dropped: tuple[str, ...] = ()
+    """Materials that are left out: shadows painted on the floor, helper planes."""
+    faces: int = 0
+    """Face budget; 0 takes FACE_BUDGETS."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawPart:
+    """One material of a model before import: y up, any unit."""
+
+    name: str
+    vertices: np.ndarray
+    """(n, 3) float64."""
+    faces: np.ndarray
+    """(m, 3) int64."""
+    uv: np.ndarray | None
+    """(m, 3, 2) float64 of the corners."""
+    finish: Finish
+    image: Image.Image | None = None
+
+
+def import_model(pack: Pack, recipe: Recipe, cache: Path) -> tuple[MeshPart, ...]:
+    """The parts of a library's model, from the cache if it is there and sound."""
+    obj = pack.entries[recipe.key].model
+    return cached(recipe, pack.digest, cache, lambda: read_obj(pack.read, obj, f"{pack.path.name}: {obj}"))
+
+
+def cached(recipe: Recipe, source: str, cache: Path, read: Callable[[], tuple[RawPart, ...]]) -> tuple[MeshPart, ...]:
+    """The finished parts of `recipe`; `read` and the import run only when the cache lacks them.
+
+    Args:
+      source: digest of the pack or file that `read` reads.
+    """
+    folder = Path(cache) / "assets" / source[:16]
+    stem = recipe.key.replace("/", "__") + "-" + digest(VERSION, asdict(recipe))[:12]
+    parts = _load(folder, stem)
+    if parts is None:
+        _save(folder, stem, finish_parts(read(), recipe))
+        parts = _load(folder, stem)
+    if parts is None:
+        raise PackError(f"{folder / stem} cannot be read back after writing; check the disk and delete {folder}")
+    return parts
+
+
+def read_obj(read: Callable[[str], bytes], name: str, where: str) -> tuple[RawPart, ...]:
+    """The parts of the OBJ file `name`, with its MTL and textures read by `read`.
+
+    Raises:
+      MeshError, PackError: damaged or missing files.
+    """
+    folder = PurePosixPath(name).parent
+    obj = parse_obj(read(name).decode("latin-1"), where)
+    materials: dict[str, Material] = {}
+    for library in obj.libraries:
+        try:
+            materials |= parse_mtl(read(str(folder / library)).decode("latin-1"))
+        except (PackError, FileNotFoundError):
+            continue
+    images: dict[str, Image.Image | None] = {}
+    parts = []
+    for group in obj.groups:
+        material = materials.get(group.material, Material(group.material))
+        image = None
+        if material.texture and (group.uv_corners >= 0).all():
+            if material.texture not in images:
+                images[material.texture] = _image(read, str(folder / material.texture.replace("\\", "/")))
+            image = images[material.texture]
+        uv = obj.uvs[group.uv_corners] if image is not None else None
+        parts.append(
+            RawPart(group.material, obj.vertices, group.corners, uv, finish_of(material, image is not None), image)
+        )
+    return tuple(parts)
+
+
+def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPart, Image.Image | None]]:
+    """Sized, turned, welded, decimated and shaded parts with their texture images.
+
+    Raises:
+      MeshError: nothing is left, or numbers are not finite.
+    """
+    raw = tuple(p for p in raw if p.name not in recipe.dropped)
+    if not raw:
+        raise MeshError(f"{recipe.key} has no faces; the model is empty or damaged")
+    placed = _placed(raw, recipe)
+    tolerance = 2e-5 * max(recipe.size)
+    prepared = []
+    for part, vertices in zip(raw, placed):
+        points, faces = weld(vertices, part.faces, tolerance)
+        uv = part.uv
+        if part.name in recipe.flipped:
+            faces, uv = faces[:, ::-1], None if uv is None else uv[:, ::-1]
+        keep = sound_faces(points, faces)
+        if keep.any():
+            prepared.append((part, points, faces[keep], None if uv is None else uv[keep]))
+    if not prepared:
+        raise MeshError(f"{recipe.key} has only degenerate faces; the model is damaged")
+    total = sum(len(f) for _, _, f, _ in prepared)
+    budget = recipe.faces or next(n for side, n in FACE_BUDGETS if max(recipe.size) <= side)
+    out = []
+    for part, points, faces, uv in prepared:
+        if total > budget and len(faces) > 40:
+            points, faces, uv = decimate(points, faces, uv, max(40, round(len(faces) * budget / total)))
+        if part.name in recipe.two_sided or "*" in recipe.two_sided:
+            out.append(_part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe))
+        out.append(_part(part, points, faces, uv, recipe))
+    return _to_size(out, recipe.size)
+
+
+def _placed(raw: tuple[RawPart, ...], recipe: Recipe) -> list[np.ndarray]:
+    """Vertices of each part in the asset frame, metres, the bounding box at its real size."""
+    turn = np.array(recipe.rotation, dtype=np.float64).reshape(3, 3).T
+    turned = [p.vertices @ turn for p in raw]
+    used = np.concatenate([v[np.unique(p.faces)] for p, v in zip(raw, turned)])
+    low, high = used.min(axis=0), used.max(axis=0)
+    if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.ptp(used, axis=0).max() <= 0:
+        raise MeshError(f"{recipe.key} has no extent or is not finite; the model is damaged")
+    yaw = round(recipe.yaw)
+    width, depth, height = recipe.size
+    if yaw % 180 == 90:
+        width, depth = depth, width
+    scale = np.array([width, height, depth]) / np.where(high - low > 1e-9, high - low, 1.0)
+    centre = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    angle = np.radians(recipe.yaw)
+    c, s = np.round(np.cos(angle), 12), np.round(np.sin(angle), 12)
+    spin = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return [((v - centre) * scale)[:, [0, 2, 1]] * [1.0, -1.0, 1.0] @ spin for v in turned]
+
+
+def _part(part: RawPart, points, faces, uv, recipe: Recipe) -> tuple[MeshPart, Image.Image | None]:
+    vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
+    finish = part.finish
+    if part.name in recipe.glow and recipe.emits:
+        finish = replace(finish, emission=recipe.emits)
+    return MeshPart(vertices, triangles, normals, coords, finish), part.image
+
+
+def _to_size(parts: list, size: tuple[float, float, float]) -> list:
+    """Bring a model that decimation shrank by a hair back to its exact bounding box."""
+    low, high = bounds(tuple(p for p, _ in parts)).astype(np.float64)
+    stretch = np.where(high - low > 1e-6, np.array(size) / np.maximum(high - low, 1e-6), 1.0)
+    stretch = np.clip(stretch, 0.9, 1.1).astype(np.float32)
+    origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]], dtype=np.float32)
+    return [(replace(p, vertices=(p.vertices - origin) * stretch), image) for p, image in parts]
+
+
+def _image(read: Callable[[str], bytes], name: str) -> Image.Image | None:
+    """The texture `name` at most MAX_TEXTURE wide, or None where the pack lost it."""
+    try:
+        data = read(str(PurePosixPath(name)))
+    except (PackError, FileNotFoundError):
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        try:
+            image = Image.open(io.BytesIO(data))
+            if image.width * image.height > MAX_PIXELS:
+                raise PackError(f"texture {name} has {image.width} x {image.height} pixels; do not use this pack")
+            clear = image.mode in ("RGBA", "LA") or "transparency" in image.info
+            image = image.convert("RGBA" if clear else "RGB")
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as e:
+            raise PackError(f"texture {name} cannot be read ({e}); install the pack again") from e
+    if clear and image.getextrema()[3][0] > 250:
+        image = image.convert("RGB")
+    scale = MAX_TEXTURE / max(image.size)
+    if scale < 1.0:
+        image = image.resize([max(1, round(s * scale)) for s in image.size], Image.LANCZOS)
+    return image
+
+
+def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]]) -> None:
+    """Write textures, then the arrays, then the manifest that makes both believed."""
+    sums, arrays, finishes, files = {}, {}, [], {}
+    for i, (part, image) in enumerate(parts):
+        texture = None
+        if image is not None:
+            texture = files.get(id(image))
+            if texture is None:
+                texture = files[id(image)] = f"{stem}-{len(files)}.png"
+                buffer = io.BytesIO()
+                image.save(buffer, format="PNG")
+                write_bytes(folder / texture, buffer.getvalue())
+                sums[texture] = digest(buffer.getvalue())
+        finishes.append(asdict(replace(part.finish, texture=texture)))
+        arrays |= {f"v{i}": part.vertices, f"f{i}": part.faces, f"n{i}": part.normals, f"t{i}": part.uv}
+    with atomic_path(folder / f"{stem}.npz") as temporary:
+        np.savez(temporary, **arrays)
+        sums[f"{stem}.npz"] = digest(temporary.read_bytes())
+    write_json(folder / f"{stem}.json", {"finishes": finishes, "sha256": sums})
+
+
+def _load(folder: Path, stem: str) -> tuple[MeshPart, ...] | None:
+    """The cached parts, or None where a file is missing or does not match its checksum."""
+    try:
+        manifest = json.loads((folder / f"{stem}.json").read_text())
+        files = {name: (folder / name).read_bytes() for name in manifest["sha256"]}
+        if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
+            return None
+        finishes = [_finish(row, folder) for row in manifest["finishes"]]
+        with np.load(io.BytesIO(files[f"{stem}.npz"]), allow_pickle=False) as arrays:
+            return tuple(
+                MeshPart(arrays[f"v{i}"], arrays[f"f{i}"], arrays[f"n{i}"], arrays[f"t{i}"], finish)
+                for i, finish in enumerate(finishes)
+            )
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+        return None
+
+
+def _finish(row: dict, folder: Path) -> Finish:
+    row = dict(row, color=tuple(row["color"]))
+    if row["texture"] is not None:
+        row["texture"] = str(folder / row["texture"])
+    if row["emission"] is not None:
+        row["emission"] = tuple(row["emission"])
+    return Finish(**row)
+
+
+def scaled(parts: tuple[MeshPart, ...], ratio: tuple[float, float, float]) -> tuple[MeshPart, ...]:
+    """The parts stretched by `ratio` along x, y, z; faces, uv and finishes are shared."""
+    if all(abs(r - 1.0) < 1e-6 for r in ratio):
+        return parts
+    s = np.array(ratio, dtype=np.float32)
+    out = []
+    for p in parts:
+        n = p.normals / s
+        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+        out.append(replace(p, vertices=p.vertices * s, normals=n.astype(np.float32)))
+    return tuple(out)
+
+
+def bounds(parts: tuple[MeshPart, ...]) -> np.ndarray:
+    """(2, 3) lowest and highest corner, metres."""
+    return np.array([np.min([p.vertices.min(0) for p in parts], 0), np.max([p.vertices.max(0) for p in parts], 0)])
+
+

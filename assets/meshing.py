@@ -1,0 +1,164 @@
+"""Triangles made ready for rendering: welding, crease normals, decimation that keeps texture coordinates."""
+
+from __future__ import annotations
+
+import fast_simplification
+import numpy as np
+from scipy.spatial import cKDTree
+
+CREASE = np.radians(42.0)
+"""Faces that meet at less than this angle share a smooth normal."""
+
+
+def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(m, 3) normals, twice the area long."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def weld(vertices: np.ndarray, faces: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Merge vertices that round to the same multiple of `tolerance`; keeps the order of faces."""
+    keys = np.round(vertices / tolerance).astype(np.int64)
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return vertices[first], inverse.reshape(-1)[faces]
+
+
+def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(m,) bool: False for slivers without area and for repeats of an earlier face (same winding)."""
+    area = np.linalg.norm(face_normals(vertices, faces), axis=1)
+    longest = np.max([np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0)
+    keep = area > 1e-6 * np.maximum(longest, 1e-9) ** 2
+    start = np.argmin(faces, axis=1)
+    turned = np.take_along_axis(faces, (start[:, None] + [0, 1, 2]) % 3, axis=1)
+    _, first = np.unique(turned, axis=0, return_index=True)
+    unique = np.zeros(len(faces), dtype=bool)
+    unique[first] = True
+    return keep & unique
+
+
+def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> np.ndarray:
+    """(m, 3, 3) unit normal of every corner: the angle-weighted mean over the faces around the
+    vertex that turn from the corner's own face by less than `crease`."""
+    unit = face_normals(vertices, faces)
+    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
+    weight = corner_angles(vertices, faces).reshape(-1)
+    corner_vertex = faces.reshape(-1)
+    corner_face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(corner_vertex, kind="stable")
+    counts = np.bincount(corner_vertex, minlength=len(vertices))
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    mine = np.repeat(np.arange(len(corner_vertex)), counts[corner_vertex])
+    rank = np.arange(len(mine)) - np.repeat(np.cumsum(counts[corner_vertex]) - counts[corner_vertex], counts[corner_vertex])
+    other = order[starts[corner_vertex[mine]] + rank]
+    cosine = np.einsum("ij,ij->i", unit[corner_face[mine]], unit[corner_face[other]])
+    smooth = cosine > np.cos(crease)
+    normal = np.zeros((len(corner_vertex), 3))
+    for axis in range(3):
+        contribution = unit[corner_face[other[smooth]], axis] * weight[other[smooth]]
+        normal[:, axis] = np.bincount(mine[smooth], contribution, minlength=len(corner_vertex))
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.where(length > 1e-12, normal / np.maximum(length, 1e-12), unit[corner_face])
+    return normal.reshape(-1, 3, 3)
+
+
+def corner_angles(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(m, 3) interior angle of every corner, radians."""
+    p = vertices[faces]
+    angles = np.empty(faces.shape)
+    for i in range(3):
+        u, v = p[:, (i + 1) % 3] - p[:, i], p[:, (i + 2) % 3] - p[:, i]
+        cosine = np.einsum("ij,ij->i", u, v) / np.maximum(np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1), 1e-30)
+        angles[:, i] = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return angles
+
+
+def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, target: int) -> tuple:
+    """About `target` faces with the same look.
+
+    Args:
+      vertices: (n, 3), faces: (m, 3) welded by position alone.
+      uv: (m, 3, 2) texture coordinates of the corners, or None.
+
+    Returns:
+      vertices, faces and the corners' uv of the smaller mesh. Texture coordinates are read back
+      from the nearest original triangle, so seams may lie anywhere.
+    """
+    points, small = fast_simplification.simplify(
+        np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int32),
+        target_count=int(target), agg=5.0,
+    )
+    points, small = np.asarray(points, dtype=np.float64), np.asarray(small, dtype=np.int64)
+    keep = sound_faces(points, small) if len(small) else np.zeros(0, dtype=bool)
+    small = small[keep]
+    if not len(small) or not np.isfinite(points).all():
+        return vertices, faces, uv
+    return points, small, None if uv is None else project_uv(vertices, faces, uv, points, small)
+
+
+def project_uv(vertices, faces, uv, points, small) -> np.ndarray:
+    """(k, 3, 2) corners' uv of the mesh (points, small) taken from the mesh (vertices, faces, uv)."""
+    rows = np.repeat(np.arange(len(faces)), 7)
+    bary = np.tile(
+        [[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 0.2], [0.2, 2, 2], [2, 0.2, 2]], (len(faces), 1)
+    ).astype(float)
+    bary /= bary.sum(axis=1, keepdims=True)
+    samples = np.einsum("ij,ijk->ik", bary, vertices[faces[rows]])
+    n = face_normals(vertices, faces)
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-30)
+    size = np.ptp(vertices, axis=0).max()
+    tree = cKDTree(np.hstack([samples, 0.1 * size * n[rows]]))
+    own = face_normals(points, small)
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
+    corners = points[small]
+    centre = corners.mean(axis=1, keepdims=True)
+    inner = corners + 0.15 * (centre - corners)
+    query = np.concatenate([inner, np.repeat(0.1 * size * own[:, None], 3, axis=1)], axis=2)
+    source = rows[tree.query(query.reshape(-1, 6))[1]]
+    out = _affine_uv(vertices[faces[source]], uv[source], corners.reshape(-1, 3)).reshape(-1, 3, 2)
+    middle = rows[tree.query(np.concatenate([centre[:, 0], 0.1 * size * own], axis=1))[1]]
+    whole = _affine_uv(
+        vertices[faces[np.repeat(middle, 3)]], uv[np.repeat(middle, 3)], corners.reshape(-1, 3)
+    ).reshape(-1, 3, 2)
+    torn = np.ptp(out, axis=1).max(axis=1) > 3.0 * np.ptp(whole, axis=1).max(axis=1) + 0.02
+    out[torn] = whole[torn]
+    return out
+
+
+def _affine_uv(triangles: np.ndarray, uv: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k, 2) the affine texture map of each triangle (k, 3, 3), (k, 3, 2) at each point (k, 3)."""
+    e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    d = points - triangles[:, 0]
+    a, b, c = (np.einsum("ij,ij->i", x, y) for x, y in ((e1, e1), (e1, e2), (e2, e2)))
+    p, q = np.einsum("ij,ij->i", d, e1), np.einsum("ij,ij->i", d, e2)
+    det = a * c - b * b
+    good = det > 1e-12 * np.maximum(a * c, 1e-30)
+    s = np.where(good, (c * p - b * q) / np.where(good, det, 1.0), 0.0)
+    t = np.where(good, (a * q - b * p) / np.where(good, det, 1.0), 0.0)
+    s, t = np.clip(s, -1.0, 2.0), np.clip(t, -1.0, 2.0)
+    return uv[:, 0] + s[:, None] * (uv[:, 1] - uv[:, 0]) + t[:, None] * (uv[:, 2] - uv[:, 0])
+
+
+def indexed(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, uv: np.ndarray | None) -> tuple:
+    """Corner attributes turned into vertices with one normal and one uv each.
+
+    Args:
+      vertices: (n, 3); faces: (m, 3); normals: (m, 3, 3); uv: (m, 3, 2) or None.
+
+    Returns:
+      float32 vertices (k, 3), int32 faces (m, 3), float32 normals (k, 3), float32 uv (k, 2).
+    """
+    uv = np.zeros((*faces.shape, 2)) if uv is None else uv
+    rows = np.hstack(
+        [faces.reshape(-1, 1), np.round(normals.reshape(-1, 3) * 512), np.round(uv.reshape(-1, 2) * 16384)]
+    ).astype(np.int64)
+    _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    first = first[order]
+    return (
+        vertices[faces.reshape(-1)[first]].astype(np.float32),
+        rank[inverse.reshape(-1)].reshape(-1, 3).astype(np.int32),
+        normals.reshape(-1, 3)[first].astype(np.float32),
+        uv.reshape(-1, 2)[first].astype(np.float32),
+    )

@@ -1,0 +1,59 @@
+"""Where furniture libraries are, and what each of ours is called."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+
+from assets.sh3f import Pack, PackError, open_pack
+
+SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
+"""Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
+
+
+def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
+    """The .sh3f files of `packs` (files or folders), or those of the system if none are given.
+
+    Raises:
+      PackError: a path in `packs` does not exist.
+    """
+    found: list[Path] = []
+    for path in packs or (SYSTEM_FOLDER,):
+        path = Path(path)
+        if path.is_dir():
+            found.extend(sorted(path.glob("*.sh3f")))
+        elif path.is_file():
+            found.append(path)
+        elif packs:
+            raise PackError(f"furniture library {path} does not exist; name a .sh3f file or a folder of them")
+    return tuple(found)
+
+
+@functools.lru_cache(maxsize=16)
+def cached_pack(path: Path, stamp: tuple[int, int]) -> Pack:
+    """The opened library at `path`; `stamp` (size, mtime) makes a changed file be read again."""
+    return open_pack(path)
+
+
+def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
+    """The library that holds the model `key`.
+
+    Raises:
+      PackError: no library is installed, or none of them holds it.
+    """
+    found = find_packs(packs)
+    for path in found:
+        stat = path.stat()
+        pack = cached_pack(path, (stat.st_size, stat.st_mtime_ns))
+        if key in pack.entries:
+            return pack
+    if not found:
+        raise PackError(
+            f"no furniture library in {SYSTEM_FOLDER}, so {key!r} cannot be imported; "
+            "apt-get install sweethome3d-furniture, or name the .sh3f files with --pack"
+        )
+    raise PackError(
+        f"no furniture library holds {key!r}, looked in {[p.name for p in found]}; "
+        "apt-get install sweethome3d-furniture (version 1.8 or later), or name the file with --pack"
+    )

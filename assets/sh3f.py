@@ -1,0 +1,216 @@
+"""Sweet Home 3D furniture libraries (.sh3f): zip files of OBJ models with a catalogue of real sizes.
+
+Nothing is ever extracted: entries are read into memory under limits, and a library whose names
+climb out of their folder, or whose entries swell like a zip bomb, is refused as a whole.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+
+from assets.cache import digest
+
+CATALOGUE = "PluginFurnitureCatalog.properties"
+MAX_ENTRY = 64 * 2**20
+"""Bytes that one unpacked entry may have; the largest of Debian's five libraries is 9 MiB."""
+MAX_RATIO = 200
+"""Unpacked over packed size above which a large entry is taken for a bomb; text packs 8 to 1."""
+MAX_ENTRIES = 20_000
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class PackError(ValueError):
+    """A pack that is missing, broken or malicious: says what and what to do."""
+
+
+@dataclass(frozen=True)
+class LightSource:
+    """Where a lamp shines from, in the model's own frame (z up, front along -y), metres."""
+
+    position: tuple[float, float, float]
+    color: tuple[float, float, float]
+    diameter: float | None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One model as its library describes it."""
+
+    key: str
+    """'<folder>/<model>', e.g. 'scopia/bed1'."""
+    name: str
+    model: str
+    """Path of the OBJ file inside the zip."""
+    size: tuple[float, float, float]
+    """Width, depth, height, metres."""
+    elevation: float
+    """Base height above the floor, metres."""
+    rotation: tuple[float, ...]
+    """Row-major 3x3 rotation applied to the OBJ's own (y up) axes before it is sized."""
+    category: str = ""
+    tags: tuple[str, ...] = ()
+    creator: str = ""
+    licence: str = ""
+    lights: tuple[LightSource, ...] = ()
+
+
+@dataclass(frozen=True)
+class Pack:
+    """An opened library; its bytes are read on demand."""
+
+    path: Path
+    digest: str
+    """Hex digest of the table of contents (names, sizes, CRC-32 sums)."""
+    licence: str
+    entries: Mapping[str, Entry]
+
+    def read(self, name: str) -> bytes:
+        """The bytes of the zip entry `name`, never more than MAX_ENTRY.
+
+        Raises:
+          PackError: no such entry, damaged, encrypted, or larger than it claims.
+        """
+        try:
+            with zipfile.ZipFile(self.path) as z, z.open(_safe_name(self.path, name)) as f:
+                data = f.read(MAX_ENTRY + 1)
+        except KeyError as e:
+            raise PackError(f"{self.path.name} has no entry {name!r}; install the pack again") from e
+        except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError, EOFError) as e:
+            raise PackError(f"{self.path.name}: entry {name!r} cannot be read ({e}); install the pack again") from e
+        if len(data) > MAX_ENTRY:
+            raise PackError(f"{self.path.name}: entry {name!r} unpacks to over {MAX_ENTRY} bytes; do not use this pack")
+        return data
+
+    def names(self) -> tuple[str, ...]:
+        with zipfile.ZipFile(self.path) as z:
+            return tuple(z.namelist())
+
+
+def open_pack(path: Path) -> Pack:
+    """Read the table of contents and the catalogue of the library at `path`.
+
+    Raises:
+      PackError: missing, not a zip, unsafe names, a bomb, or a catalogue that makes no sense.
+    """
+    path = Path(path)
+    try:
+        with zipfile.ZipFile(path) as z:
+            infos = z.infolist()
+    except FileNotFoundError as e:
+        raise PackError(f"furniture library {path} does not exist; apt-get install sweethome3d-furniture") from e
+    except (zipfile.BadZipFile, OSError) as e:
+        raise PackError(f"{path} is not a .sh3f library ({e}); install it again or name another file") from e
+    _check_contents(path, infos)
+    toc = digest([[i.filename, i.file_size, i.CRC] for i in infos])
+    bare = Pack(path, toc, "", MappingProxyType({}))
+    if CATALOGUE not in {i.filename for i in infos}:
+        raise PackError(f"{path.name} has no {CATALOGUE}; it is not a furniture library of Sweet Home 3D")
+    fields = parse_properties(bare.read(CATALOGUE).decode("latin-1"))
+    licence = fields.get("license", "")
+    return Pack(path, toc, licence, MappingProxyType(_entries(path, fields, licence)))
+
+
+def parse_properties(text: str) -> dict[str, str]:
+    """Java properties as a dict; later keys win."""
+    text = re.sub(r"(?<!\\)\\\r?\n[ \t]*", "", text)
+    found = {}
+    for line in text.splitlines():
+        line = line.strip()
+        if not line or line[0] in "#!" or "=" not in line:
+            continue
+        key, value = line.split("=", 1)
+        value = re.sub(r"\\u([0-9a-fA-F]{4})", lambda m: chr(int(m[1], 16)), value)
+        found[key.strip()] = re.sub(r"\\(.)", r"\1", value.strip())
+    return found
+
+
+def key_of(model: str) -> str:
+    """'scopia/bed1/bed1.obj' gives 'scopia/bed1'; an OBJ outside any folder gives its stem."""
+    p = PurePosixPath(model)
+    return str(p.parent) if len(p.parts) > 1 else p.stem
+
+
+def _check_contents(path: Path, infos: list[zipfile.ZipInfo]) -> None:
+    if len(infos) > MAX_ENTRIES:
+        raise PackError(f"{path.name} has {len(infos)} entries, at most {MAX_ENTRIES} are read; do not use this pack")
+    for i in infos:
+        _safe_name(path, i.filename)
+        if i.file_size > MAX_ENTRY or (i.file_size > 2**20 and i.file_size > MAX_RATIO * max(1, i.compress_size)):
+            raise PackError(
+                f"{path.name}: entry {i.filename!r} unpacks from {i.compress_size} to {i.file_size} bytes, "
+                "which looks like a zip bomb; do not use this pack"
+            )
+
+
+def _safe_name(path: Path, name: str) -> str:
+    parts = PurePosixPath(name).parts
+    if name.startswith("/") or "\\" in name or ".." in parts or "\0" in name or (parts and ":" in parts[0]):
+        raise PackError(f"{path.name}: entry {name!r} points outside the library; do not use this pack")
+    return name
+
+
+def _entries(path: Path, fields: Mapping[str, str], licence: str) -> dict[str, Entry]:
+    rows: dict[int, dict[str, str]] = {}
+    for key, value in fields.items():
+        if m := re.fullmatch(r"(\w+)#(\d+)", key):
+            rows.setdefault(int(m[2]), {})[m[1]] = value
+    entries = {}
+    for number in sorted(rows):
+        entry = _entry(path, number, rows[number], licence)
+        entries[entry.key] = entry
+    return entries
+
+
+def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Entry:
+    where = f"{path.name}: model {number}"
+    if not row.get("model"):
+        raise PackError(f"{where} names no model file; the library is damaged")
+    model = _safe_name(path, row["model"].lstrip("/"))
+    width, depth, height = (_number(where, row, f) / 100.0 for f in ("width", "depth", "height"))
+    if min(width, depth, height) <= 0:
+        raise PackError(f"{where} should have a positive size, got {width} x {depth} x {height} m")
+    rotation = IDENTITY
+    if row.get("modelRotation"):
+        rotation = tuple(float(x) for x in row["modelRotation"].split())
+        if len(rotation) != 9 or not all(math.isfinite(x) for x in rotation):
+            raise PackError(f"{where} should have a modelRotation of nine numbers, got {row['modelRotation']!r}")
+    return Entry(
+        key=key_of(model), name=row.get("name", ""), model=model, size=(width, depth, height),
+        elevation=_number(where, row, "elevation", 0.0) / 100.0, rotation=rotation,
+        category=row.get("category", ""), creator=row.get("creator", ""), licence=row.get("license", licence),
+        tags=tuple(t.strip() for t in row.get("tags", "").split(",") if t.strip()),
+        lights=_lights(row, (width, depth, height)),
+    )
+
+
+def _lights(row: Mapping[str, str], size: tuple[float, float, float]) -> tuple[LightSource, ...]:
+    """Sources given as cm from the left, the back and the floor, brought into the asset frame."""
+    columns = [row.get(f"lightSource{f}", "").split() for f in ("X", "Y", "Z", "Color", "Diameter")]
+    diameters = columns[4] or [""] * len(columns[0])
+    return tuple(
+        LightSource(
+            (float(x) / 100.0 - size[0] / 2, size[1] / 2 - float(y) / 100.0, float(z) / 100.0),
+            tuple(int(color.lstrip("#"), 16) >> s & 255 for s in (16, 8, 0)),
+            float(d) / 100.0 if d else None,
+        )
+        for x, y, z, color, d in zip(*columns[:4], diameters)
+    )
+
+
+def _number(where: str, row: Mapping[str, str], name: str, default: float | None = None) -> float:
+    text = row.get(name, "")
+    if not text and default is not None:
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise PackError(f"{where} should have a number for {name}, got {text!r}; the library is damaged")
+    return value
