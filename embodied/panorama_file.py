@@ -1,0 +1,172 @@
+"""PanoramaFile: all panoramas of a house in one file, each readable alone.
+
+Layout: 8 bytes magic; the encoded pictures of every node one after another; the index (JSON); its
+length, its SHA-256 and the magic again. Per node three pictures with the six faces side by side:
+
+  rgb    JPEG, quality 95 without chroma subsampling (about 40 dB), or PNG when asked for lossless
+  depth  16-bit PNG of whole millimetres (error at most 0.5 mm up to 65.5 m, 0 where nothing is)
+  ids    16-bit PNG, exact
+
+Every picture carries a CRC-32 that is checked when it is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Self
+
+import cv2
+import numpy as np
+
+from assets.cache import atomic_path
+from embodied.panorama import Panorama
+
+MAGIC = b"EMBPANO1"
+TAIL = struct.Struct("<Q32s8s")
+"""Length of the index, its SHA-256, the magic."""
+JPEG_QUALITY = 95
+FARTHEST = 65.535
+"""Metres beyond which depths are stored as this."""
+CHANNELS = ("rgb", "depth", "ids")
+
+
+class PanoramaFileError(ValueError):
+    """A panorama file that is damaged, cut short or of another kind."""
+
+
+class PanoramaFile:
+    """An open panorama file. Reads only what is asked for; safe to share between threads that lock."""
+
+    def __init__(self, path: Path) -> None:
+        """Open `path` and read its index.
+
+        Raises:
+          PanoramaFileError: not a panorama file, truncated, or its index is damaged.
+        """
+        self.path = Path(path)
+        self._file = self.path.open("rb")
+        try:
+            self.index = _read_index(self._file, self.path)
+        except PanoramaFileError:
+            self._file.close()
+            raise
+
+    @property
+    def meta(self) -> Mapping[str, object]:
+        """What the file was made from and with."""
+        return self.index["meta"]
+
+    @property
+    def size(self) -> int:
+        """Side of a face, pixels."""
+        return self.index["size"]
+
+    def __len__(self) -> int:
+        return len(self.index["nodes"])
+
+    def read(self, node: int) -> Panorama:
+        """The whole panorama of one node."""
+        return Panorama(self.rgb(node), self.depth(node), self.ids(node))
+
+    def rgb(self, node: int) -> np.ndarray:
+        """(6, s, s, 3) uint8."""
+        return _apart(cv2.cvtColor(self._picture(node, "rgb", cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB))
+
+    def depth(self, node: int) -> np.ndarray:
+        """(6, s, s) float32 metres along each face's axis, to 0.5 mm; inf where nothing is."""
+        millimetres = _apart(self._picture(node, "depth", cv2.IMREAD_UNCHANGED))
+        return np.where(millimetres > 0, millimetres / np.float32(1000), np.float32(np.inf))
+
+    def ids(self, node: int) -> np.ndarray:
+        """(6, s, s) int32."""
+        return _apart(self._picture(node, "ids", cv2.IMREAD_UNCHANGED)).astype(np.int32)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _picture(self, node: int, channel: str, flag: int) -> np.ndarray:
+        if not 0 <= node < len(self):
+            raise IndexError(f"{self.path} holds the nodes 0 to {len(self) - 1}, not {node}")
+        offset, length, crc = self.index["nodes"][node][channel]
+        self._file.seek(offset)
+        data = self._file.read(length)
+        if len(data) != length or zlib.crc32(data) != crc:
+            raise PanoramaFileError(f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again")
+        return cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+
+
+def write_panoramas(path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False) -> None:
+    """Write `panoramas` (node 0, 1, ...) to `path` atomically.
+
+    Args:
+      meta: JSON-able facts about what they were made from and with.
+      lossless: keep the colours exactly, for about four times the space.
+    """
+    with atomic_path(Path(path)) as temporary, open(temporary, "wb") as f:
+        f.write(MAGIC)
+        nodes, size = [], 0
+        for panorama in panoramas:
+            size, entry = panorama.size, {}
+            for channel, data in zip(CHANNELS, encode(panorama, lossless), strict=True):
+                entry[channel] = [f.tell(), len(data), zlib.crc32(data)]
+                f.write(data)
+            nodes.append(entry)
+        index = json.dumps({"meta": dict(meta), "size": size, "lossless": lossless, "nodes": nodes}).encode()
+        f.write(index)
+        f.write(TAIL.pack(len(index), hashlib.sha256(index).digest(), MAGIC))
+
+
+def encode(panorama: Panorama, lossless: bool = False) -> tuple[bytes, bytes, bytes]:
+    """The three pictures of a node as files: rgb, depth, ids."""
+    colours = cv2.cvtColor(_beside(panorama.rgb), cv2.COLOR_RGB2BGR)
+    if lossless:
+        rgb = _encoded(".png", colours, cv2.IMWRITE_PNG_COMPRESSION, 3)
+    else:
+        rgb = _encoded(".jpg", colours, cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+                       cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+    metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST), 0)
+    depth = _encoded(".png", _beside(np.rint(metres * 1000).astype(np.uint16)), cv2.IMWRITE_PNG_COMPRESSION, 1)
+    if panorama.ids.max() > 65535:
+        raise ValueError(f"instance id {panorama.ids.max()} does not fit into 16 bits; a house may have 65535 owners")
+    return rgb, depth, _encoded(".png", _beside(panorama.ids.astype(np.uint16)), cv2.IMWRITE_PNG_COMPRESSION, 1)
+
+
+def _encoded(kind: str, image: np.ndarray, *options: int) -> bytes:
+    return cv2.imencode(kind, image, options)[1].tobytes()
+
+
+def _beside(faces: np.ndarray) -> np.ndarray:
+    """(6, s, s, ...) faces next to each other: (s, 6 s, ...)."""
+    return np.ascontiguousarray(np.concatenate(list(faces), axis=1))
+
+
+def _apart(strip: np.ndarray) -> np.ndarray:
+    return np.stack(np.split(strip, 6, axis=1))
+
+
+def _read_index(f, path: Path) -> dict:
+    end = f.seek(0, 2)
+    f.seek(0)
+    broken = f"{path} is no complete panorama file ({end} bytes); delete it, it is made again"
+    if end < len(MAGIC) + TAIL.size or f.read(len(MAGIC)) != MAGIC:
+        raise PanoramaFileError(broken)
+    f.seek(end - TAIL.size)
+    length, checksum, magic = TAIL.unpack(f.read(TAIL.size))
+    if magic != MAGIC or length > end - TAIL.size - len(MAGIC):
+        raise PanoramaFileError(broken)
+    f.seek(end - TAIL.size - length)
+    index = f.read(length)
+    if hashlib.sha256(index).digest() != checksum:
+        raise PanoramaFileError(f"{path}: the index is damaged; delete the file, it is made again")
+    return json.loads(index)
