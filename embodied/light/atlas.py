@@ -1,0 +1,287 @@
+"""The atlas of a house: which page holds whose light, and what lies under every texel.
+
+A page is one texture. Things of one room that want the same fineness share pages; every owner
+keeps its own triangles, so that instance ids and culling by room go on working.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from assets.records import Finish, MeshPart
+from embodied.geometry import rotation
+from embodied.light.backend import mitsuba, scene_of
+from embodied.light.unwrap import Unwrapped, areas_of, cached_model, face_normals, pack, unwrap_planes
+
+SHELL = ("wall", "floor", "ceiling")
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """Everything of one owner, unwrapped, in world coordinates."""
+
+    owner: str
+    room: str
+    kind: str
+    flat: Unwrapped
+    finishes: tuple[Finish, ...]
+    """Indexed by `flat.part`."""
+    fineness: int
+    """Texels per luxel along each axis."""
+    glass: bool
+    """Lets light through and is drawn see-through."""
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """One texture and the triangles that wear it; m faces."""
+
+    width: int
+    """Luxels."""
+    height: int
+    fineness: int
+    glass: bool
+    corners: np.ndarray
+    """(m, 3, 3) float32, metres, world."""
+    normals: np.ndarray
+    """(m, 3, 3) float32."""
+    luxels: np.ndarray
+    """(m, 3, 2) float32, position on the page in luxels."""
+    uv: np.ndarray
+    thin: np.ndarray
+    finish: np.ndarray
+    """(m,) int32 into `finishes`."""
+    finishes: tuple[Finish, ...]
+    owner: np.ndarray
+    """(m,) int32 into `Atlas.owners`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """All pages of a house, and who its faces belong to."""
+
+    pages: tuple[Page, ...]
+    owners: tuple[str, ...]
+    rooms: tuple[str, ...]
+    """Room of each owner."""
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """What lies under the covered texels of one page; n of them."""
+
+    index: np.ndarray
+    """(n,) int64, row * width + column."""
+    position: np.ndarray
+    """(n, 3) float32, metres, world."""
+    normal: np.ndarray
+    """(n, 3) float32, unit, shading."""
+    face_normal: np.ndarray
+    face: np.ndarray
+    """(n,) int32, face of the page."""
+    weights: np.ndarray
+    """(n, 3) float32 barycentric."""
+    shape: tuple[int, int]
+    """Height and width of the page in these texels."""
+
+
+def things_of(
+    parts: Sequence, *, density: float, budget: float, cache: Path, progress: Callable[[int, int], None] = lambda i, n: None
+) -> tuple[Thing, ...]:
+    """Group parts by owner and unwrap each; furniture from the cache.
+
+    Args:
+      parts: embodied.parts.Part of one house; kind 'outdoor' must be left out.
+      density: luxels per metre of walls, floors and ceilings.
+      budget: luxels per piece of furniture.
+    """
+    groups: dict[tuple, list] = {}
+    for p in parts:
+        groups.setdefault((p.owner, p.room, p.kind, _is_glass(p.mesh.finish), p.position, p.yaw), []).append(p)
+    things = []
+    for done, ((owner, room, kind, glass, position, yaw), mine) in enumerate(groups.items()):
+        progress(done, len(groups))
+        meshes: list[MeshPart] = [p.mesh for p in mine]
+        if kind in SHELL:
+            flat = unwrap_planes(meshes, density)
+        else:
+            flat = cached_model(meshes, budget, cache, trusted=kind == "opening")
+        if len(flat.corners):
+            flat = _placed(flat, position, yaw)
+            finishes = tuple(m.finish for m in meshes)
+            things.append(Thing(owner, room, kind, flat, finishes, _fineness(kind, flat, finishes), glass))
+    return tuple(things)
+
+
+def atlas_of(things: Sequence[Thing], widest: int = 4096) -> Atlas:
+    """Lay the things of a house out on pages, by room and fineness.
+
+    Args:
+      widest: a page's largest side in texels.
+    """
+    owners = tuple(dict.fromkeys(t.owner for t in things))
+    number = {o: i for i, o in enumerate(owners)}
+    first = {t.owner: t for t in reversed(things)}
+    shelves: dict[tuple, list[Thing]] = {}
+    for t in things:
+        shelves.setdefault((t.room, t.fineness, t.glass), []).append(t)
+    pages = []
+    for (_, fineness, glass), mine in shelves.items():
+        limit = widest // fineness
+        while mine:
+            width = int(min(limit, max(128, 1.05 * np.sqrt(sum(int(t.flat.size.prod()) for t in mine)))))
+            places, _ = pack(np.array([t.flat.size for t in mine]), width)
+            inside = [bool(y + t.flat.size[1] <= limit) for t, (_, y) in zip(mine, places)]
+            if not any(inside):
+                raise ValueError(f"{mine[0].owner!r} needs an atlas of {mine[0].flat.size} luxels, over {limit}; lower the density")
+            pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
+            mine = [t for t, ok in zip(mine, inside) if not ok]
+    return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
+
+
+def rasterise(page: Page, fineness: int) -> Texels:
+    """What lies under the centre of each texel, found by shooting rays straight down on the layout."""
+    mi = mitsuba()
+    import drjit as dr
+
+    w, h = page.width * fineness, page.height * fineness
+    flat = np.concatenate([page.luxels * fineness, np.zeros((*page.luxels.shape[:2], 1), np.float32)], axis=-1)
+    i = dr.arange(mi.UInt32, w * h)
+    above = mi.Point3f(mi.Float(i % w) + 0.5, mi.Float(i // w) + 0.5, 1.0)
+    hit = scene_of(flat).ray_intersect_preliminary(mi.Ray3f(above, mi.Vector3f(0, 0, -1)))
+    index = np.nonzero(np.asarray(hit.is_valid()))[0]
+    face = np.asarray(hit.prim_index)[index].astype(np.int32)
+    b1, b2 = (np.asarray(hit.prim_uv[k])[index] for k in (0, 1))
+    weights = np.stack([1 - b1 - b2, b1, b2], axis=1).astype(np.float32)
+    normal = mix(weights, page.normals, face)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
+    flat_normal = face_normals(page.corners).astype(np.float32)[face]
+    return Texels(index, mix(weights, page.corners, face), normal, flat_normal, face, weights, (h, w))
+
+
+def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """Barycentric mean of per-corner values (m, 3, c) at n points: (n, c) float32."""
+    values = corners[face]
+    return (weights[:, :1] * values[:, 0] + weights[:, 1:2] * values[:, 1] + weights[:, 2:] * values[:, 2]).astype(np.float32)
+
+
+def albedo(page: Page, texels: Texels, read: Callable[[str], np.ndarray]) -> np.ndarray:
+    """(n, 3) float32 linear reflectance under each texel, kept inside [0.02, 0.88].
+
+    Args:
+      read: colour map by path as (h, w, 3) uint8 sRGB.
+    """
+    out = np.zeros((len(texels.face), 3), np.float32)
+    which = page.finish[texels.face]
+    scale = texels.shape[1] / page.width
+    for f, finish in enumerate(page.finishes):
+        mine = np.nonzero(which == f)[0]
+        if not len(mine):
+            continue
+        if finish.texture is None:
+            out[mine] = linear(np.asarray(finish.color[:3], np.float32))
+            continue
+        image = read(finish.texture)
+        uv = mix(texels.weights[mine], page.uv, texels.face[mine])
+        for level, chosen in _by_level(page, f, scale, image.shape, texels.face[mine]):
+            out[mine[chosen]] = _sample(_shrunk(image, level), uv[chosen])
+    return np.clip(out, 0.02, 0.88)
+
+
+def linear(srgb: np.ndarray) -> np.ndarray:
+    """sRGB in [0, 1] to linear (IEC 61966-2-1)."""
+    srgb = np.asarray(srgb)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def gamma(x: np.ndarray) -> np.ndarray:
+    """Linear to sRGB in [0, 1] (IEC 61966-2-1)."""
+    x = np.clip(x, 0.0, 1.0)
+    return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def read_colours(path: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of an image file."""
+    image = cv2.imread(path, cv2.IMREAD_COLOR)
+    if image is None:
+        raise FileNotFoundError(f"texture {path} cannot be read; delete the cache's textures and try again")
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def _is_glass(finish: Finish) -> bool:
+    return finish.color[3] < 0.9
+
+
+def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped:
+    turn = np.eye(3)
+    turn[:2, :2] = rotation(yaw)
+    corners = flat.corners.astype(np.float64) @ turn.T + np.asarray(position, float)
+    return replace(flat, corners=corners.astype(np.float32), normals=(flat.normals @ turn.T.astype(np.float32)))
+
+
+def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish]) -> int:
+    """Texels per luxel: floors 5, patterned walls 4, plain walls 2; furniture by its pattern and density."""
+    used = np.bincount(flat.part, weights=areas_of(flat.corners), minlength=len(finishes))
+    patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
+    if kind in SHELL:
+        return (5 if kind == "floor" else 4) if patterned else 2
+    side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
+    return int(np.clip(round(220 / side), 2, 4)) if patterned else 2
+
+
+def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:
+    finishes: list[Finish] = []
+    known: dict[Finish, int] = {}
+    which, owner, luxels = [], [], []
+    for t, place in zip(things, places):
+        local = []
+        for f in t.finishes:
+            if f not in known:
+                known[f] = len(finishes)
+                finishes.append(f)
+            local.append(known[f])
+        which.append(np.array(local, np.int32)[t.flat.part])
+        owner.append(np.full(len(t.flat.part), number[t.owner], np.int32))
+        luxels.append(t.flat.luxels + place.astype(np.float32))
+    join = lambda name: np.concatenate([getattr(t.flat, name) for t in things])  # noqa: E731
+    width = max(int(x + t.flat.size[0]) for t, (x, _) in zip(things, places))
+    height = max(int(y + t.flat.size[1]) for t, (_, y) in zip(things, places))
+    return Page(
+        width, height, fineness, glass, join("corners"), join("normals"), np.concatenate(luxels), join("uv"),
+        join("thin"), np.concatenate(which), tuple(finishes), np.concatenate(owner),
+    )
+
+
+def _by_level(page: Page, finish: int, scale: float, shape: tuple[int, ...], face: np.ndarray):
+    """Texels by how far the colour map must be shrunk first: pairs of level and positions in `face`."""
+    pad = lambda a: np.pad(a, ((0, 0), (0, 0), (0, 1)))  # noqa: E731
+    source = areas_of(pad(page.uv)) * shape[0] * shape[1]
+    target = areas_of(pad(page.luxels)) * scale**2
+    levels = np.clip(np.round(0.5 * np.log2(np.maximum(source, 1e-9) / np.maximum(target, 1e-9))), 0, 8).astype(int)
+    mine = levels[face]
+    for level in np.unique(mine):
+        yield int(level), np.nonzero(mine == level)[0]
+
+
+def _shrunk(image: np.ndarray, level: int) -> np.ndarray:
+    """(h, w, 3) float32 linear, halved `level` times."""
+    light = linear(np.arange(256, dtype=np.float32) / 255)[image]
+    h, w = max(1, image.shape[0] >> level), max(1, image.shape[1] >> level)
+    return cv2.resize(light, (w, h), interpolation=cv2.INTER_AREA) if level else light
+
+
+def _sample(light: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear, repeating lookup; v runs up."""
+    h, w = light.shape[:2]
+    x, y = (uv[:, 0] % 1) * w - 0.5, ((1 - uv[:, 1]) % 1) * h - 0.5
+    xi, yi = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = (x - xi)[:, None].astype(np.float32), (y - yi)[:, None].astype(np.float32)
+    at = lambda a, b: light[b % h, a % w]  # noqa: E731
+    top = at(xi, yi) * (1 - fx) + at(xi + 1, yi) * fx
+    return top * (1 - fy) + (at(xi, yi + 1) * (1 - fx) + at(xi + 1, yi + 1) * fx) * fy

@@ -1,0 +1,121 @@
+"""Where Mitsuba is found and started, and the few array helpers all of `embodied.light` shares.
+
+Mitsuba's fast variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
+needs a shared libLLVM of version 15 or later (Debian: `apt install libllvm19`).
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import functools
+import glob
+import os
+import re
+import types
+import warnings
+
+import numpy as np
+
+_LLVM_PLACES = (
+    "/usr/lib/*/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    "/usr/local/lib/libLLVM*.so*", "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
+)
+OLDEST_LLVM = 15
+
+
+class LightError(RuntimeError):
+    """Light cannot be computed: says what was expected, what came and what to do."""
+
+
+def find_llvm() -> str | None:
+    """Path of the newest libLLVM on this machine that Dr.Jit can use; None if there is none."""
+    found = []
+    for place in _LLVM_PLACES:
+        for path in sorted(glob.glob(place)):
+            version = re.search(r"libLLVM(?:[-.]so[-.]|[-.])?(?:so\.)?(\d+)", os.path.basename(path))
+            if version and OLDEST_LLVM <= int(version[1]) < 40:
+                found.append((int(version[1]), path))
+    return max(found)[1] if found else ctypes.util.find_library("LLVM")
+
+
+@functools.cache
+def mitsuba() -> types.ModuleType:
+    """Mitsuba with its best variant switched on.
+
+    Raises:
+      LightError: Mitsuba is not installed, or neither CUDA nor LLVM can be used.
+    """
+    if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
+        os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
+    try:
+        import mitsuba as mi
+    except ImportError as e:
+        raise LightError(
+            f"light needs mitsuba ({e}); `pip install mitsuba`, or look at the house with quality='unlit'"
+        ) from e
+    import drjit as dr
+
+    reasons = []
+    for variant, has in (("cuda_ad_rgb", dr.JitBackend.CUDA), ("llvm_ad_rgb", dr.JitBackend.LLVM)):
+        if not dr.has_backend(has):
+            reasons.append(f"{variant}: Dr.Jit finds no usable {has.name} library")
+            continue
+        mi.set_variant(variant)
+        return mi
+    raise LightError(
+        f"no vectorised Mitsuba variant works here ({'; '.join(reasons)}); install LLVM {OLDEST_LLVM} or later "
+        "(Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or use quality='unlit'"
+    )
+
+
+def device() -> str:
+    """'cuda' or 'llvm': what the light is computed on, for fingerprints and tables."""
+    return mitsuba().variant().split("_")[0]
+
+
+def scene_of(corners: np.ndarray):
+    """A Mitsuba scene of bare triangles, for ray tests only.
+
+    Args:
+      corners: (m, 3, 3) metres; triangle i is primitive i.
+    """
+    mi = mitsuba()
+    m = len(corners)
+    mesh = mi.Mesh("triangles", 3 * m, m)
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
+    params["faces"] = np.arange(3 * m, dtype=np.uint32)
+    params.update()
+    return mi.load_dict({"type": "scene", "triangles": mesh})
+
+
+def vector(a: np.ndarray):
+    """(n, 3) array as mi.Vector3f."""
+    mi = mitsuba()
+    a = np.asarray(a, np.float32)
+    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(a[:, k])) for k in range(3)))
+
+
+def array(v) -> np.ndarray:
+    """A Dr.Jit vector or colour as an (n, 3) float32 array."""
+    import drjit as dr
+
+    dr.eval(v)
+    return np.ascontiguousarray(np.stack([np.asarray(v[k]) for k in range(3)], axis=-1), np.float32)
+
+
+def constant(x: float):
+    """A number that kernels read as data, so that changing it compiles nothing anew."""
+    import drjit as dr
+
+    return dr.opaque(mitsuba().Float, float(x))
+
+
+def r2(k: int) -> tuple[float, float]:
+    """Point k of the R2 low-discrepancy sequence in the unit square (M. Roberts, 2018)."""
+    return ((k + 1) * 0.7548776662466927) % 1.0, ((k + 1) * 0.5698402909980532) % 1.0
+
+
+def warn(message: str) -> None:
+    """Tell the user about a fall-back."""
+    warnings.warn(message, RuntimeWarning, stacklevel=3)

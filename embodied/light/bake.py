@@ -1,0 +1,334 @@
+"""Light a house once: from House to a folder of pages that renderers show and tracers read.
+
+A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the settings
+and the version. Every stage is a file of its own, so that an interrupted bake goes on where it
+stopped; manifest.json is written last and lists every file with its checksum.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from assets.cache import atomic_path, digest, write_bytes, write_json
+from embodied.house import House
+from embodied.light import tone
+from embodied.light.atlas import Atlas, albedo, atlas_of, linear, rasterise, read_colours, things_of  # noqa: F401
+from embodied.light.backend import LightError, device, warn
+from embodied.light.compose import Ingredients, page_of
+from embodied.light.emitters import lamps_of, portals_of
+from embodied.light.radiosity import space_of
+from embodied.light.settings import VERSION, Settings, settings_of
+from embodied.light.sky import outdoors as outdoors_of
+from embodied.light.solve import Light, Luxels, luxels_of, solve
+from embodied.light.surroundings import dome_mesh, surroundings
+from embodied.light.tone import Exposure, expose
+from embodied.lit import LitMesh, LitPages
+from embodied.parts import house_parts, owners
+
+Progress = Callable[[str, float], None]
+
+
+class StaleBake(LightError):
+    """A bake that does not belong to the house at hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bake:
+    """A lit house on disk."""
+
+    folder: Path
+    manifest: dict
+
+    @functools.cached_property
+    def exposure(self) -> Exposure:
+        e = self.manifest["exposure"]
+        polygons = tuple(tuple(tuple(c) for c in p) for p in e["polygons"])
+        return Exposure(polygons, np.array(e["levels"]), np.array(e["gains"]), np.array(e["outdoors"]))
+
+    @functools.cached_property
+    def lit(self) -> LitPages:
+        """What renderers draw."""
+        pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
+        with np.load(self.folder / "meshes.npz", allow_pickle=False) as z:
+            meshes = tuple(
+                LitMesh(m["owner"], m["kind"], m["room"], m["page"], z[f"v{i}"], z[f"f{i}"], z[f"t{i}"], m["alpha"])
+                for i, m in enumerate(self.manifest["meshes"])
+            )
+        return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
+
+    def probe(self, room: str) -> np.ndarray:
+        """(6, 3) float32 light that reaches the middle of a room from +x, -x, +y, -y, +z, -z, as sRGB in [0, 1].
+
+        Multiply a moving thing's sRGB colour by the value of the side a face looks to.
+
+        Raises:
+          KeyError: no such room.
+        """
+        return np.array(self.manifest["probes"][room], np.float32)
+
+    def ingredients(self, page: int) -> Ingredients:
+        """One page before exposure."""
+        with np.load(self.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
+            soft = z["soft"]
+        sun = cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE)
+        shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
+        return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"))
+
+
+def key_of(house: House, settings: Settings) -> str:
+    """What a bake is filed under."""
+    return digest("light", VERSION, house.digest, dataclasses.asdict(settings))[:24]
+
+
+def bake(house: House, catalogue, cache: Path, settings: Settings | str = "normal", *,
+         progress: Progress = lambda stage, done: None) -> Bake:
+    """Light `house`, or open the bake that is already there.
+
+    Args:
+      settings: or the name of a quality: 'draft', 'normal', 'high'.
+      progress: told the stage's name and how far it is, 0 to 1.
+
+    Raises:
+      LightError: Mitsuba or LLVM is missing, or the bake disagrees with the path tracer.
+    """
+    settings = settings_of(settings) if isinstance(settings, str) else settings
+    folder = Path(cache) / "light" / key_of(house, settings)
+    if (done := _open(folder, house)) is not None:
+        return done
+    return _make(house, catalogue, Path(cache), folder, settings, progress)
+
+
+def open_bake(folder: Path, house: House) -> Bake:
+    """Open a finished bake and make sure that it belongs to `house`.
+
+    Raises:
+      StaleBake: absent, unfinished, damaged, of another version, or of a house that was edited since.
+    """
+    folder = Path(folder)
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text())
+    except (OSError, ValueError) as e:
+        raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
+    if manifest.get("version") != VERSION:
+        raise StaleBake(f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; run `embodied light` again")
+    if manifest.get("house") != house.digest:
+        raise StaleBake(
+            f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: it was edited "
+            "after it was lit; run `embodied light` again"
+        )
+    for name, size in manifest["files"].items():
+        path = folder / name
+        if not path.is_file() or path.stat().st_size != size:
+            raise StaleBake(f"{path} is missing or damaged; run `embodied light` again")
+    return Bake(folder, manifest)
+
+
+def _open(folder: Path, house: House) -> Bake | None:
+    if not folder.exists():
+        return None
+    try:
+        return open_bake(folder, house)
+    except StaleBake:
+        (folder / "manifest.json").unlink(missing_ok=True)
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A house with its light, in memory: what pages are composed from and checks are made on."""
+
+    house: House
+    atlas: Atlas
+    lux: Luxels
+    light: Light
+    outdoors: object
+    lamps: tuple
+    exposure: Exposure
+
+
+def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder: Path | None = None, *,
+                read: Callable[[str], np.ndarray] | None = None, progress: Progress = lambda s, d: None,
+                took: dict[str, float] | None = None) -> Solved:
+    """Everything up to the light of every luxel; stages are kept in `folder` where one is given."""
+    took = {} if took is None else took
+    read = read or functools.lru_cache(maxsize=None)(read_colours)
+    clock = _Clock(took)
+    parts = tuple(p for p in house_parts(house, catalogue) if p.kind != "outdoor" and len(p.mesh.faces))
+    clock("parts")
+    things = things_of(parts, density=settings.density, budget=settings.budget, cache=Path(cache) / "light",
+                       progress=lambda i, n: progress("unwrapping", i / n))
+    clock("unwrap")
+    atlas = atlas_of(things)
+    outdoors = outdoors_of(house)
+    clock("outdoors")
+    lamps = lamps_of(house, atlas)
+    lux = luxels_of(house, atlas, lamps, read)
+    clock("luxels")
+    stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))  # noqa: E731
+    light = solve(house, atlas, lux, outdoors, lamps, settings, stage, progress)
+    clock("smooth")
+    exposure = expose(house, _light_of_rooms(house, atlas, lux, light), np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0))
+    return Solved(house, atlas, lux, light, outdoors, lamps, exposure)
+
+
+def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings, progress: Progress) -> Bake:
+    from embodied.light.check import check
+
+    took: dict[str, float] = {}
+    start = time.perf_counter()
+    folder.mkdir(parents=True, exist_ok=True)
+    read = functools.lru_cache(maxsize=None)(read_colours)
+    s = solve_house(house, catalogue, cache, settings, folder, read=read, progress=progress, took=took)
+    clock = _Clock(took)
+    dark = [r.id for r, g in zip(house.rooms, _levels(s)) if g < tone.DARKEST]
+    if dark and house.sky.hour > 8 and house.sky.hour < 17:
+        warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
+    error = check(s)
+    clock("check")
+    space = space_of(s.atlas, s.lux.texels, s.outdoors.picture)
+    portals = portals_of(house)
+    for i in range(len(s.atlas.pages)):
+        progress("pages", i / len(s.atlas.pages))
+        if not all((folder / n).exists() for n in _page_files(i)):
+            one = page_of(i, house, s.atlas, s.lux, s.light, space, portals, s.lamps, s.outdoors, s.exposure, settings, read)
+            _write_page(folder, i, one, settings.jpeg)
+    clock("pages")
+    meshes = _meshes(s.atlas)
+    extra_meshes, extra_pages = surroundings(house, catalogue, s.outdoors, s.exposure, read, first=len(s.atlas.pages))
+    for i, picture in enumerate(extra_pages, len(s.atlas.pages)):
+        _write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
+    clock("surroundings")
+    meshes += extra_meshes
+    with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
+        np.savez_compressed(f, **{f"{k}{i}": a for i, m in enumerate(meshes)
+                                  for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))})
+    clock("meshes")
+    for name in ("direct", "sun", "bounces"):
+        (folder / f"stage_{name}.npz").unlink(missing_ok=True)
+    files = {p.name: p.stat().st_size for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")}
+    manifest = {
+        "version": VERSION, "key": folder.name, "house": house.digest, "device": device(),
+        "settings": dataclasses.asdict(settings), "pages": len(s.atlas.pages) + len(extra_pages), "own_pages": len(s.atlas.pages),
+        "owners": list(owners(house)), "seconds": {k: round(v, 2) for k, v in took.items()},
+        "total_seconds": round(time.perf_counter() - start, 1), "luxels": len(s.lux.position), "check": error,
+        "exposure": {"polygons": s.exposure.polygons, "levels": s.exposure.levels.tolist(), "gains": s.exposure.gains.tolist(),
+                     "outdoors": s.exposure.outdoors.tolist()},
+        "meshes": [{"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha} for m in meshes],
+        "probes": _probes(s, space), "files": files,
+    }
+    write_json(folder / "manifest.json", manifest)
+    progress("done", 1.0)
+    return Bake(folder, manifest)
+
+
+class _Clock:
+    """Notes what passed between calls under a name."""
+
+    def __init__(self, took: dict[str, float]) -> None:
+        self._took, self._last = took, time.perf_counter()
+
+    def __call__(self, name: str) -> None:
+        now = time.perf_counter()
+        self._took[name] = self._took.get(name, 0.0) + now - self._last
+        self._last = now
+
+
+def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clock, n: int) -> dict:
+    """What `work` returns, from disk if an earlier run left it there whole."""
+    path = folder / f"stage_{name}.npz" if folder else None
+    if path is not None and path.exists():
+        try:
+            with np.load(path, allow_pickle=False) as z:
+                known = {k: z[k] for k in z.files}
+            if known and all(len(v) == n for v in known.values()):
+                return known
+        except Exception as e:  # noqa: BLE001  a damaged stage file, whatever zip or numpy say about it
+            warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
+    made = work()
+    if path is not None:
+        with atomic_path(path) as temporary, open(temporary, "wb") as f:
+            np.savez(f, **made)
+    clock(name)
+    return made
+
+
+def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Light) -> dict[str, np.ndarray]:
+    """Middle e (without the sun's own) on the shell of every room."""
+    e = light.soft
+    room_of_owner = np.array([[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms])
+    room = room_of_owner[lux.owner]
+    out = {}
+    for i, r in enumerate(house.rooms):
+        mine = (room == i) & lux.shell & light.good
+        out[r.id] = np.median(e[mine], axis=0) if mine.any() else np.zeros(3)
+    return out
+
+
+def _levels(s: Solved) -> list[float]:
+    light = _light_of_rooms(s.house, s.atlas, s.lux, s.light)
+    return [float(light[r.id] @ [0.2126, 0.7152, 0.0722]) for r in s.house.rooms]
+
+
+def _probes(s: Solved, space) -> dict[str, list]:
+    from embodied.light.probe import ambient_cube
+
+    return {r.id: ambient_cube(s, space, r).round(4).tolist() for r in s.house.rooms}
+
+
+def _meshes(atlas: Atlas) -> list[LitMesh]:
+    """One mesh per owner and page, corners welded, thin faces listed twice."""
+    out = []
+    for number, page in enumerate(atlas.pages):
+        uv = page.luxels / np.array([page.width, page.height], np.float32)
+        for o in np.unique(page.owner):
+            mine = np.nonzero(page.owner == o)[0]
+            both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
+            _, first, index = np.unique(np.round(both, 5), axis=0, return_index=True, return_inverse=True)
+            faces = index.reshape(-1, 3).astype(np.int32)
+            thin = page.thin[mine]
+            faces = np.concatenate([faces, faces[thin][:, ::-1]])
+            real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+            alpha = min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
+            out.append(LitMesh(atlas.owners[o], atlas.kinds[o], atlas.rooms[o], number, both[first, :3].astype(np.float32),
+                               faces[real], both[first, 3:].astype(np.float32), float(alpha)))
+    return out
+
+
+def _page_files(i: int) -> tuple[str, ...]:
+    return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
+
+
+def _write_page(folder: Path, i: int, page: Ingredients, quality: int) -> None:
+    light, sun, shown, picture = _page_files(i)
+    with atomic_path(folder / light) as temporary, open(temporary, "wb") as f:
+        np.savez_compressed(f, soft=page.soft)
+    write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
+    _write_jpeg(folder / shown, page.albedo, quality)
+    _write_jpeg(folder / picture, page.picture, quality)
+
+
+def _write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
+    data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    write_bytes(path, data.tobytes())
+
+
+def _read_picture(path: Path) -> np.ndarray:
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise StaleBake(f"{path} is missing or damaged; run `embodied light` again")
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def forget(cache: Path, house: House, settings: Settings) -> None:
+    """Delete the bake of `house`, finished or not."""
+    shutil.rmtree(Path(cache) / "light" / key_of(house, settings), ignore_errors=True)

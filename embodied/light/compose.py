@@ -1,0 +1,91 @@
+"""From light to pages: albedo times light at texel size, sharp sun, reflections, exposure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from embodied.house import House
+from embodied.light import radiosity
+from embodied.light.atlas import Atlas, Texels, albedo, gamma, rasterise
+from embodied.light.emitters import Lamp, Portal
+from embodied.light.radiosity import Space, points_of
+from embodied.light.settings import Settings
+from embodied.light.sky import Outdoors
+from embodied.light.solve import AMBIENT, Light, Luxels, glow_of
+from embodied.light.tone import Exposure, display
+
+
+@dataclass(frozen=True, eq=False)
+class Ingredients:
+    """One page before exposure, at texel size unless said otherwise."""
+
+    soft: np.ndarray
+    """(h luxels, w luxels, 3) float16 e of all light but the sun's own."""
+    sun: np.ndarray
+    """(h, w) uint8 share of the sun seen, times 255."""
+    albedo: np.ndarray
+    """(h, w, 3) uint8 sRGB."""
+    picture: np.ndarray
+    """(h, w, 3) uint8 sRGB, exposed: what the classic renderer shows."""
+
+
+def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Light, space: Space, portals: Sequence[Portal],
+            lamps: Sequence[Lamp], outdoors: Outdoors, exposure: Exposure, settings: Settings,
+            read: Callable[[str], np.ndarray]) -> Ingredients:
+    """Compose page `number` of the atlas."""
+    page = atlas.pages[number]
+    start = sum(len(t.index) for t in lux.texels[:number])
+    mine = slice(start, start + len(lux.texels[number].index))
+    coarse = lux.texels[number]
+    good = light.good[mine]
+    good = good if good.any() else np.ones(len(good), bool)
+    soft = spread(coarse.index[good], (light.soft[mine] + AMBIENT.astype(np.float32))[good], coarse.shape)
+    share = spread(coarse.index[good], light.sun[mine][good, None], coarse.shape)[..., 0]
+    t = rasterise(page, page.fineness)
+    colour = albedo(page, t, read)
+    size = (page.width * page.fineness, page.height * page.fineness)
+    e = cv2.resize(soft, size, interpolation=cv2.INTER_LINEAR).reshape(-1, 3)[t.index]
+    sun = _sharp_sun(page, t, share, space, portals, outdoors, settings)
+    radiance = colour * (e + sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32))
+    radiance += glow_of(house, atlas, page, t, lamps)
+    picture = spread(t.index, display(radiance, exposure.at(t.position)), t.shape)
+    whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
+    whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
+    shown = spread(t.index, (gamma(colour) * 255 + 0.5).astype(np.uint8), t.shape)
+    return Ingredients(np.clip(soft, 0, 6e4).astype(np.float16), whole.reshape(t.shape), shown, picture)
+
+
+def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Values (n, c) at flat positions of a page, and beyond them the nearest one's: (h, w, c)."""
+    out = np.zeros((shape[0] * shape[1], values.shape[1]), values.dtype)
+    out[index] = values
+    if not len(index):
+        return out.reshape(*shape, -1)
+    mask = np.ones(shape[0] * shape[1], bool)
+    mask[index] = False
+    y, x = distance_transform_edt(mask.reshape(shape), return_distances=False, return_indices=True)
+    return out.reshape(*shape, -1)[y, x]
+
+
+def _sharp_sun(page, t: Texels, share: np.ndarray, space: Space, portals: Sequence[Portal], outdoors: Outdoors,
+               settings: Settings) -> np.ndarray:
+    """(n,) share of the sun per texel: traced where luxels around disagree, else taken from them."""
+    if not outdoors.sun.any() or not portals or share.max() <= 0:
+        return np.zeros(len(t.index), np.float32)
+    facing = np.clip(t.normal @ outdoors.sun_direction.astype(np.float32), 0, 1)
+    box = np.ones((5, 5), np.uint8)
+    high, low = cv2.dilate(share, box), cv2.erode(share, box)
+    unsure = (high - low > 0.02) & (high > 0.004)
+    at = lambda a: np.kron(a, np.ones((page.fineness, page.fineness), a.dtype)).ravel()[t.index]  # noqa: E731
+    out = at(share).astype(np.float32)
+    out = np.where(page.thin[t.face], out, np.where(out > 0.5 * facing, facing, 0.0) * (out > 0.004))
+    i = np.nonzero(at(unsure.astype(np.uint8)) > 0)[0]
+    if len(i):
+        p = points_of(t.position[i], t.normal[i], t.face_normal[i], page.thin[t.face[i]])
+        out[i] = radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays)
+    return out

@@ -1,0 +1,148 @@
+"""Smoothing light over surfaces without carrying it around corners or across edges of shadow.
+
+Flat, large charts (walls, floors, ceilings) are smoothed on the page by an a-trous filter with
+growing steps (Dammertz et al. 2010); everything else over nearest neighbours in space, so that
+chart borders never show. Both weigh by distance, normal and likeness of brightness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from embodied.light.atlas import Atlas, Texels
+from embodied.light.backend import array, constant, mitsuba, vector
+
+STEPS = (1, 2, 4, 8)
+KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
+"""B3 spline, as in Dammertz et al."""
+
+
+def smooth_pages(
+    e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
+    steps: Sequence[int] = STEPS, likeness: float = 0.25,
+) -> np.ndarray:
+    """A-trous smoothing within planes.
+
+    Args:
+      e: (n, 3) float32.
+      good: (n,) bool, luxels whose value counts.
+      chosen: (n,) bool, luxels to smooth.
+      likeness: standard deviation of log brightness that still counts as the same light; the
+        coarser the step, the stricter.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    sizes = np.array([p.width * p.height for p in atlas.pages])
+    base = np.cumsum(sizes) - sizes
+    number = np.full(int(sizes.sum()), -1, np.int32)
+    flat = np.concatenate([t.index + b for t, b in zip(luxels, base)])
+    number[flat] = np.arange(len(flat))
+    widths = np.concatenate([np.full(len(t.index), p.width) for t, p in zip(luxels, atlas.pages)])
+    last = np.concatenate([np.full(len(t.index), b + s - 1) for t, b, s in zip(luxels, base, sizes)])
+    mine = np.nonzero(chosen)[0]
+    if not len(mine):
+        return e
+    i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))  # noqa: E731
+    page_number, at, width = i32(number), i32(flat[mine]), i32(widths[mine])
+    low, high = i32(base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]), i32(last[mine])
+    column = i32((flat[mine] - base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]) % widths[mine])
+    position = np.concatenate([t.position for t in luxels])
+    normal = np.concatenate([t.normal for t in luxels])
+    places, normals = (mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal))
+    p, n = vector(position[mine]), vector(normal[mine])
+    trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
+    out = np.array(e, np.float32)
+    for step in steps:
+        values = mi.Float(out.ravel())
+        own = dr.gather(mi.Color3f, values, mi.UInt32(i32(mine)))
+        shade = dr.log(_brightness(own) + 1e-4)
+        total, weight = mi.Color3f(0.0), mi.Float(0.0)
+        tight = constant(1.0 / (likeness * (1.0 if step < 4 else 0.7)))
+        for j in range(-2, 3):
+            for i in range(-2, 3):
+                x = column + i * step
+                spot = at + j * step * width + i * step
+                inside = (x >= 0) & (x < width) & (spot >= low) & (spot <= high)
+                k = dr.gather(mi.Int32, page_number, mi.UInt32(spot), inside)
+                inside &= k >= 0
+                q = mi.UInt32(k)
+                other = dr.gather(mi.Color3f, values, q, inside)
+                off = dr.abs(dr.dot(dr.gather(mi.Vector3f, places, q, inside) - p, n))
+                alike = dr.dot(dr.gather(mi.Vector3f, normals, q, inside), n)
+                far = (dr.log(_brightness(other) + 1e-4) - shade) * tight
+                w = dr.select(inside & (off < 0.004) & (alike > 0.98), dr.exp(-0.5 * dr.square(far)), 0.0)
+                w *= KERNEL[i + 2] * KERNEL[j + 2] * dr.gather(mi.Float, trust, q, inside)
+                total += other * w
+                weight += w
+        out[mine] = array(dr.select(weight > 1e-12, total / dr.maximum(weight, 1e-12), own))
+    return out
+
+
+def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12) -> np.ndarray:
+    """(m, k) int, nearest good luxels of the chosen ones by place and facing."""
+    pool = np.nonzero(good)[0]
+    if not len(pool):
+        pool = np.arange(len(position))
+    where = np.concatenate([position, normal * 0.02], axis=1).astype(np.float32)
+    tree = cKDTree(where[pool], balanced_tree=False, compact_nodes=False)
+    _, near = tree.query(where[chosen], k=min(k, len(pool)), workers=-1)
+    return pool[near.reshape(int(np.count_nonzero(chosen)), -1)]
+
+
+def smooth_space(
+    e: np.ndarray, position: np.ndarray, normal: np.ndarray, near: np.ndarray, chosen: np.ndarray, *,
+    passes: int = 2, likeness: float = 0.6,
+) -> np.ndarray:
+    """Smoothing over neighbours in space.
+
+    Args:
+      e, position, normal: (n, 3).
+      near: (m, k) from `neighbours` for the m chosen.
+      chosen: (n,) bool.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    mine = np.nonzero(chosen)[0]
+    if not len(mine):
+        return e
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    places, normals = flat(position), flat(normal)
+    ids = [mi.UInt32(np.ascontiguousarray(near[:, j], np.uint32)) for j in range(near.shape[1])]
+    p, n = vector(position[mine]), vector(normal[mine])
+    reach = dr.norm(dr.gather(mi.Vector3f, places, ids[min(6, len(ids) - 1)]) - p) * 1.5 + 1e-4
+    out = np.array(e, np.float32)
+    for _ in range(passes):
+        values = flat(out)
+        own = dr.gather(mi.Color3f, values, mi.UInt32(np.ascontiguousarray(mine, np.uint32)))
+        shade = dr.log(_brightness(own) + 1e-4)
+        total, weight = mi.Color3f(0.0), mi.Float(0.0)
+        for q in ids:
+            other = dr.gather(mi.Color3f, values, q)
+            d = dr.norm(dr.gather(mi.Vector3f, places, q) - p) / reach
+            facing = dr.maximum(dr.dot(dr.gather(mi.Vector3f, normals, q), n), 0.0)
+            far = (dr.log(_brightness(other) + 1e-4) - shade) * (1.0 / likeness)
+            w = dr.exp(-0.5 * (dr.square(d) + dr.square(far))) * facing**4 + 1e-9
+            total += other * w
+            weight += w
+        out[mine] = array(total / weight)
+    return out
+
+
+def lift_specks(e: np.ndarray, near: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Chosen luxels raised to half the median of their neighbours and cut at three times it: creases, fireflies."""
+    out = np.array(e, np.float32)
+    mine = np.nonzero(chosen)[0]
+    for start in range(0, len(mine), 200_000):
+        part = slice(start, start + 200_000)
+        middle = np.median(out[near[part]], axis=1)
+        out[mine[part]] = np.clip(e[mine[part]], 0.5 * middle, 3.0 * middle + 1e-4)
+    return out
+
+
+def _brightness(c):
+    return (c.x + c.y + c.z) * (1.0 / 3.0)

@@ -1,0 +1,153 @@
+"""What gives light: portals (the sky through windows), lamps, and the sun.
+
+All intensities are radiosities or radiances in units of 100 cd/m2 (see sky.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.house import House, Opening
+from embodied.light.atlas import Atlas
+from embodied.light.unwrap import areas_of, face_normals
+
+GLAZED = ("window", "french_window")
+GLASS = 0.88
+"""Share of light that clean double glazing lets through."""
+UNIT = 100.0
+"""cd/m2 per unit of radiance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Portal:
+    """A rectangle in an outer wall through which the outdoors shines in."""
+
+    id: str
+    room: str
+    corner: np.ndarray
+    along: np.ndarray
+    up: np.ndarray
+    """(3,) each: a corner and the two edges, metres; along x up points into the house."""
+
+    @property
+    def normal(self) -> np.ndarray:
+        n = np.cross(self.along, self.up)
+        return n / np.linalg.norm(n)
+
+    @property
+    def area(self) -> float:
+        return float(np.linalg.norm(np.cross(self.along, self.up)))
+
+
+@dataclass(frozen=True, eq=False)
+class Lamp:
+    """Points on glowing surfaces, all of one strength."""
+
+    id: str
+    room: str
+    points: np.ndarray
+    """(k, 3) metres, world; spread evenly over the glowing area."""
+    normals: np.ndarray
+    """(k, 3) unit; zero where the lamp shines the same in all directions (a bare bulb)."""
+    radiance: np.ndarray
+    """(3,) of its surface; for a bare bulb the intensity in 100 cd."""
+    area: float
+    """Glowing square metres; 1 for a bare bulb."""
+    owner: str | None
+    """Placement whose own faces do not stand in a bare bulb's way."""
+
+
+def portals_of(house: House) -> tuple[Portal, ...]:
+    """One portal per glazed or open hole to the outdoors, in the plane of the outer face of the wall."""
+    return tuple(_portal(house, o) for o in house.openings if None in o.rooms and _lets_light_in(o))
+
+
+def _lets_light_in(o: Opening) -> bool:
+    return o.kind in GLAZED or (o.kind == "passage") or o.angle > 0.05
+
+
+def _portal(house: House, o: Opening) -> Portal:
+    inside = next(r for r in o.rooms if r is not None)
+    room = house.room_by_id[inside]
+    a, b = np.array(o.a), np.array(o.b)
+    d = (b - a) / np.linalg.norm(b - a)
+    left = np.array([-d[1], d[0]])
+    if _holds(room.polygon, (a + b) / 2 - left * 0.05):
+        a, b, left = b, a, -left
+    z = house.storey_of(room).elevation
+    # the facade stands outer_wall beyond the inner face, which lies half an inner wall inside the centre line
+    out = left * -(house.outer_wall - house.inner_wall / 2)
+    corner = np.array([*(a + out), z + o.sill])
+    along, up = np.array([*(b - a), 0.0]), np.array([0.0, 0.0, o.head - o.sill])
+    if np.cross(along, up)[:2] @ left < 0:
+        corner, along = corner + along, -along
+    return Portal(o.id, inside, corner, along, up)
+
+
+def _holds(polygon: Sequence[Sequence[float]], point: np.ndarray) -> bool:
+    """Whether a polygon contains a point (even-odd rule)."""
+    p = np.asarray(polygon, float)
+    q = np.roll(p, -1, axis=0)
+    crosses = (p[:, 1] > point[1]) != (q[:, 1] > point[1])
+    x = p[:, 0] + (point[1] - p[:, 1]) / np.where(q[:, 1] == p[:, 1], 1e-12, q[:, 1] - p[:, 1]) * (q[:, 0] - p[:, 0])
+    return bool(np.sum(crosses & (point[0] < x)) % 2)
+
+
+def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ...]:
+    """The lamps that are on: glowing faces of their placement where it has any, else bare bulbs."""
+    glow = glowing_faces(atlas)
+    lamps = []
+    for light in house.lights:
+        if not light.on or light.power <= 0:
+            continue
+        color = np.asarray(light.color, float)
+        corners = glow.get(light.placement or "", np.zeros((0, 3, 3)))
+        near = [x for x in house.lights if x.on and x.placement == light.placement]
+        if light.placement is not None and len(corners):
+            area = areas_of(corners)
+            total = float(area.sum())
+            radiance = color * light.power / _luminance(color) / (np.pi * total) / UNIT
+            if len(near) > 1:  # several bulbs in one fitting share its glowing faces
+                radiance = radiance * len(near) if light is near[0] else radiance * 0
+                if light is not near[0]:
+                    continue
+            at, n = _spread(corners, area, points)
+            lamps.append(Lamp(light.id, light.room, at, n, radiance, total, None))
+        else:
+            intensity = color * light.power / _luminance(color) / (4 * np.pi) / UNIT
+            shell = np.array([_ball(k, 24) for k in range(24)]) * 0.05 + np.asarray(light.position)
+            lamps.append(Lamp(light.id, light.room, shell, np.zeros((24, 3)), intensity, 1.0, light.placement))
+    return tuple(lamps)
+
+
+def glowing_faces(atlas: Atlas) -> dict[str, np.ndarray]:
+    """Owner to the triangles (m, 3, 3) whose finish emits."""
+    found: dict[str, list[np.ndarray]] = {}
+    for page in atlas.pages:
+        emits = np.array([f.emission is not None for f in page.finishes])[page.finish]
+        for o in np.unique(page.owner[emits]):
+            found.setdefault(atlas.owners[o], []).append(page.corners[emits & (page.owner == o)])
+    return {o: np.concatenate(c).astype(np.float64) for o, c in found.items()}
+
+
+def _luminance(color: np.ndarray) -> float:
+    return float(max(color @ [0.2126, 0.7152, 0.0722], 1e-3))
+
+
+def _spread(corners: np.ndarray, area: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """n points evenly over triangles by area, and their normals."""
+    cut = np.cumsum(area) / area.sum()
+    k = np.arange(n)
+    face = np.minimum(np.searchsorted(cut, (k + 0.5) / n), len(area) - 1)
+    u, v = np.sqrt((k * 0.7548776662466927 + 0.5) % 1), (k * 0.5698402909980532 + 0.5) % 1
+    w = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    return np.einsum("nk,nkc->nc", w, corners[face]), face_normals(corners)[face]
+
+
+def _ball(k: int, n: int) -> np.ndarray:
+    """Point k of n spread evenly over the unit sphere (Fibonacci lattice)."""
+    z = 1 - 2 * (k + 0.5) / n
+    return np.array([np.sqrt(1 - z * z) * np.cos(2.399963 * k), np.sqrt(1 - z * z) * np.sin(2.399963 * k), z])

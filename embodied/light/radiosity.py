@@ -1,0 +1,344 @@
+"""Light transport between luxels: direct light from sky, lamps and sun, then bounces.
+
+For every luxel we keep e = E / pi, so that a diffuse surface shows albedo * e. The luxel positions
+and all rays live in Mitsuba; no BSDF is ever evaluated, which is where the speed comes from.
+
+Source: steps 6 to 11 of the bake prototype's recipe; the last gather is final gathering over a
+radiosity solution (Reichert 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from embodied.light.atlas import Atlas, Texels
+from embodied.light.backend import array, constant, mitsuba, r2, scene_of, vector
+from embodied.light.emitters import GLASS, Lamp, Portal
+from embodied.light.unwrap import face_normals
+
+LIFT = 2e-3
+"""Metres by which rays start above their surface."""
+ENV_ROWS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Surface points on the device; n of them, Dr.Jit arrays."""
+
+    n: int
+    position: object
+    normal: object
+    face_normal: object
+    thin: object
+    turn0: object
+    turn1: object
+    """Per-point rotation of the sample sequences (Cranley and Patterson 1976)."""
+
+
+def points_of(position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, seed: int = 0) -> Points:
+    """Upload points; all arrays (n, 3) but `thin` (n,)."""
+    mi = mitsuba()
+    import drjit as dr
+
+    turn = np.random.default_rng(seed).random((2, len(position)), np.float32)
+    p = Points(len(position), mi.Point3f(vector(position)), vector(normal), vector(face_normal),
+               mi.Bool(np.ascontiguousarray(thin)), mi.Float(turn[0]), mi.Float(turn[1]))
+    dr.eval(p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
+    return p
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """The house as something rays can hit; faces in page order."""
+
+    scene: object
+    opaque_faces: np.ndarray
+    """(f,) int, position in page order of each face of `scene`; glass is left out."""
+    page: object
+    """Page of each face (device), then the same for:"""
+    luxel_xy: object
+    normal: object
+    thin: object
+    width: object
+    height: object
+    base: object
+    luxel_of: object
+    """Per page pixel the luxel to read: the pixel's own or the nearest one that is covered."""
+    env: object
+    """Outdoor radiance (ENV_ROWS x 2 ENV_ROWS pixels, flat RGB)."""
+
+
+def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray, hidden: frozenset[int] = frozenset()) -> Space:
+    """Upload the house.
+
+    Args:
+      luxels: what lies under each page at fineness 1.
+      env: outdoor radiance picture (h, 2h, 3).
+      hidden: numbers of owners to leave out.
+    """
+    mi = mitsuba()
+    corners = np.concatenate([p.corners for p in atlas.pages])
+    owner = np.concatenate([p.owner for p in atlas.pages])
+    page = np.concatenate([np.full(len(p.corners), i) for i, p in enumerate(atlas.pages)])
+    clear = np.array([p.glass for p in atlas.pages])[page] | np.isin(owner, sorted(hidden))
+    keep = np.nonzero(~clear)[0]
+    xy = np.concatenate([p.luxels for p in atlas.pages])[keep]
+    thin = np.concatenate([p.thin for p in atlas.pages])[keep]
+    sizes = np.array([p.width * p.height for p in atlas.pages])
+    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))  # noqa: E731
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    return Space(
+        scene_of(corners[keep]), keep, u32(page[keep]), flat(xy), flat(face_normals(corners[keep])),
+        mi.Bool(np.ascontiguousarray(thin)), u32([p.width for p in atlas.pages]), u32([p.height for p in atlas.pages]),
+        u32(np.cumsum(sizes) - sizes), u32(nearest_luxel(atlas, luxels)), flat(_small(env)),
+    )
+
+
+def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | None = None) -> np.ndarray:
+    """For every pixel of every page, in order, the number of the luxel to read there: its own or the nearest.
+
+    Args:
+      good: (n,) bool, luxels that may be read; all by default. A page without any keeps its own.
+    """
+    out, start = [], 0
+    for page, t in zip(atlas.pages, luxels):
+        n = len(t.index)
+        number = np.zeros(page.width * page.height, np.int64)
+        number[t.index] = start + np.arange(n)
+        mask = np.zeros(page.width * page.height, bool)
+        chosen = np.ones(n, bool) if good is None or not good[start : start + n].any() else good[start : start + n]
+        mask[t.index[chosen]] = True
+        mask = mask.reshape(page.height, page.width)
+        if mask.any():
+            y, x = distance_transform_edt(~mask, return_distances=False, return_indices=True)
+            number = number.reshape(mask.shape)[y, x].ravel()
+        out.append(number)
+        start += n
+    return np.concatenate(out)
+
+
+def env_lookup(space: Space, d, active=True):
+    """Outdoor radiance in direction `d`, bilinear in yaw and nearest in the few rows of the small picture."""
+    mi = mitsuba()
+    import drjit as dr
+
+    h, w = ENV_ROWS, 2 * ENV_ROWS
+    x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * w - 0.5
+    y = dr.clip(dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * h - 0.5, 0, h - 1.001)
+    x0, y0 = dr.floor(x), dr.floor(y)
+    fx, fy = x - x0, y - y0
+    xi = mi.UInt32(mi.Int32(x0) + w)
+    out = mi.Color3f(0.0)
+    for dx, wx in ((0, 1 - fx), (1, fx)):
+        for dy, wy in ((0, 1 - fy), (1, fy)):
+            out += dr.gather(mi.Color3f, space.env, (mi.UInt32(y0) + dy) * w + (xi + dx) % w, active) * (wx * wy)
+    return out
+
+
+def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> np.ndarray:
+    """(n, 3) e from the outdoors through one portal, by area sampling.
+
+    One sample is clamped at 4 / samples and the sum at full view of the portal: without it, things
+    a few centimetres from the glass turn into fireflies.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal))
+    area, share = constant(portal.area / np.pi / samples * GLASS), constant(4.0 / samples)
+    total, seen = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
+    for k in range(samples):
+        a, b = (constant(x) for x in r2(k))
+        a, b = p.turn0 + a, p.turn1 + b
+        q = corner + along * (a - dr.floor(a)) + up * (b - dr.floor(b))
+        d = q - p.position
+        far = dr.norm(d)
+        d /= dr.maximum(far, 1e-6)
+        cos, side, active = _facing(p, d)
+        leaving = -dr.dot(n, d)
+        active &= leaving > 0
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
+        blocked = space.scene.ray_test(ray, active)
+        g = dr.select(active & ~blocked, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0)
+        g = dr.minimum(g, share)
+        total += env_lookup(space, d, active) * g
+        seen += g
+        dr.eval(total, seen)
+    return array(total * dr.select(seen > 1, 1 / seen, 1))
+
+
+def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> np.ndarray:
+    """(n, 3) e from one lamp."""
+    mi = mitsuba()
+    import drjit as dr
+
+    bare = not lamp.normals.any()
+    count = len(lamp.points)
+    at = mi.Float(np.ascontiguousarray(lamp.points, np.float32).ravel())
+    out = mi.Float(np.ascontiguousarray(lamp.normals, np.float32).ravel())
+    strength = constant(lamp.area / np.pi / samples)
+    total = dr.zeros(mi.Float, p.n)
+    for k in range(samples):
+        pick = p.turn0 + constant(r2(k)[0])
+        i = dr.minimum(mi.UInt32((pick - dr.floor(pick)) * count), count - 1)
+        d = dr.gather(mi.Point3f, at, i) - p.position
+        far = dr.norm(d)
+        d /= dr.maximum(far, 1e-6)
+        cos, side, active = _facing(p, d)
+        if bare:
+            g = cos / dr.maximum(dr.square(far), 0.0025)
+        else:
+            leaving = -dr.dot(dr.gather(mi.Vector3f, out, i), d)
+            active &= leaving > 0
+            g = cos * leaving / dr.maximum(dr.square(far), 1e-4)
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - (4 * LIFT if not bare else 0.06), 0.0, [])
+        active &= ray.maxt > 0
+        total += dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), constant((4.0 if not bare else 400.0) / samples))
+        dr.eval(total)
+    e = np.asarray(total)
+    return (np.minimum(e, 1.0) if not bare else e)[:, None] * lamp.radiance.astype(np.float32)
+
+
+def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, directions: int, radius: float = 0.006) -> np.ndarray:
+    """(n,) cosine-weighted share of the sun's disc that a point sees through a portal.
+
+    Args:
+      directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
+      radius: of the disc, radians; a little over the real 0.0047 for soft edges at texel size.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    total = dr.zeros(mi.Float, p.n)
+    frame = mi.Frame3f(mi.Vector3f(*(float(x) for x in towards)))
+    for k in range(directions):
+        r, turn = (radius * np.sqrt((k + 0.5) / directions), k * 2.399963) if directions > 1 else (0.0, 0.0)
+        d = dr.normalize(frame.n + frame.s * constant(r * np.cos(turn)) + frame.t * constant(r * np.sin(turn)))
+        cos, side, active = _facing(p, d)
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
+        active &= portals_scene.ray_test(ray, active)
+        total += dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0)
+        dr.eval(total)
+    return np.asarray(total) / directions
+
+
+def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarray, flux: np.ndarray, extent: np.ndarray) -> np.ndarray:
+    """(n, 3) e from sunlit patches, each a small disc light, the same for all points and so free of noise.
+
+    Args:
+      position, normal: (k, 3). flux: (k, 3) radiosity times area. extent: (k,) area in square metres.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    total = dr.zeros(mi.Color3f, p.n)
+    for q, n, f, a in zip(position + normal * LIFT, normal, flux, extent):
+        d = mi.Point3f(*(constant(x) for x in q)) - p.position
+        far = dr.norm(d)
+        d /= dr.maximum(far, 1e-5)
+        cos, side, active = _facing(p, d)
+        leaving = -dr.dot(mi.Vector3f(*(constant(x) for x in n)), d)
+        active &= leaving > 0
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 3 * LIFT, 0.0, [])
+        g = cos * leaving / (dr.pi * dr.square(far) + constant(a))
+        total += mi.Color3f(*(constant(x) for x in f)) * dr.select(active & ~space.scene.ray_test(ray, active), g, 0.0)
+        dr.eval(total)
+    return array(total)
+
+
+def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of what cosine-distributed rays meet.
+
+    Args:
+      radiosity: (n luxels, 3) of the whole house.
+      first: index of the first point of the R2 sequence, so that rounds differ.
+
+    Returns:
+      (n, 3) e, and (n,) share of rays that met a back face or something nearer than 12 mm.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    b = mi.Float(np.ascontiguousarray(radiosity, np.float32).ravel())
+    total, bad = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
+    for k in range(samples):
+        u0, u1 = (constant(x) for x in r2(k + first))
+        u = mi.Point2f(p.turn0 + u0, p.turn1 + u1)
+        side = dr.select(p.thin & (constant(k % 2) > 0.5), -1.0, 1.0)
+        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+        out = p.face_normal * side
+        rise = dr.dot(d, out)
+        d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
+        luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position + out * LIFT, d))
+        total += dr.gather(mi.Color3f, b, luxel, hit & front)
+        bad += dr.select(hit & (~front | near), 1.0, 0.0)
+        dr.eval(total, bad)
+    return array(total) / samples, np.asarray(bad) / samples
+
+
+def hit_luxel(space: Space, ray, active=True):
+    """Luxel number where a ray hits, whether it hits, whether from the front, whether nearer than 12 mm."""
+    mi = mitsuba()
+    import drjit as dr
+
+    h = space.scene.ray_intersect_preliminary(ray, False, active)
+    hit = h.is_valid() & active
+    f = h.prim_index
+    page = dr.gather(mi.UInt32, space.page, f, hit)
+    b1, b2 = h.prim_uv.x, h.prim_uv.y
+    at = lambda c: dr.gather(mi.Point2f, space.luxel_xy, f * 3 + c, hit)  # noqa: E731
+    q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
+    w, height = dr.gather(mi.UInt32, space.width, page, hit), dr.gather(mi.UInt32, space.height, page, hit)
+    x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
+    y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
+    luxel = dr.gather(mi.UInt32, space.luxel_of, dr.gather(mi.UInt32, space.base, page, hit) + y * w + x, hit)
+    n = dr.gather(mi.Normal3f, space.normal, f, hit)
+    front = (dr.dot(n, ray.d) < 0) | dr.gather(mi.Bool, space.thin, f, hit)
+    return luxel, hit, front, h.t < 0.012
+
+
+def portal_scene(portals: Sequence[Portal]):
+    """The portals alone, as something the sun's rays can be asked about."""
+    quads = []
+    for p in portals:
+        a, b, c, d = p.corner, p.corner + p.along, p.corner + p.along + p.up, p.corner + p.up
+        quads += [[a, b, c], [a, c, d]]
+    return scene_of(np.array(quads))
+
+
+def reached(units: np.ndarray, sees: Callable[[np.ndarray], np.ndarray], *, tries: int = 300) -> np.ndarray:
+    """Which luxels a light may reach: whole units (rooms, openings), left out when no tried luxel of them is reached.
+
+    Args:
+      units: (n,) unit number of each luxel.
+      sees: luxel numbers to whether each is reached.
+
+    Returns:
+      Luxel numbers in rising order.
+    """
+    rng = np.random.default_rng(0)
+    order = np.argsort(units, kind="stable")
+    groups = np.split(order, np.nonzero(np.diff(units[order]))[0] + 1)
+    tried = [g if len(g) <= tries else rng.choice(g, tries, replace=False) for g in groups]
+    hit = np.split(sees(np.concatenate(tried)), np.cumsum([len(t) for t in tried])[:-1])
+    return np.sort(np.concatenate([g for g, h in zip(groups, hit) if h.any()] or [np.zeros(0, np.int64)]))
+
+
+def _facing(p: Points, d):
+    """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
+    import drjit as dr
+
+    cos, flat = dr.dot(p.normal, d), dr.dot(p.face_normal, d)
+    cos = dr.select(p.thin, dr.abs(cos) * 0.5, cos)
+    side = dr.select(p.thin, dr.sign(flat), 1.0)
+    return cos, side, (cos > 0) & (p.thin | (flat > 0))
+
+
+def _small(env: np.ndarray) -> np.ndarray:
+    h = env.shape[0]
+    k = h // ENV_ROWS
+    return env[: k * ENV_ROWS, : 2 * k * ENV_ROWS].reshape(ENV_ROWS, k, 2 * ENV_ROWS, k, 3).mean((1, 3))

@@ -1,0 +1,255 @@
+"""From an atlas to light: every luxel's e, by stages that can be kept on disk and taken up again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from embodied.house import House
+from embodied.light import denoise, radiosity
+from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
+from embodied.light.emitters import Lamp, Portal, lamps_of, portals_of
+from embodied.light.radiosity import Points, Space, points_of
+from embodied.light.settings import Settings
+from embodied.light.sky import Outdoors
+from embodied.light.unwrap import areas_of
+
+AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
+"""e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
+
+
+@dataclass(frozen=True, eq=False)
+class Luxels:
+    """All luxels of a house in page order; n of them."""
+
+    texels: tuple[Texels, ...]
+    position: np.ndarray
+    normal: np.ndarray
+    face_normal: np.ndarray
+    """(n, 3) float32 each."""
+    thin: np.ndarray
+    """(n,) bool."""
+    albedo: np.ndarray
+    """(n, 3) float32."""
+    glow: np.ndarray
+    """(n, 3) float32 radiance of what shines itself."""
+    sampled: np.ndarray
+    """(n,) bool, glow that lamps already account for."""
+    area: np.ndarray
+    """(n,) square metres."""
+    owner: np.ndarray
+    """(n,) int32 into Atlas.owners."""
+    unit: np.ndarray
+    """(n,) int32: room or opening, for leaving out lights that cannot reach."""
+    shell: np.ndarray
+    """(n,) bool: walls, floors and ceilings."""
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """What reaches each luxel: (n, 3) float32 each, radiosity e = E / pi in 100 cd/m2."""
+
+    direct: np.ndarray
+    """From sky and lamps."""
+    sun: np.ndarray
+    """(n,) cosine-weighted share of the sun seen."""
+    patches: np.ndarray
+    """First bounce of the sun."""
+    indirect: np.ndarray
+    """All other bounces."""
+    good: np.ndarray
+    """(n,) bool; false inside or behind things."""
+
+    @property
+    def soft(self) -> np.ndarray:
+        """All but the sun itself."""
+        return self.direct + self.patches + self.indirect
+
+
+def luxels_of(house: House, atlas: Atlas, lamps: Sequence[Lamp], read: Callable[[str], np.ndarray]) -> Luxels:
+    """What lies under every luxel."""
+    texels = tuple(rasterise(p, 1) for p in atlas.pages)
+    color, glow, thin, area, owner = [], [], [], [], []
+    for page, t in zip(atlas.pages, texels):
+        color.append(albedo(page, t, read))
+        glow.append(glow_of(house, atlas, page, t, lamps))
+        thin.append(page.thin[t.face])
+        flat = areas_of(np.pad(page.luxels, ((0, 0), (0, 0), (0, 1))))
+        area.append((areas_of(page.corners) / np.maximum(flat, 1e-6)).astype(np.float32)[t.face])
+        owner.append(page.owner[t.face])
+    owner_of = np.concatenate(owner)
+    units = {}
+    for o, room, kind in zip(atlas.owners, atlas.rooms, atlas.kinds):
+        units.setdefault(o.split("/")[0] if kind == "opening" else room, len(units))
+    unit_of_owner = np.array([units[o.split("/")[0] if k == "opening" else r] for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)])
+    shell_of_owner = np.array([k in SHELL for k in atlas.kinds])
+    lit = {x.id for x in lamps}
+    sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
+    glow_all = np.concatenate(glow)
+    return Luxels(
+        texels, *(np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")),
+        np.concatenate(thin), np.concatenate(color), glow_all, sampled[owner_of] & (glow_all.sum(1) > 0),
+        np.concatenate(area), owner_of, unit_of_owner[owner_of].astype(np.int32), shell_of_owner[owner_of],
+    )
+
+
+def glow_of(house: House, atlas: Atlas, page, texels: Texels, lamps: Sequence[Lamp]) -> np.ndarray:
+    """(n, 3) radiance that texels of `page` give off themselves."""
+    emission = np.array([f.emission or (0.0, 0.0, 0.0) for f in page.finishes], np.float32)[page.finish[texels.face]]
+    out = np.zeros_like(emission)
+    if not emission.any():
+        return out
+    by_light = {x.id: x for x in lamps}
+    for o in np.unique(page.owner):
+        name = atlas.owners[o]
+        mine = (page.owner[texels.face] == o) & (emission.sum(1) > 0)
+        lights = [x for x in house.lights if x.placement == name]
+        if not lights:  # screens, stars on a nursery ceiling: they glow by themselves
+            out[mine] = emission[mine]
+        for x in lights:
+            if x.id in by_light:
+                out[mine] = by_light[x.id].radiance
+    return out
+
+
+def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Portal], lamps: Sequence[Lamp],
+                 settings: Settings, env: np.ndarray, tell: Callable[[float], None]) -> np.ndarray:
+    """(n, 3) e from sky and lamps."""
+    e = np.zeros((len(lux.position), 3), np.float32)
+    jobs: list[tuple[Space, Callable]] = []
+    for portal in portals:
+        jobs.append((space, lambda s, p, r, x=portal: radiosity.sky_light(s, p, x, r or settings.sky_rays)))
+    for lamp in lamps:
+        own = space
+        if lamp.owner is not None and lamp.owner in atlas.owners:
+            own = radiosity.space_of(atlas, lux.texels, env, frozenset({atlas.owners.index(lamp.owner)}))
+        jobs.append((own, lambda s, p, r, x=lamp: radiosity.lamp_light(s, p, x, r or settings.lamp_rays)))
+    for done, (where, shine) in enumerate(jobs):
+        tell(done / len(jobs))
+        mine = radiosity.reached(lux.unit, lambda i: shine(where, subset(lux, i), 4).sum(1) > 0)
+        if len(mine):
+            e[mine] += shine(where, subset(lux, mine), 0)
+    return e
+
+
+def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: int = 24) -> np.ndarray:
+    """(n, 3) e that the outer side of windows and outer doors takes from the open sky."""
+    import drjit as dr
+
+    from embodied.light.backend import array, constant, mitsuba, r2
+
+    mi = mitsuba()
+    e = np.zeros((len(lux.position), 3), np.float32)
+    outer = {o.id for o in house.openings if None in o.rooms}
+    of_outer = np.array([k == "opening" and o.split("/")[0] in outer for o, k in zip(atlas.owners, atlas.kinds)])
+    mine = np.nonzero(of_outer[lux.owner])[0]
+    if not len(mine):
+        return e
+    p = subset(lux, mine)
+    total = dr.zeros(mi.Color3f, p.n)
+    portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
+    for k in range(samples):
+        a, b = (constant(x) for x in r2(k))
+        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+        ray = mi.Ray3f(p.position + p.face_normal * radiosity.LIFT, d)
+        free = ~space.scene.ray_test(ray) & ~portals.ray_test(ray)
+        total += dr.select(free, radiosity.env_lookup(space, d, free), mi.Color3f(0.0))
+        dr.eval(total)
+    e[mine] = array(total) / samples
+    return e
+
+
+def _nowhere() -> Portal:
+    return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Outdoors, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) share of the sun, and (n, 3) e of its first bounce."""
+    n = len(lux.position)
+    if not portals or not outdoors.sun.any():
+        return np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
+    share = radiosity.sun_share(space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4)
+    flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
+    power = flux.mean(1) * ~lux.thin
+    e = np.zeros((n, 3), np.float32)
+    for unit in np.unique(lux.unit[power > 0]):
+        mine = np.nonzero((lux.unit == unit) & (power > 0))[0]
+        at = np.round(lux.position[mine] * 4)
+        mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
+        cut = np.cumsum(power[mine])
+        if cut[-1] < 1e-4:
+            continue
+        k = int(np.clip(settings.patches * min(1.0, len(mine) / 2000 + 0.1), 4, settings.patches))
+        pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
+        strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
+        extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
+        one = lambda i: radiosity.patch_light(  # noqa: E731
+            space, subset(lux, i), lux.position[pick], lux.normal[pick], strength, extent)
+        reach = radiosity.reached(lux.unit, lambda i: one(i).sum(1) > 0)
+        if len(reach):
+            e[reach] += one(reach)
+    return share, e
+
+
+def bounce(lux: Luxels, space: Space, light: Light, settings: Settings, tell: Callable[[float], None]) -> Light:
+    """All further bounces, by Jacobi rounds of gathering."""
+    everywhere = subset(lux, np.arange(len(lux.position)))
+    glow = np.where(lux.sampled[:, None], 0.0, lux.glow)
+    first, total = 0, sum(settings.bounces)
+    for samples in settings.bounces:
+        tell(first / total)
+        seen = lux.albedo * (light.soft + AMBIENT) + glow
+        e, bad = radiosity.gather(space, everywhere, seen, samples, first)
+        light = replace(light, indirect=e, good=bad < 0.5)
+        first += samples
+    return light
+
+
+def smooth(lux: Luxels, atlas: Atlas, light: Light) -> Light:
+    """Noise taken out of all but the sun; luxels that are not good take their neighbours' light."""
+    soft = ~lux.shell
+    near = denoise.neighbours(lux.position, lux.normal, light.good, soft)
+    pages = lambda e, steps, like: denoise.smooth_pages(e, atlas, lux.texels, light.good, lux.shell, steps=steps, likeness=like)  # noqa: E731
+    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)  # noqa: E731
+    indirect = space(pages(light.indirect, (1, 2, 4, 8, 16), 0.35), 3, 0.8)
+    direct = space(pages(light.direct, (1, 2, 4), 0.2), 2, 0.45)
+    total = direct + indirect + light.patches
+    if soft.any():
+        indirect = indirect + np.minimum(denoise.lift_specks(total, near, soft) - total, np.inf)
+    return replace(light, direct=direct, indirect=np.maximum(indirect, 0.0))
+
+
+def subset(lux: Luxels, i: np.ndarray) -> Points:
+    """Some luxels on the device."""
+    return points_of(lux.position[i], lux.normal[i], lux.face_normal[i], lux.thin[i])
+
+
+def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Sequence[Lamp], settings: Settings,
+          stage: Callable[[str, Callable[[], dict]], dict], tell: Callable[[str, float], None]) -> Light:
+    """The light of a house.
+
+    Args:
+      stage: runs a named step that returns arrays, or gives back what it returned in an earlier, interrupted run.
+    """
+    portals = portals_of(house)
+    space = radiosity.space_of(atlas, lux.texels, outdoors.picture)
+    n = len(lux.position)
+    zero = np.zeros((n, 3), np.float32)
+    direct = stage("direct", lambda: {
+        "e": direct_light(lux, atlas, space, portals, lamps, settings, outdoors.picture, lambda x: tell("direct light", x)),
+        "outer": outer_light(house, lux, atlas, space)})
+    sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
+    light = Light(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool))
+
+    def gathered() -> dict:
+        done = bounce(lux, space, light, settings, lambda x: tell("bounces", x))
+        return {"e": done.indirect, "good": done.good}
+
+    bounced = stage("bounces", gathered)
+    light = replace(light, indirect=bounced["e"], good=bounced["good"])
+    tell("smoothing", 0.0)
+    light = smooth(lux, atlas, light)
+    return replace(light, indirect=light.indirect + direct["outer"])

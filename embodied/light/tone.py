@@ -1,0 +1,103 @@
+"""From light to picture: exposure and white balance that adapt from room to room, and the film curve.
+
+A camera carried through a house adapts to each room. Here every point in space has a gain per
+colour channel that changes smoothly through doors and openings, so that textures lit once can be
+shown with it and never show a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from embodied.house import House
+from embodied.light.atlas import gamma
+
+TARGET = 1.1
+"""Linear value (before the curve) that a white sheet in a room's middle light is brought to."""
+ADAPT = 0.85
+"""How far exposure follows a room's own light rather than the house's."""
+BALANCE = 0.62
+"""How far white balance takes out the colour of the light."""
+BLEND = 0.45
+"""Metres over which one room's gain turns into the next one's."""
+DARKEST = 2e-3
+"""Light of a room (100 cd/m2) below which exposure follows no more: by moonlight rooms stay dark."""
+WHITE = 4.0
+"""Value that the curve brings to full white."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """Gains over space."""
+
+    polygons: tuple[tuple[tuple[float, float], ...], ...]
+    levels: np.ndarray
+    """(r, 2) float, lowest and highest z of each room."""
+    gains: np.ndarray
+    """(r, 3) float, linear."""
+    outdoors: np.ndarray
+    """(3,) gain of what is seen through windows."""
+
+    def at(self, position: np.ndarray) -> np.ndarray:
+        """(n, 3) float32 gains at points (n, 3)."""
+        position = np.asarray(position, float)
+        cells, index = np.unique(np.round(position / [0.1, 0.1, 0.5]).astype(int), axis=0, return_inverse=True)
+        centres = cells * [0.1, 0.1, 0.5]
+        points = shapely.points(centres[:, :2])
+        log, weight = np.zeros((len(cells), 3)), np.zeros((len(cells), 1))
+        for polygon, (low, high), gain in zip(self.polygons, self.levels, self.gains):
+            flat = shapely.distance(shapely.Polygon(polygon), points)
+            z = np.maximum(np.maximum(low - centres[:, 2], centres[:, 2] - high), 0.0)
+            w = np.exp(-0.5 * ((flat**2 + z**2) / BLEND**2))[:, None] + 1e-12
+            log, weight = log + w * np.log(gain), weight + w
+        return np.exp(log / weight)[index.reshape(-1)].astype(np.float32)
+
+
+def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> Exposure:
+    """Set the gains.
+
+    Args:
+      light: room id to (3,) middle e of its walls and floor.
+      outside: (3,) middle radiance of what windows show.
+    """
+    e = np.array([light[r.id] for r in house.rooms])
+    y = e @ [0.2126, 0.7152, 0.0722]
+    middle = np.exp(np.mean(np.log(np.maximum(y, DARKEST))))
+    level = np.maximum(y, DARKEST) ** ADAPT * middle ** (1 - ADAPT)
+    gains = np.stack([_gain(c, l) for c, l in zip(e, level)])
+    storeys = [house.storey_of(r) for r in house.rooms]
+    levels = np.array([(s.elevation, s.elevation + s.height) for s in storeys])
+    out_y = float(outside @ [0.2126, 0.7152, 0.0722])
+    inside = float(np.median(gains.mean(1)))
+    # a picture's windows are brighter than its walls but hold their detail by day; at night they are dark
+    wanted = np.clip(0.75 * (out_y * inside) ** 0.25, 0.05, 1.3)
+    return Exposure(tuple(r.polygon for r in house.rooms), levels, gains, np.full(3, wanted / max(out_y, 1e-6)))
+
+
+def _gain(light: np.ndarray, level: float) -> np.ndarray:
+    hue = np.maximum(light / max(light @ [0.2126, 0.7152, 0.0722], 1e-6), 0.05)
+    gain = TARGET / level * hue**-BALANCE
+    return gain / (gain @ (hue * [0.2126, 0.7152, 0.0722])) * (TARGET / level)
+
+
+def develop(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """Radiance times gain as sRGB in [0, 1]: extended Reinhard, half on luminance and half per channel.
+
+    Source: Reinhard et al. 2002, eq. 4, with white at `WHITE`.
+    """
+    x = np.asarray(radiance, np.float32) * np.asarray(gain, np.float32)
+    y = np.maximum(x @ np.array([0.2126, 0.7152, 0.0722], np.float32), 1e-9)[..., None]
+    by_luminance = x * (_curve(y) / y)
+    return gamma(0.5 * (np.minimum(by_luminance, 1.0) + _curve(x)) * np.float32(1.12))
+
+
+def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """`develop` as uint8."""
+    return (develop(radiance, gain) * 255 + 0.5).astype(np.uint8)
+
+
+def _curve(x: np.ndarray) -> np.ndarray:
+    return x * (1 + x / np.float32(WHITE**2)) / (1 + x)
