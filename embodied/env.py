@@ -28,7 +28,7 @@ from embodied.interface import (
     Stop,
     Task,
 )
-from embodied.moves import Moves, PanoramicMoves
+from embodied.moves import Moves, PanoramicMoves, Reach
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class HelpEnv:
         self.time = self.time_on_task = self.requests = 0
         self.budget = self._budget()
         self.ended = None
-        self._steps = []
+        self._steps, self._trail = [], []
         self._begin()
         return self._look()
 
@@ -157,6 +157,10 @@ class HelpEnv:
             return ()
         return self.assistant.intentions(situation)
 
+    def _reachable(self) -> Reach:
+        """What the next move can reach from here."""
+        return self.moves.at(self.world, self.pose)
+
     def _cost(self, action: Action) -> float:
         return 0.0
 
@@ -182,18 +186,21 @@ class HelpEnv:
         return whole
 
     def _look(self) -> Observation:
-        self._reach = self.moves.at(self.world, self.pose)
+        self._reach = self._reachable()
         candidates, poses = self._reach
+        if len(self._trail) <= self.time:
+            self._trail.append(self.pose.node)
+        left = None if self.budget is None else max(self.budget - self.requests, 0)
         self.situation = Situation(
             self.world, self.task, self.pose, self.mode, self.targets, self.subtask,
-            tuple(p.node for p in poses), candidates, self.time, self.requests, self._stack(),
+            tuple(p.node for p in poses), candidates, self.time, self.requests, left,
+            tuple(self._trail), self._stack(),
         )
         state, goals = self._descriptions()
         self.observation = Observation(
             Sight(self.task.world, self.pose.node), self.pose.turn, self.pose.tilt, candidates, self.instruction,
             self.target, self.mode, self._askable(self.situation),
-            None if self.budget is None else max(self.budget - self.requests, 0),
-            self.time, self.time_on_task, state, goals,
+            left, self.time, self.time_on_task, state, goals,
         )
         return self.observation
 

@@ -333,6 +333,10 @@ class Situation:
     time: int
     requests: int
     """Requests made so far."""
+    requests_left: int | None = None
+    """Remaining request budget; None without a budget."""
+    trail: tuple[int, ...] = ()
+    """Node at the beginning of every navigation step so far, the current one last."""
     goals: tuple[int, ...] = ()
     """HARI: the true goal nodes on the stack, top last."""
 
