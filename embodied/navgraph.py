@@ -1,0 +1,328 @@
+"""The navigation graph: viewpoints at eye height, joined where a person walks straight and sees the other end."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+
+from assets.cache import write_bytes
+from embodied.house import DOORS, House, HouseError
+from embodied.walkable import EYE, free_floor, sight_floor
+
+RADIUS = 0.2
+"""Radius of the agent's body, metres."""
+CELL = 0.1
+"""Grid on which viewpoints are chosen, metres."""
+LONGEST = 2.3
+"""Longest edge in units of the wanted spacing."""
+
+
+@dataclass(frozen=True, eq=False)
+class NavGraph:
+    """Viewpoints and the straight walks between them."""
+
+    positions: np.ndarray
+    """(n, 3) float64, metres, world: the eye, 1.5 m above the floor."""
+    ids: tuple[str, ...]
+    room_of_node: tuple[str, ...]
+    edges: np.ndarray
+    """(m, 2) int64, i < j, sorted."""
+    lengths: np.ndarray
+    """(m,) float64, metres."""
+    distance: np.ndarray
+    """(n, n) float64: length of the shortest path, metres."""
+    next_hop: np.ndarray
+    """(n, n) int64: the node after i on the shortest path from i to j; i where i == j."""
+
+    def neighbours(self, node: int) -> tuple[int, ...]:
+        """Nodes one edge away, ascending."""
+        a, b = self.edges.T
+        return tuple(sorted(int(k) for k in np.concatenate([b[a == node], a[b == node]])))
+
+    def path(self, start: int, goal: int) -> tuple[int, ...]:
+        """Nodes of the shortest path, both ends included."""
+        nodes = [start]
+        while nodes[-1] != goal:
+            nodes.append(int(self.next_hop[nodes[-1], goal]))
+        return tuple(nodes)
+
+
+def graph_of(positions: np.ndarray, edges: np.ndarray, ids: tuple[str, ...], rooms: tuple[str, ...]) -> NavGraph:
+    """A NavGraph from its nodes and edges.
+
+    Args:
+      positions: (n, 3) float, metres, world.
+      edges: (m, 2) int node pairs.
+
+    Raises:
+      HouseError: the graph is not connected.
+    """
+    positions = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
+    n = len(positions)
+    edges = np.unique(np.sort(np.asarray(edges, dtype=np.int64).reshape(-1, 2), axis=1), axis=0)
+    lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+    matrix = csr_matrix((lengths, edges.T), shape=(n, n))
+    distance, before = dijkstra(matrix, directed=False, return_predecessors=True)
+    if not np.isfinite(distance).all():
+        lone = [ids[k] for k in np.flatnonzero(~np.isfinite(distance[0]))[:5]]
+        raise HouseError(f"navigation graph is not connected: {lone} cannot be reached from {ids[0]!r}")
+    distance = (distance + distance.T) / 2
+    next_hop = before.T.astype(np.int64).copy()
+    np.fill_diagonal(next_hop, np.arange(n))
+    return NavGraph(positions, tuple(ids), tuple(rooms), edges, lengths, distance, next_hop)
+
+
+def build_graph(house: House, catalogue: object | None = None, spacing: float = 2.25) -> NavGraph:
+    """The house's viewpoints, about `spacing` metres apart, joined where one walks straight.
+
+    A node or an edge keeps the agent's radius from walls, leaves and everything that stands between
+    4 cm and 1.8 m above the floor; placements count with their rotated bounding rectangles. A line so
+    free is also a free line of sight at eye height. Deterministic: nothing is drawn.
+
+    Raises:
+      HouseError: a room that cannot be entered on foot.
+    """
+    positions, rooms, edges = [], [], []
+    for storey in range(len(house.storeys)):
+        xy, room, pairs = _storey_graph(house, storey, spacing)
+        edges += [(a + len(positions), b + len(positions)) for a, b in pairs]
+        positions += [(x, y, house.storeys[storey].elevation + EYE) for x, y in xy]
+        rooms += room
+    ids = tuple(f"v{k:03d}" for k in range(len(positions)))
+    return graph_of(np.round(positions, 4), np.asarray(edges), ids, tuple(rooms))
+
+
+def walkable(house: House, storey: int = 0) -> shapely.Geometry:
+    """Where the agent's centre may be: the free floor shrunk by its radius."""
+    return free_floor(house, storey).buffer(-(RADIUS + 0.005), quad_segs=6)
+
+
+def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list[str], list[tuple[int, int]]]:
+    space = walkable(house, storey)
+    rooms = [r for r in house.rooms if r.storey == storey]
+    space = _reachable_part(space, rooms)
+    shapely.prepare(space)
+    grid = _Grid(space)
+    room_of_cell = np.full(len(grid.xy), -1)
+    for k, r in enumerate(rooms):
+        polygon = shapely.Polygon(r.polygon)
+        shapely.prepare(polygon)
+        room_of_cell[shapely.contains_xy(polygon, grid.xy[:, 0], grid.xy[:, 1])] = k
+    nodes = _spread(grid, room_of_cell, len(rooms), spacing)
+    nodes = _join(house, storey, space, grid, nodes, spacing)
+    xy = grid.xy[nodes]
+    pairs = _pruned(xy, _visible_pairs(space, xy, LONGEST * spacing))
+    polygons = [shapely.Polygon(r.polygon) for r in rooms]
+    names = [rooms[int(np.argmin([p.distance(shapely.Point(q)) for p in polygons]))].id for q in xy]
+    return xy.tolist(), names, pairs
+
+
+def _reachable_part(space: shapely.Geometry, rooms) -> shapely.Polygon:
+    """The connected part of the free space that enters every room."""
+    parts = sorted(getattr(space, "geoms", [space]), key=lambda g: -g.area)
+    inner = [shapely.Polygon(r.polygon).buffer(-0.25, join_style="mitre") for r in rooms]
+    best = max(parts, key=lambda g: sum(g.intersects(p) for p in inner), default=None)
+    if best is None:
+        raise HouseError("the house has no free floor at all; remove furniture")
+    for r, p in zip(rooms, inner):
+        if not best.intersects(p):
+            raise HouseError(f"room {r.id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
+                             "widen its door or move the furniture that blocks it")
+    return best
+
+
+class _Grid:
+    """Cell centres inside the free space and how far each is from its border."""
+
+    def __init__(self, space: shapely.Polygon) -> None:
+        x0, y0, x1, y1 = space.bounds
+        self.x0, self.y0 = np.floor(x0 / CELL) * CELL, np.floor(y0 / CELL) * CELL
+        nx, ny = int(np.ceil((x1 - self.x0) / CELL)) + 1, int(np.ceil((y1 - self.y0) / CELL)) + 1
+        cx, cy = self.x0 + CELL * np.arange(nx), self.y0 + CELL * np.arange(ny)
+        gx, gy = np.meshgrid(cx, cy, indexing="ij")
+        self.inside = shapely.contains_xy(space, gx, gy)
+        self.index = np.full(self.inside.shape, -1)
+        self.index[self.inside] = np.arange(int(self.inside.sum()))
+        self.xy = np.round(np.stack([gx[self.inside], gy[self.inside]], axis=1), 4)
+        padded = np.pad(self.inside, 1)
+        self.clearance = (distance_transform_edt(padded)[1:-1, 1:-1] * CELL)[self.inside]
+
+    def matrix(self) -> csr_matrix:
+        """Sparse 8-neighbour graph of the cells, dearer near obstacles."""
+        rows, cols, costs = [], [], []
+        for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            a = self.index[: self.index.shape[0] - dx, max(0, -dy): self.index.shape[1] - max(0, dy)]
+            b = self.index[dx:, max(0, dy): self.index.shape[1] + min(0, dy)]
+            both = (a >= 0) & (b >= 0)
+            i, j = a[both], b[both]
+            rows.append(i)
+            cols.append(j)
+            near = np.minimum(self.clearance[i], self.clearance[j])
+            costs.append(CELL * np.hypot(dx, dy) * (1.0 + 0.6 * np.exp(-near / 0.2)))
+        n = len(self.xy)
+        return csr_matrix((np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
+
+
+def _spread(grid: _Grid, room_of_cell: np.ndarray, rooms: int, spacing: float) -> list[int]:
+    """Cells of the viewpoints: in each room first its calmest spot, then a loose packing of the rest."""
+    chosen: list[int] = []
+    apart = 0.86 * spacing
+    for k in range(rooms):
+        cells = np.flatnonzero(room_of_cell == k)
+        if len(cells) == 0:
+            continue
+        xy, calm = grid.xy[cells], np.minimum(grid.clearance[cells], 0.5)
+        gap = np.full(len(cells), np.inf)
+        elsewhere = np.full(len(cells), np.inf)
+        if chosen:
+            elsewhere = cKDTree(grid.xy[chosen]).query(xy)[0]
+        middle = xy.mean(0)
+        value = 2.0 * calm - 0.15 * np.hypot(*(xy - middle).T) + 0.2 * np.minimum(elsewhere, 1.2)
+        if len(cells) > 400:
+            value = 2.0 * calm + 0.05 * np.hypot(*(xy - middle).T) + 0.2 * np.minimum(elsewhere, 1.2)
+        best = int(np.argmax(value))
+        while True:
+            chosen.append(int(cells[best]))
+            gap = np.minimum(gap, np.hypot(*(xy - xy[best]).T))
+            open_ = (gap >= apart) & (elsewhere >= 0.45 * apart)
+            if not open_.any():
+                break
+            # next: close to the wanted distance from what is there, well clear of obstacles
+            value = np.where(open_, 1.5 * calm - 0.6 * np.abs(gap - apart * 1.05), -np.inf)
+            best = int(np.argmax(value))
+    return chosen
+
+
+def _visible_pairs(space: shapely.Polygon, xy: np.ndarray, longest: float) -> np.ndarray:
+    """(m, 2) pairs of points within `longest` metres whose straight line stays in `space`."""
+    pairs = cKDTree(xy).query_pairs(longest, output_type="ndarray")
+    if len(pairs) == 0:
+        return pairs.reshape(0, 2)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    lines = shapely.linestrings(xy[pairs])
+    return pairs[shapely.covers(space, lines)]
+
+
+def _pruned(xy: np.ndarray, pairs: np.ndarray) -> list[tuple[int, int]]:
+    """Drop long edges that a detour over one node nearly replaces, as the sparse Matterport graphs do."""
+    lengths = np.hypot(*(xy[pairs[:, 0]] - xy[pairs[:, 1]]).T)
+    near: list[dict[int, float]] = [{} for _ in xy]
+    for (a, b), d in zip(pairs.tolist(), lengths.tolist()):
+        near[a][b] = near[b][a] = d
+    kept = []
+    for (a, b), d in sorted(zip(map(tuple, pairs.tolist()), lengths.tolist()), key=lambda e: (-e[1], e[0])):
+        around = [near[a][k] + near[b][k] for k in near[a] if k in near[b] and max(near[a][k], near[b][k]) < 0.98 * d]
+        if around and min(around) < 1.05 * d:
+            del near[a][b], near[b][a]
+        else:
+            kept.append((a, b))
+    return sorted(kept)
+
+
+def _join(house: House, storey: int, space, grid: _Grid, nodes: list[int], spacing: float) -> list[int]:
+    """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
+    ids = {r.id for r in house.rooms if r.storey == storey}
+    tree = cKDTree(grid.xy)
+    longest = LONGEST * spacing
+    for o in house.openings:
+        if o.kind not in DOORS or o.rooms[1] is None or o.rooms[0] not in ids:
+            continue
+        xy = grid.xy[nodes]
+        label = _components(space, xy, longest)
+        if label.max() == 0:
+            return nodes
+        gap, cell = tree.query((np.asarray(o.a) + np.asarray(o.b)) / 2)
+        if gap > 0.2:
+            continue
+        cell = int(cell)
+        close = np.flatnonzero(np.hypot(*(xy - grid.xy[cell]).T) < longest)
+        seen = close[shapely.covers(space, shapely.linestrings([(grid.xy[cell], xy[k]) for k in close]))] if (
+            len(close)) else close
+        if len(np.unique(label[seen])) > 1:
+            nodes = [*nodes, cell]
+    matrix = None
+    for _ in range(len(nodes)):
+        xy = grid.xy[nodes]
+        label = _components(space, xy, longest)
+        if label.max() == 0:
+            return nodes
+        matrix = grid.matrix() if matrix is None else matrix
+        nodes = [*nodes, *_bridge(space, grid, matrix, nodes, label, spacing)]
+    raise HouseError("viewpoints could not be connected although the floor is; this is a defect of build_graph")
+
+
+def _components(space, xy: np.ndarray, longest: float) -> np.ndarray:
+    pairs = _visible_pairs(space, xy, longest)
+    return connected_components(csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(xy), len(xy))), directed=False)[1]
+
+
+def _bridge(space, grid: _Grid, matrix: csr_matrix, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
+    """New cells along the cheapest way from the smallest component to the nearest other node."""
+    sizes = np.bincount(label)
+    small = int(np.argmin(sizes))
+    inside = [n for n, k in zip(nodes, label) if k == small]
+    others = np.array([n for n, k in zip(nodes, label) if k != small])
+    cost, before, _ = dijkstra(matrix, directed=False, indices=inside, min_only=True, return_predecessors=True)
+    way = [int(others[np.argmin(cost[others])])]
+    while way[-1] not in inside:
+        way.append(int(before[way[-1]]))
+    added = []
+    at = 0
+    while True:
+        ends = np.arange(len(way) - 1, at, -1)
+        lines = shapely.linestrings([(grid.xy[way[at]], grid.xy[way[k]]) for k in ends])
+        ok = shapely.covers(space, lines) & (shapely.length(lines) < LONGEST * spacing)
+        far = int(ends[np.argmax(ok)]) if ok.any() else at + 1
+        if far == len(way) - 1:
+            return added or [way[len(way) // 2]]
+        added.append(way[far])
+        at = far
+
+
+def to_matterport(graph: NavGraph, path: Path) -> None:
+    """Write the graph as Matterport3DSimulator's `<scan>_connectivity.json`.
+
+    Per viewpoint: image_id, pose (16 floats, row-major camera-to-world, translation at 3, 7, 11), included,
+    visible, unobstructed, height; 'room' is ours and ignored by the programs that read the format.
+    """
+    n = len(graph.ids)
+    open_ = np.zeros((n, n), bool)
+    open_[graph.edges[:, 0], graph.edges[:, 1]] = open_[graph.edges[:, 1], graph.edges[:, 0]] = True
+    items = []
+    for k, (x, y, z) in enumerate(graph.positions.tolist()):
+        items.append({
+            "image_id": graph.ids[k], "pose": [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0],
+            "included": True, "visible": open_[k].tolist(), "unobstructed": open_[k].tolist(), "height": EYE,
+            "room": graph.room_of_node[k],
+        })
+    write_bytes(Path(path), json.dumps(items).encode())
+
+
+def from_matterport(path: Path) -> NavGraph:
+    """Read a connectivity file; viewpoints that are not included are left out, unknown rooms are ''.
+
+    Raises:
+      HouseError: not such a file, an asymmetric matrix, or a graph in several pieces.
+    """
+    try:
+        items = json.loads(Path(path).read_text())
+        keep = [k for k, i in enumerate(items) if i["included"]]
+        positions = [[float(items[k]["pose"][at]) for at in (3, 7, 11)] for k in keep]
+        matrix = np.array([[bool(items[k]["unobstructed"][j]) for j in keep] for k in keep]).reshape(len(keep), len(keep))
+        ids = tuple(str(items[k]["image_id"]) for k in keep)
+    except (ValueError, KeyError, IndexError, TypeError) as e:
+        raise HouseError(f"{path} is not a Matterport connectivity file ({e!r}); write one with to_matterport") from e
+    if not keep or not np.isfinite(positions).all():
+        raise HouseError(f"{path} has no included viewpoints with finite positions")
+    if (matrix != matrix.T).any():
+        raise HouseError(f"{path}: 'unobstructed' should be symmetric")
+    edges = np.argwhere(np.triu(matrix, 1))
+    return graph_of(np.array(positions), edges, ids, tuple(str(items[k].get("room", "")) for k in keep))

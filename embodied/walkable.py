@@ -1,0 +1,94 @@
+"""Where a person can stand and what they can see: flat free-space polygons of one storey, metres, world."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from embodied.geometry import rectangle
+from embodied.house import DOORS, House, Opening, Room
+
+EYE = 1.5
+"""Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""
+HEAD = 1.8
+"""Things whose base is higher than this do not stop a person."""
+STEP = 0.04
+"""Things lower than this (rugs, mats, thresholds) are walked over."""
+LINING = 0.03
+"""What a door's lining takes from its hole on each side, metres."""
+LEAF = 0.05
+"""Thickness of an open leaf with its handle, metres."""
+
+
+def free_floor(house: House, storey: int) -> shapely.Geometry:
+    """The floor that is neither wall, furniture nor door leaf; doorways included."""
+    open_floor = _floors_and_doorways(house, storey)
+    things = obstacles(house, storey, STEP, HEAD)
+    return open_floor.difference(shapely.union_all(things)) if things else open_floor
+
+
+def sight_floor(house: House, storey: int, height: float = EYE) -> shapely.Geometry:
+    """Where a horizontal sight line at `height` may run."""
+    open_floor = _floors_and_doorways(house, storey)
+    things = obstacles(house, storey, height - 0.02, height + 0.02)
+    return open_floor.difference(shapely.union_all(things)) if things else open_floor
+
+
+def obstacles(house: House, storey: int, low: float, high: float) -> list[shapely.Polygon]:
+    """Footprints of placements and leaves that occupy heights between low and high above the floor."""
+    rooms = {r.id for r in house.rooms if r.storey == storey}
+    floor = house.storeys[storey].elevation
+    found = []
+    for p in house.placements:
+        if p.room in rooms and p.position[2] - floor < high and p.position[2] + p.size[2] - floor > low:
+            found.append(shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)))
+    for o in house.openings:
+        if o.kind == "door" and o.rooms[0] in rooms:
+            found += leaves(house, o)
+    return found
+
+
+def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
+    """The one leaf of a door, or two from 1.25 m on, as it stands open."""
+    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    width = float(np.linalg.norm(b - a))
+    normal = inward(house, opening)
+    face = house.inner_wall / 2 * normal
+    pairs = [(a, b), (b, a)] if width >= 1.25 else [(a, b) if opening.hinge == "a" else (b, a)]
+    found = []
+    for hinge, other in pairs:
+        across = (other - hinge) / width
+        long = (width - 2 * LINING) / len(pairs)
+        start = hinge + LINING * across + face
+        tip = start + long * (math.cos(opening.angle) * across + math.sin(opening.angle) * normal)
+        found.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
+    return found
+
+
+def inward(house: House, opening: Opening) -> np.ndarray:
+    """(2,) unit normal of the opening's wall into its first room."""
+    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    along = (b - a) / np.linalg.norm(b - a)
+    normal = np.array([-along[1], along[0]])
+    room = shapely.Polygon(house.room_by_id[opening.rooms[0]].polygon)
+    return normal if room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)) else -normal
+
+
+def doorway(house: House, opening: Opening) -> shapely.Polygon:
+    """The floor inside the wall that a door or passage between two rooms opens up."""
+    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    along = (b - a) / np.linalg.norm(b - a)
+    lining = LINING if opening.kind != "passage" or opening.leaf_finish is not None else 0.0
+    a, b = a + lining * along, b - lining * along
+    half = (house.inner_wall / 2 + 1e-3) * inward(house, opening)
+    return shapely.Polygon([a - half, b - half, b + half, a + half])
+
+
+def _floors_and_doorways(house: House, storey: int) -> shapely.Geometry:
+    rooms: list[Room] = [r for r in house.rooms if r.storey == storey]
+    ids = {r.id for r in rooms}
+    ways = [doorway(house, o) for o in house.openings
+            if o.kind in DOORS and o.rooms[1] is not None and o.rooms[0] in ids]
+    return shapely.union_all([*(house.floor(r) for r in rooms), *ways])
