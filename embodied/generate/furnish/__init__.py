@@ -1,0 +1,70 @@
+"""Furnishing: a House with rooms and openings becomes one with objects and lights.
+
+Room by room: groups of furniture claim their place in order of importance (rooms.py), then what
+hangs on walls and ceilings (walls.py), then small things on surfaces (smalls.py), then lights.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+
+from embodied.generate.furnish.arrange import Thing
+from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.lights import lights
+from embodied.generate.furnish.rooms import furnish_room
+from embodied.generate.furnish.smalls import clutter
+from embodied.generate.furnish.space import room_space
+from embodied.generate.furnish.stock import Stock
+from embodied.generate.furnish.style import house_style
+from embodied.generate.furnish.walls import hang_all
+from embodied.geometry import wrap
+from embodied.house import House, Placement, rounded
+from embodied.seeds import stream
+
+
+def furnish(draft: House, catalogue, *, seed: int) -> House:
+    """Put furniture, wall things, small things and lights into every room.
+
+    Args:
+      draft: a house whose rooms, openings and stairs are settled; placements and lights it
+        already has are replaced.
+      catalogue: assets.catalogue.Catalogue; only its records are used, never a mesh.
+      seed: the same seed gives the same furniture.
+    """
+    style = house_style(rng=stream(seed, "furnish", "style"))
+    stock = Stock(catalogue, style)
+    kinds = tuple(sorted({r.kind for r in draft.rooms}))
+    rooms: list[tuple[str, list[Thing]]] = []
+    for room in draft.rooms:
+        ctx = Context(room_space(draft, room), stock, stream(seed, "furnish", room.id), kinds)
+        furnish_room(ctx)
+        hang_all(ctx)
+        clutter(ctx)
+        rooms.append((room.id, ctx.things))
+    placements = _placements(rooms)
+    shining = lights(placements, style, rng=stream(seed, "furnish", "lights"))
+    return dataclasses.replace(draft, placements=placements, lights=shining)
+
+
+def _placements(rooms: list[tuple[str, list[Thing]]]) -> tuple[Placement, ...]:
+    """Things with ids, in the order in which they were placed."""
+    numbers: Counter[str] = Counter()
+    ids: dict[int, str] = {}
+    placements = []
+    for room, things in rooms:
+        for t in things:
+            name = t.asset.object_class.replace(" ", "_")
+            numbers[name] += 1
+            ids[id(t)] = f"{name}_{numbers[name]}"
+            placements.append(Placement(
+                ids[id(t)], t.asset.key, t.asset.object_class, room, rounded((t.x, t.y, t.z)),
+                rounded(float(wrap(t.yaw))), rounded(t.size), ids[id(t.parent)] if t.parent is not None else None,
+                t.surface, tuple(sorted(t.params)), f"{room}/{t.group}" if t.group else None,
+            ))
+    return tuple(placements)
+
+
+
+
+

@@ -1,0 +1,345 @@
+"""The space of one room: boxes that may not meet, walls to stand at, and the floor one walks on.
+
+Everything that stands, hangs or must stay free in a room is an upright box. A plan of the floor
+in cells of 5 cm, eroded by the radius of a walker, tells whether doors and furniture stay
+reachable when a box is added.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import shapely
+
+from embodied.house import DOORS, House, Opening, Room
+
+CELL = 0.05
+"""Side of a cell of the walking plan, metres."""
+TOUCH = 1e-3
+"""Boxes that overlap by less than this only touch, metres."""
+WALKABLE = 0.06
+"""Things lower than this (rugs, mats) can be walked over, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An upright box: centre (x, y), half sizes along its own axes, yaw, bottom and top, metres."""
+
+    x: float
+    y: float
+    half_width: float
+    half_depth: float
+    yaw: float
+    bottom: float
+    top: float
+    cos: float
+    sin: float
+    reach_x: float
+    """Half sizes of the axis-aligned rectangle around it, metres."""
+    reach_y: float
+    square: bool
+    """Whether its sides run along the world's axes."""
+
+    def corners(self, grow: float = 0.0) -> np.ndarray:
+        """(4, 2) corners counter-clockwise, metres; `grow` widens it on all sides."""
+        a, b = self.half_width + grow, self.half_depth + grow
+        c, s = self.cos, self.sin
+        return np.array([
+            (self.x + c * u - s * v, self.y + s * u + c * v) for u, v in ((-a, -b), (a, -b), (a, b), (-a, b))
+        ])
+
+
+def box(x: float, y: float, width: float, depth: float, yaw: float, bottom: float, top: float) -> Box:
+    """The box of full `width` and `depth` at (x, y)."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    square = min(abs(c), abs(s)) < 1e-6
+    a, b = max(width / 2, 0.0), max(depth / 2, 0.0)
+    return Box(
+        x, y, a, b, yaw, bottom, top, c, s, abs(c) * a + abs(s) * b, abs(s) * a + abs(c) * b, square,
+    )
+
+
+def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
+    """Whether two boxes come closer than `gap` (separating axes); a negative gap forgives touching."""
+    if p.bottom >= q.top - TOUCH or q.bottom >= p.top - TOUCH:
+        return False
+    dx, dy = q.x - p.x, q.y - p.y
+    if abs(dx) >= p.reach_x + q.reach_x + gap or abs(dy) >= p.reach_y + q.reach_y + gap:
+        return False
+    if p.square and q.square:
+        return True
+    for a in (p, q):
+        for ux, uy in ((a.cos, a.sin), (-a.sin, a.cos)):
+            distance = abs(dx * ux + dy * uy)
+            reach = gap
+            for b in (p, q):
+                reach += b.half_width * abs(b.cos * ux + b.sin * uy) + b.half_depth * abs(b.cos * uy - b.sin * ux)
+            if distance >= reach:
+                return False
+    return True
+
+
+@dataclass(frozen=True)
+class Wall:
+    """One straight inner face of a room, seen from inside with the wall at the back.
+
+    Positions on it are measured from `start` along `along`, metres.
+    """
+
+    index: int
+    start: tuple[float, float]
+    along: tuple[float, float]
+    inward: tuple[float, float]
+    length: float
+    outer: bool
+    """Whether the outdoors is on its other side (it has a window or front door)."""
+    openings: tuple[tuple[float, float, Opening], ...]
+    """(from, to, opening) along the wall."""
+    corners: tuple[bool, bool]
+    """Whether the room turns inwards (an ordinary corner) at its start and at its end."""
+
+    @property
+    def yaw(self) -> float:
+        """Yaw of a thing that stands with its back to this wall."""
+        return math.atan2(self.inward[1], self.inward[0]) + math.pi / 2
+
+    def point(self, s: float, away: float = 0.0) -> tuple[float, float]:
+        """World point at `s` along the wall and `away` from it, metres."""
+        return (
+            self.start[0] + s * self.along[0] + away * self.inward[0],
+            self.start[1] + s * self.along[1] + away * self.inward[1],
+        )
+
+
+@dataclass
+class RoomSpace:
+    """What a room has in it while it is being furnished; `add` is the only thing that changes it."""
+
+    room: Room
+    bottom: float
+    """z of its floor, metres."""
+    height: float
+    polygon: shapely.Polygon
+    walls: tuple[Wall, ...]
+    openings: tuple[Opening, ...]
+    entries: tuple[tuple[float, float], ...]
+    """Where one stands after each door, metres."""
+    keepouts: list[Box]
+    """Where nothing may stand: door swings, approaches, the light of windows, stairs."""
+    radius: float
+    """Of the walker, metres."""
+    walk: np.ndarray
+    """(rows, columns) uint8, 1 where the walker's centre may be."""
+    origin: tuple[float, float]
+    solids: list[Box] = field(default_factory=list)
+    clearances: list[Box] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        return self.room.kind
+
+    @property
+    def area(self) -> float:
+        return self.polygon.area
+
+    def inside(self, b: Box) -> bool:
+        """Whether the box stays between the walls, a millimetre forgiven."""
+        return bool(shapely.contains_xy(self._grown, b.corners()).all()) and (
+            self._convex or self._grown.covers(shapely.Polygon(b.corners()))
+        )
+
+    def __post_init__(self) -> None:
+        self._grown = self.polygon.buffer(TOUCH, join_style="mitre")
+        shapely.prepare(self._grown)
+        self._convex = self.polygon.convex_hull.area - self.polygon.area < 1e-4
+        x0, y0, x1, y1 = self.polygon.bounds
+        self._rectangle = (
+            (x0 - TOUCH, y0 - TOUCH, x1 + TOUCH, y1 + TOUCH)
+            if (x1 - x0) * (y1 - y0) - self.polygon.area < 1e-4 else None
+        )
+
+    def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False) -> bool:
+        """Whether a solid may be put at `b`.
+
+        Args:
+          ignore: solids it may overlap (the table a chair is pushed under).
+          passage: whether it may reach into keep-outs and clearances (a curtain, a rug).
+        """
+        if self._rectangle is not None:
+            x0, y0, x1, y1 = self._rectangle
+            if not (x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1):
+                return False
+        elif not self.inside(b):
+            return False
+        if b.top > self.bottom + self.height + TOUCH:
+            return False
+        if not passage and any(overlap(b, k) for k in self.keepouts):
+            return False
+        for other in self.solids:
+            if overlap(b, other) and not any(other is i for i in ignore):
+                return False
+        return passage or not any(overlap(b, c) for c in self.clearances)
+
+    def is_clear(self, b: Box) -> bool:
+        """Whether no solid reaches into the clearance `b`."""
+        return not any(overlap(b, other) for other in self.solids)
+
+    def walkable(self, added: Iterable[Box], reach: Iterable[tuple[float, float]]) -> np.ndarray | None:
+        """The walking plan with `added` boxes in it, or None if it would cut the room apart.
+
+        Every entry and every point of `reach` must lie in one connected part that holds nearly
+        all of the free floor.
+        """
+        plan = self.walk.copy()
+        for b in added:
+            if b.bottom - self.bottom < 1.9 and b.top - self.bottom > WALKABLE:
+                cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius - 0.02)), 0)
+        cells = [self._cell(p) for p in (*self.entries, *reach)]
+        if not cells:
+            return plan
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(plan, connectivity=4)
+        if count < 2:
+            return None
+        seen = {self._label(labels, c) for c in cells}
+        if len(seen) != 1 or 0 in seen:
+            return None
+        (main,) = seen
+        free = int(stats[1:, cv2.CC_STAT_AREA].sum())
+        if stats[main, cv2.CC_STAT_AREA] < 0.88 * free:
+            return None
+        return plan
+
+    def add(self, solids: Iterable[Box], clearances: Iterable[Box] = (), plan: np.ndarray | None = None) -> None:
+        """Put boxes into the room for good."""
+        self.solids.extend(solids)
+        self.clearances.extend(clearances)
+        if plan is not None:
+            self.walk = plan
+
+    def _cells(self, points: np.ndarray) -> np.ndarray:
+        return np.rint((points - self.origin) / CELL).astype(np.int32)
+
+    def _cell(self, point: tuple[float, float]) -> tuple[int, int]:
+        row = int(round((point[1] - self.origin[1]) / CELL))
+        column = int(round((point[0] - self.origin[0]) / CELL))
+        rows, columns = self.walk.shape
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+
+    @staticmethod
+    def _label(labels: np.ndarray, cell: tuple[int, int]) -> int:
+        """The free part that contains the cell or one of its close neighbours, else 0."""
+        r, c = cell
+        near = labels[max(r - 2, 0): r + 3, max(c - 2, 0): c + 3]
+        here = int(labels[r, c])
+        return here if here else int(near.max(initial=0))
+
+
+def room_space(house: House, room: Room) -> RoomSpace:
+    """The empty space of `room`."""
+    storey = house.storey_of(room)
+    floor = shapely.remove_repeated_points(house.floor(room).simplify(1e-4))
+    floor = shapely.orient_polygons(floor)
+    openings = tuple(o for o in house.openings if room.id in o.rooms)
+    walls = _walls(floor, openings, house.inner_wall)
+    radius = 0.3 if floor.area > 4.0 else 0.2
+    keepouts: list[Box] = []
+    entries: list[tuple[float, float]] = []
+    for wall in walls:
+        for s0, s1, o in wall.openings:
+            keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation))
+            if o.kind in DOORS:
+                entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
+    for stair in house.stairs:
+        if room.id in stair.rooms:
+            keepouts.extend(_stair_keepouts(stair, storey.elevation, storey.height))
+    x0, y0, x1, y1 = floor.bounds
+    origin = (x0 - CELL, y0 - CELL)
+    shape = (int((y1 - y0) / CELL) + 3, int((x1 - x0) / CELL) + 3)
+    walk = np.zeros(shape, np.uint8)
+    eroded = floor.buffer(-(radius - 0.02), join_style="mitre")
+    for part in getattr(eroded, "geoms", (eroded,)):
+        if not part.is_empty:
+            ring = np.asarray(part.exterior.coords)[:-1]
+            cv2.fillPoly(walk, [np.rint((ring - origin) / CELL).astype(np.int32)], 1)
+    space = RoomSpace(
+        room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin,
+    )
+    for b in keepouts:
+        if b.bottom - storey.elevation < 0.1 and b.top - storey.elevation > 2.3:  # stairs
+            cv2.fillConvexPoly(walk, space._cells(b.corners(radius - 0.02)), 0)
+    return space
+
+
+def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float) -> tuple[Wall, ...]:
+    ring = np.asarray(floor.exterior.coords)[:-1]
+    n = len(ring)
+    steps = np.roll(ring, -1, axis=0) - ring
+    lengths = np.hypot(*steps.T)
+    units = steps / lengths[:, None]
+    convex = [
+        bool(units[i - 1][0] * units[i][1] - units[i - 1][1] * units[i][0] > 0) for i in range(n)
+    ]  # whether corner i turns left
+    walls = []
+    for i in range(n):
+        along, inward = units[i], np.array([-units[i][1], units[i][0]])
+        found = []
+        for o in openings:
+            a, b = np.asarray(o.a) - ring[i], np.asarray(o.b) - ring[i]
+            if abs(a @ inward + thickness / 2) > 0.02 or abs(b @ inward + thickness / 2) > 0.02:
+                continue
+            s0, s1 = sorted((float(a @ along), float(b @ along)))
+            if s1 < 0 or s0 > lengths[i]:
+                continue
+            found.append((s0, s1, o))
+        found.sort(key=lambda f: (f[0], f[2].id))
+        outer = any(None in o.rooms for _, _, o in found)
+        walls.append(Wall(
+            i, (float(ring[i][0]), float(ring[i][1])), (float(along[0]), float(along[1])),
+            (float(inward[0]), float(inward[1])), float(lengths[i]), outer, tuple(found),
+            (convex[i], convex[(i + 1) % n]),
+        ))
+    return tuple(walls)
+
+
+def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, z: float) -> list[Box]:
+    """Boxes that stay free: before a door its approach and swing, before a window its light."""
+    width = s1 - s0
+    yaw = math.atan2(wall.along[1], wall.along[0])
+
+    def before(from_: float, to: float, depth: float, bottom: float, top: float) -> Box:
+        x, y = wall.point((from_ + to) / 2, depth / 2)
+        return box(x, y, to - from_, depth, yaw, z + bottom, z + top)
+
+    if o.kind == "window":
+        return [before(s0 - 0.05, s1 + 0.05, 0.3, o.sill, o.head)]
+    swings_here = o.rooms[0] == room.id and o.kind in ("door", "front_door", "back_door")
+    depth = {"passage": 0.6, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6)
+    if o.kind in ("front_door",):
+        depth = 1.0
+    if swings_here:
+        depth = max(depth, width + 0.05)
+    return [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
+
+
+def _stair_keepouts(stair, z: float, height: float) -> list[Box]:
+    boxes = []
+    path = stair.path
+    foot, head = path[0], path[-1]
+    for (ax, ay, _), (bx, by, _) in zip(path[:-1], path[1:]):
+        length = math.hypot(bx - ax, by - ay)
+        if length < 1e-6:
+            continue
+        yaw = math.atan2(by - ay, bx - ax)
+        boxes.append(box((ax + bx) / 2, (ay + by) / 2, length, stair.width + 0.06, yaw, z, z + height))
+    ends = ((foot, path[1]), (head, path[-2]))
+    for end, next_ in ends:
+        length = math.hypot(next_[0] - end[0], next_[1] - end[1]) or 1.0
+        ux, uy = (end[0] - next_[0]) / length, (end[1] - next_[1]) / length
+        boxes.append(box(
+            end[0] + 0.45 * ux, end[1] + 0.45 * uy, 0.9, stair.width, math.atan2(uy, ux), z, z + 2.1,
+        ))
+    return boxes

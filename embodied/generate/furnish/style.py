@@ -1,0 +1,57 @@
+"""The taste of one house: which woods, colours and periods its owner prefers, how tidy it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from assets.records import Asset
+
+
+@dataclass(frozen=True)
+class Style:
+    """One house's taste; words are matched against an asset's colours, materials, name and tags."""
+
+    name: str
+    favours: tuple[str, ...]
+    shuns: tuple[str, ...]
+    fabric: tuple[str, ...]
+    """Material keys' families for rugs, curtains and cushions: patterns of words."""
+    tidiness: float = 0.6
+    """0 is lived in, 1 is a show flat; scales how many small things lie about."""
+    warmth: float = 0.5
+    """Colour of its lamps: 0 neutral white, 1 warm white."""
+    seed: int = 0
+    """For the looks of built things that should agree through the house."""
+
+
+STYLES = (
+    Style("light", ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
+          ("black", "dark", "antique", "red", "gothic", "ornate"), ("beige", "grey", "white", "blue")),
+    Style("warm", ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
+          ("black", "metal", "glass", "plastic", "purple"), ("beige", "terracotta", "green", "brown")),
+    Style("dark", ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
+          ("pine", "pink", "rustic", "beige"), ("grey", "black", "blue", "white")),
+    Style("classic", ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
+          ("plastic", "modern", "white", "glass", "metal"), ("red", "brown", "green", "beige")),
+    Style("colourful", ("blue", "green", "red", "yellow", "orange", "white", "modern"),
+          ("brown", "dark", "antique", "black"), ("blue", "green", "yellow", "terracotta")),
+)
+
+
+def house_style(*, rng: np.random.Generator) -> Style:
+    """A taste for one house."""
+    base = STYLES[int(rng.integers(len(STYLES)))]
+    return Style(
+        base.name, base.favours, base.shuns, base.fabric, float(rng.uniform(0.15, 0.95)),
+        float(rng.uniform(0.2, 1.0)), int(rng.integers(1 << 30)),
+    )
+
+
+def liking(style: Style, asset: Asset) -> float:
+    """How much the taste multiplies the weight of an asset; 1 is indifferent."""
+    words = {*asset.colours, *asset.materials, *asset.tags, *asset.name.split()}
+    good = sum(w in words for w in style.favours)
+    bad = sum(w in words for w in style.shuns)
+    return float(2.2 ** min(good, 2) * 0.35 ** min(bad, 2))
