@@ -249,7 +249,7 @@ def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: boo
         which.append(np.array(local, np.int32)[t.flat.part])
         owner.append(np.full(len(t.flat.part), number[t.owner], np.int32))
         luxels.append(t.flat.luxels + place.astype(np.float32))
-    join = lambda name: np.concatenate([getattr(t.flat, name) for t in things])  # noqa: E731
+    join = lambda name: np.concatenate([getattr(t.flat, name) for t in things])
     width = max(int(x + t.flat.size[0]) for t, (x, _) in zip(things, places))
     height = max(int(y + t.flat.size[1]) for t, (_, y) in zip(things, places))
     return Page(
@@ -260,7 +260,7 @@ def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: boo
 
 def _by_level(page: Page, finish: int, scale: float, shape: tuple[int, ...], face: np.ndarray):
     """Texels by how far the colour map must be shrunk first: pairs of level and positions in `face`."""
-    pad = lambda a: np.pad(a, ((0, 0), (0, 0), (0, 1)))  # noqa: E731
+    pad = lambda a: np.pad(a, ((0, 0), (0, 0), (0, 1)))
     source = areas_of(pad(page.uv)) * shape[0] * shape[1]
     target = areas_of(pad(page.luxels)) * scale**2
     levels = np.clip(np.round(0.5 * np.log2(np.maximum(source, 1e-9) / np.maximum(target, 1e-9))), 0, 8).astype(int)
@@ -282,6 +282,6 @@ def _sample(light: np.ndarray, uv: np.ndarray) -> np.ndarray:
     x, y = (uv[:, 0] % 1) * w - 0.5, ((1 - uv[:, 1]) % 1) * h - 0.5
     xi, yi = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = (x - xi)[:, None].astype(np.float32), (y - yi)[:, None].astype(np.float32)
-    at = lambda a, b: light[b % h, a % w]  # noqa: E731
+    at = lambda a, b: light[b % h, a % w]
     top = at(xi, yi) * (1 - fx) + at(xi + 1, yi) * fx
     return top * (1 - fy) + (at(xi, yi + 1) * (1 - fx) + at(xi + 1, yi + 1) * fx) * fy

@@ -29,8 +29,8 @@ from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.radiosity import space_of
 from embodied.light.settings import VERSION, Settings, settings_of
 from embodied.light.sky import outdoors as outdoors_of
-from embodied.light.solve import Light, Luxels, luxels_of, solve
-from embodied.light.surroundings import dome_mesh, surroundings
+from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
+from embodied.light.surroundings import surroundings
 from embodied.light.tone import Exposure, expose
 from embodied.lit import LitMesh, LitPages
 from embodied.parts import house_parts, owners
@@ -150,7 +150,7 @@ class Solved:
     house: House
     atlas: Atlas
     lux: Luxels
-    light: Light
+    light: Radiosity
     outdoors: object
     lamps: tuple
     exposure: Exposure
@@ -174,7 +174,7 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
     lamps = lamps_of(house, atlas)
     lux = luxels_of(house, atlas, lamps, read)
     clock("luxels")
-    stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))  # noqa: E731
+    stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))
     light = solve(house, atlas, lux, outdoors, lamps, settings, stage, progress)
     clock("smooth")
     exposure = expose(house, _light_of_rooms(house, atlas, lux, light), np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0))
@@ -262,7 +262,7 @@ def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clo
     return made
 
 
-def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Light) -> dict[str, np.ndarray]:
+def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
     """Middle e (without the sun's own) on the shell of every room."""
     e = light.soft
     room_of_owner = np.array([[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms])

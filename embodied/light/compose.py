@@ -16,7 +16,7 @@ from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
-from embodied.light.solve import AMBIENT, Light, Luxels, glow_of
+from embodied.light.solve import AMBIENT, Luxels, Radiosity, glow_of
 from embodied.light.tone import Exposure, display
 
 
@@ -34,7 +34,7 @@ class Ingredients:
     """(h, w, 3) uint8 sRGB, exposed: what the classic renderer shows."""
 
 
-def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Light, space: Space, portals: Sequence[Portal],
+def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosity, space: Space, portals: Sequence[Portal],
             lamps: Sequence[Lamp], outdoors: Outdoors, exposure: Exposure, settings: Settings,
             read: Callable[[str], np.ndarray]) -> Ingredients:
     """Compose page `number` of the atlas."""
@@ -81,11 +81,11 @@ def _sharp_sun(page, t: Texels, share: np.ndarray, space: Space, portals: Sequen
     box = np.ones((5, 5), np.uint8)
     high, low = cv2.dilate(share, box), cv2.erode(share, box)
     unsure = (high - low > 0.02) & (high > 0.004)
-    at = lambda a: np.kron(a, np.ones((page.fineness, page.fineness), a.dtype)).ravel()[t.index]  # noqa: E731
+    at = lambda a: np.kron(a, np.ones((page.fineness, page.fineness), a.dtype)).ravel()[t.index]
     out = at(share).astype(np.float32)
     out = np.where(page.thin[t.face], out, np.where(out > 0.5 * facing, facing, 0.0) * (out > 0.004))
     i = np.nonzero(at(unsure.astype(np.uint8)) > 0)[0]
     if len(i):
         p = points_of(t.position[i], t.normal[i], t.face_normal[i], page.thin[t.face[i]])
-        out[i] = radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays)
+        out[i] = np.asarray(radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays))
     return out

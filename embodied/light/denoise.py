@@ -46,7 +46,7 @@ def smooth_pages(
     mine = np.nonzero(chosen)[0]
     if not len(mine):
         return e
-    i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))  # noqa: E731
+    i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))
     page_number, at, width = i32(number), i32(flat[mine]), i32(widths[mine])
     low, high = i32(base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]), i32(last[mine])
     column = i32((flat[mine] - base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]) % widths[mine])
@@ -110,7 +110,7 @@ def smooth_space(
     mine = np.nonzero(chosen)[0]
     if not len(mine):
         return e
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     places, normals = flat(position), flat(normal)
     ids = [mi.UInt32(np.ascontiguousarray(near[:, j], np.uint32)) for j in range(near.shape[1])]
     p, n = vector(position[mine]), vector(normal[mine])

@@ -7,6 +7,8 @@ import shapely
 
 from embodied.house import Room
 from embodied.light import radiosity
+from embodied.light.backend import array
+from embodied.light.emitters import portals_of
 from embodied.light.solve import AMBIENT
 from embodied.light.tone import develop
 
@@ -29,9 +31,7 @@ def ambient_cube(solved, space: radiosity.Space, room: Room, *, rays: int = 256)
     seen = lux.albedo * (light.soft + AMBIENT) + lux.glow
     e, _ = radiosity.gather(space, points, seen, rays)
     e = e + AMBIENT
-    from embodied.light.emitters import portals_of
-
     for portal in portals_of(house):
-        e = e + radiosity.sky_light(space, points, portal, 16)
+        e = e + array(radiosity.sky_light(space, points, portal, 16))
     e = np.median(e.reshape(len(spots), 6, 3), axis=0)
     return develop(0.8 * e, solved.exposure.at(spots[:1])).astype(np.float32)

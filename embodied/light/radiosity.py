@@ -89,8 +89,8 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray, hidden: fr
     xy = np.concatenate([p.luxels for p in atlas.pages])[keep]
     thin = np.concatenate([p.thin for p in atlas.pages])[keep]
     sizes = np.array([p.width * p.height for p in atlas.pages])
-    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))  # noqa: E731
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     return Space(
         scene_of(corners[keep]), keep, u32(page[keep]), flat(xy), flat(face_normals(corners[keep])),
         mi.Bool(np.ascontiguousarray(thin)), u32([p.width for p in atlas.pages]), u32([p.height for p in atlas.pages]),
@@ -139,8 +139,8 @@ def env_lookup(space: Space, d, active=True):
     return out
 
 
-def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> np.ndarray:
-    """(n, 3) e from the outdoors through one portal, by area sampling.
+def sky_light(space: Space, p: Points, portal: Portal, samples: int):
+    """e (a Color3f) from the outdoors through one portal, by area sampling.
 
     One sample is clamped at 4 / samples and the sum at full view of the portal: without it, things
     a few centimetres from the glass turn into fireflies.
@@ -168,11 +168,11 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> np.ndarr
         total += env_lookup(space, d, active) * g
         seen += g
         dr.eval(total, seen)
-    return array(total * dr.select(seen > 1, 1 / seen, 1))
+    return total * dr.select(seen > 1, 1 / seen, 1)
 
 
-def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> np.ndarray:
-    """(n, 3) e from one lamp."""
+def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
+    """e (a Color3f) from one lamp."""
     mi = mitsuba()
     import drjit as dr
 
@@ -199,12 +199,11 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> np.ndarray:
         active &= ray.maxt > 0
         total += dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), constant((4.0 if not bare else 400.0) / samples))
         dr.eval(total)
-    e = np.asarray(total)
-    return (np.minimum(e, 1.0) if not bare else e)[:, None] * lamp.radiance.astype(np.float32)
+    return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
-def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, directions: int, radius: float = 0.006) -> np.ndarray:
-    """(n,) cosine-weighted share of the sun's disc that a point sees through a portal.
+def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, directions: int, radius: float = 0.006):
+    """Cosine-weighted share (a Float) of the sun's disc that a point sees through a portal.
 
     Args:
       directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
@@ -223,7 +222,7 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
         active &= portals_scene.ray_test(ray, active)
         total += dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0)
         dr.eval(total)
-    return np.asarray(total) / directions
+    return total / directions
 
 
 def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarray, flux: np.ndarray, extent: np.ndarray) -> np.ndarray:
@@ -290,7 +289,7 @@ def hit_luxel(space: Space, ray, active=True):
     f = h.prim_index
     page = dr.gather(mi.UInt32, space.page, f, hit)
     b1, b2 = h.prim_uv.x, h.prim_uv.y
-    at = lambda c: dr.gather(mi.Point2f, space.luxel_xy, f * 3 + c, hit)  # noqa: E731
+    at = lambda c: dr.gather(mi.Point2f, space.luxel_xy, f * 3 + c, hit)
     q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
     w, height = dr.gather(mi.UInt32, space.width, page, hit), dr.gather(mi.UInt32, space.height, page, hit)
     x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))

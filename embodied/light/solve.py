@@ -10,7 +10,8 @@ import numpy as np
 from embodied.house import House
 from embodied.light import denoise, radiosity
 from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
-from embodied.light.emitters import Lamp, Portal, lamps_of, portals_of
+from embodied.light.backend import array, constant, mitsuba, r2
+from embodied.light.emitters import Lamp, Portal, portals_of
 from embodied.light.radiosity import Points, Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
@@ -48,7 +49,7 @@ class Luxels:
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
+class Radiosity:
     """What reaches each luxel: (n, 3) float32 each, radiosity e = E / pi in 100 cd/m2."""
 
     direct: np.ndarray
@@ -128,17 +129,15 @@ def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Port
         jobs.append((own, lambda s, p, r, x=lamp: radiosity.lamp_light(s, p, x, r or settings.lamp_rays)))
     for done, (where, shine) in enumerate(jobs):
         tell(done / len(jobs))
-        mine = radiosity.reached(lux.unit, lambda i: shine(where, subset(lux, i), 4).sum(1) > 0)
+        mine = radiosity.reached(lux.unit, lambda i: array(shine(where, subset(lux, i), 4)).sum(1) > 0)
         if len(mine):
-            e[mine] += shine(where, subset(lux, mine), 0)
+            e[mine] += array(shine(where, subset(lux, mine), 0))
     return e
 
 
 def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: int = 24) -> np.ndarray:
     """(n, 3) e that the outer side of windows and outer doors takes from the open sky."""
     import drjit as dr
-
-    from embodied.light.backend import array, constant, mitsuba, r2
 
     mi = mitsuba()
     e = np.zeros((len(lux.position), 3), np.float32)
@@ -171,7 +170,7 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
     n = len(lux.position)
     if not portals or not outdoors.sun.any():
         return np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
-    share = radiosity.sun_share(space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4)
+    share = np.asarray(radiosity.sun_share(space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4))
     flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
     power = flux.mean(1) * ~lux.thin
     e = np.zeros((n, 3), np.float32)
@@ -186,7 +185,7 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
         pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
         strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
         extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
-        one = lambda i: radiosity.patch_light(  # noqa: E731
+        one = lambda i: radiosity.patch_light(
             space, subset(lux, i), lux.position[pick], lux.normal[pick], strength, extent)
         reach = radiosity.reached(lux.unit, lambda i: one(i).sum(1) > 0)
         if len(reach):
@@ -194,10 +193,11 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
     return share, e
 
 
-def bounce(lux: Luxels, space: Space, light: Light, settings: Settings, tell: Callable[[float], None]) -> Light:
+def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell: Callable[[float], None]) -> Radiosity:
     """All further bounces, by Jacobi rounds of gathering."""
     everywhere = subset(lux, np.arange(len(lux.position)))
     glow = np.where(lux.sampled[:, None], 0.0, lux.glow)
+    light = replace(light, indirect=_endless(lux, light, glow))
     first, total = 0, sum(settings.bounces)
     for samples in settings.bounces:
         tell(first / total)
@@ -208,12 +208,29 @@ def bounce(lux: Luxels, space: Space, light: Light, settings: Settings, tell: Ca
     return light
 
 
-def smooth(lux: Luxels, atlas: Atlas, light: Light) -> Light:
+def _endless(lux: Luxels, light: Radiosity, glow: np.ndarray) -> np.ndarray:
+    """First guess (n, 3) of all bounces: each room as a white box's sphere, e * rho / (1 - rho).
+
+    Jacobi rounds from nothing would miss a fifth of a white room's light after four of them.
+    """
+    out = np.zeros_like(light.direct)
+    openings = 0.06  # share of a room's walls that lets light out
+    for unit in np.unique(lux.unit):
+        mine = np.nonzero((lux.unit == unit) & lux.shell)[0]
+        if len(mine):
+            weight = lux.area[mine, None] / lux.area[mine].sum()
+            rho = (lux.albedo[mine] * weight).sum(0) * (1 - openings)
+            sent = (lux.albedo[mine] * (light.direct[mine] + light.patches[mine]) + glow[mine]) * weight
+            out[lux.unit == unit] = sent.sum(0) / (1 - rho)
+    return out
+
+
+def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     """Noise taken out of all but the sun; luxels that are not good take their neighbours' light."""
     soft = ~lux.shell
     near = denoise.neighbours(lux.position, lux.normal, light.good, soft)
-    pages = lambda e, steps, like: denoise.smooth_pages(e, atlas, lux.texels, light.good, lux.shell, steps=steps, likeness=like)  # noqa: E731
-    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)  # noqa: E731
+    pages = lambda e, steps, like: denoise.smooth_pages(e, atlas, lux.texels, light.good, lux.shell, steps=steps, likeness=like)
+    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
     indirect = space(pages(light.indirect, (1, 2, 4, 8, 16), 0.35), 3, 0.8)
     direct = space(pages(light.direct, (1, 2, 4), 0.2), 2, 0.45)
     total = direct + indirect + light.patches
@@ -228,7 +245,7 @@ def subset(lux: Luxels, i: np.ndarray) -> Points:
 
 
 def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Sequence[Lamp], settings: Settings,
-          stage: Callable[[str, Callable[[], dict]], dict], tell: Callable[[str, float], None]) -> Light:
+          stage: Callable[[str, Callable[[], dict]], dict], tell: Callable[[str, float], None]) -> Radiosity:
     """The light of a house.
 
     Args:
@@ -242,7 +259,7 @@ def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Se
         "e": direct_light(lux, atlas, space, portals, lamps, settings, outdoors.picture, lambda x: tell("direct light", x)),
         "outer": outer_light(house, lux, atlas, space)})
     sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
-    light = Light(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool))
+    light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool))
 
     def gathered() -> dict:
         done = bounce(lux, space, light, settings, lambda x: tell("bounces", x))

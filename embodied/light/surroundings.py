@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import cv2
 import numpy as np
 
 from embodied.house import House
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
-from embodied.light.unwrap import corners_of, face_normals
-from embodied.light.atlas import _sample, linear
+from embodied.light.unwrap import face_normals
 from embodied.lit import LitMesh
-from embodied.parts import house_parts
 
 RADIUS = 70.0
 """Metres to the dome."""
