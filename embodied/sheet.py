@@ -106,7 +106,7 @@ def _measure(spec: mujoco.MjSpec, asset, x: float) -> None:
     box([x, -depth / 2 - step / 2, 0], [4 * thin, step / 2, thin], [0.9, 0.1, 0.1, 1])
     box([x, -depth / 2 - step, 0], [12 * thin, 4 * thin, thin], [0.9, 0.1, 0.1, 1])
     if large:
-        figure = [x - width / 2 - 0.35, depth / 2, 0.0]
+        figure = [x + width / 2 + 0.3, depth / 2, 0.0]
         box([figure[0], figure[1], 0.72], [0.17, 0.01, 0.72], [0.35, 0.45, 0.6, 1])
         box([figure[0], figure[1], 1.58], [0.09, 0.01, 0.12], [0.35, 0.45, 0.6, 1])
 
