@@ -68,12 +68,12 @@ def versions() -> Finding:
 
 def renderer() -> Finding:
     """The off-screen renderer that MuJoCo gets."""
-    from embodied.gl import GlError, probe
+    from embodied.gl import REMEDY, GLError, info
 
     try:
-        device = probe()
-    except GlError as e:
-        return Finding("renderer", False, str(e), "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6")
+        device = info()
+    except GLError as e:
+        return Finding("renderer", False, str(e), REMEDY)
     return Finding("renderer", True, str(device))
 
 

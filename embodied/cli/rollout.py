@@ -1,0 +1,121 @@
+"""Roll out an agent on tasks of one house, off-screen, into videos and recordings.
+
+The camera of --video moves smoothly between viewpoints: this is a 3D scene, not a set of
+photographs. With several episodes, %d in a file name stands for the number of the episode.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.demo import texts
+from embodied.cli.recording import add_sinks, sinks_of
+
+AGENTS = ("shortest", "random", "forward10")
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--house", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
+    where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
+    parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
+    parser.add_argument("--episodes", type=int, default=1, metavar="N", help="how many tasks (default: %(default)s)")
+    parser.add_argument("--quality", choices=("unlit", "baked"), default="baked", help="how the house is drawn (default: baked)")
+    parser.add_argument("--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)")
+    parser.add_argument("--video", type=Path, metavar="MP4", help="write what the agent sees as a video")
+    parser.add_argument("--video-size", type=int, nargs=2, default=(480, 640), metavar=("H", "W"), help="pixels, both even")
+    add_sinks(parser)
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from embodied.env import HelpEnv
+    from embodied.language.plain import PlainLanguage
+    from embodied.metrics import PER_EPISODE
+    from embodied.rollout import play
+    from embodied.tasks.find import find_pool, find_task
+
+    if args.episodes < 1:
+        raise ValueError(f"--episodes should be at least 1, got {args.episodes}")
+    with world_of(args) as world:
+        pool = find_pool(world, seed=args.seed)
+        if args.episodes > len(pool):
+            raise ValueError(f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house")
+        tasks = [find_task(pool, i, seed=args.seed, language=PlainLanguage()) for i in range(args.episodes)]
+        episodes = play(lambda: HelpEnv({world.name: world}), policy_of(args.agent), tasks, seed=args.seed, agent=args.agent)
+        rows = []
+        for number, episode in enumerate(episodes):
+            row = {"task": episode.task.id, "request": episode.task.request}
+            row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
+            if args.video:
+                row["video"] = str(film(world, episode, numbered(args.video, number, args.episodes), tuple(args.video_size)))
+            if args.rrd or args.spawn or args.connect or args.serve:
+                row["recording"] = record_episode(args, world, episode, number)
+            rows.append(row)
+        facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint, "episodes": rows}
+    lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
+    show(args, facts, "\n".join(lines))
+    return 0
+
+
+def world_of(args: argparse.Namespace):
+    """The world of --house, or of the generated house of --seed."""
+    from embodied.generate import generate_house
+    from embodied.world import open_folder, open_world
+
+    catalogue = catalogue_of(args)
+    if args.house:
+        return open_folder(args.house, catalogue, args.cache, size=args.size, quality=args.quality)
+    house = generate_house(args.seed, catalogue=catalogue)
+    return open_world(house, catalogue, args.cache, size=args.size, quality=args.quality)
+
+
+def policy_of(name: str):
+    """The policy behind an --agent word."""
+    from embodied.policies import Forward10, RandomWalk, Shortest
+
+    return {"shortest": Shortest, "random": RandomWalk, "forward10": Forward10}[name]()
+
+
+def numbered(path: Path, number: int, total: int) -> Path:
+    """`path` with the episode's number in it: where %d stands, else before the suffix."""
+    if total == 1 and "%d" not in path.name:
+        return path
+    name = path.name if "%d" in path.name else f"{path.stem}-%d{path.suffix}"
+    return path.with_name(name.replace("%d", str(number)))
+
+
+def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
+    """Write what the agent saw as a video with smooth motion; returns the path."""
+    from tqdm import tqdm
+
+    from viz.video import camera_track, captioned, write_video
+
+    poses = [episode.task.start, *(s.next_pose for s in episode.steps)]
+    track = camera_track(world.graph.positions, poses)
+    drawn = (
+        captioned(world.renderer.view(c[:3], c[3], c[4], 1.2, size).rgb, episode.task.request)
+        for c in tqdm(track, "video", unit="frame", leave=False)
+    )
+    write_video(path, drawn, size)
+    note(f"{path}: {len(track)} frames")
+    return path
+
+
+def record_episode(args: argparse.Namespace, world, episode, number: int) -> str:
+    """Record one episode to where the options say; returns the file's name or the viewer's."""
+    from viz.blueprint import episode_blueprint
+    from viz.recording import record
+    from viz.sinks import open_recording
+
+    sinks = sinks_of(args)
+    if sinks.rrd is not None:
+        sinks = type(sinks)(numbered(sinks.rrd, number, args.episodes), sinks.spawn, sinks.connect, sinks.serve)
+    with open_recording(sinks, episode_blueprint(world.house), name=episode.task.request, properties=texts(world.fingerprint)) as r:
+        for _ in record(r, world, episode.task, episode.steps):
+            pass
+    return str(sinks.rrd or sinks.connect or "viewer")
