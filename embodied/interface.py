@@ -371,6 +371,8 @@ class Episode:
     """'stop' when the agent stopped, 'limit' when the horizon cut it short."""
     seed: int = 0
     agent: str = ""
+    budget: int | None = None
+    """The whole number of requests that this episode was given; None without a budget."""
 
     @property
     def nodes(self) -> tuple[int, ...]:

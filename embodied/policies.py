@@ -12,8 +12,24 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Policy, Sight, Situation, Stop
-from embodied.teachers.shortest import shortest_action
+from embodied.interface import (
+    Action,
+    Ask,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Policy,
+    Sight,
+    Situation,
+    Stop,
+    Teacher,
+    Thought,
+)
+from embodied.language.plain import heard_subgoal
+from embodied.moves import WORDS
+from embodied.teachers.shortest import ShortestTeacher, shortest_action
+from embodied.teachers.vnla import ask_reason
 
 Observations = Sequence[Observation | None]
 Actions = list[Action | None]
@@ -49,11 +65,15 @@ class Shortest:
 
     privileged = True
 
+    def __init__(self, teacher: Teacher | None = None) -> None:
+        """`teacher`: of the action space; the panoramic shortest-path teacher if None."""
+        self._label = (teacher or ShortestTeacher()).label
+
     def act(
         self, observations: Observations, memory: object | None, *,
         rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
-        return [None if s is None else _teacher_move(s) for s in situations], ()
+        return [None if s is None else self._label(s).move for s in situations], ()
 
 
 class AskRule(Protocol):
@@ -147,6 +167,86 @@ class PerfectInterpreter:
         visits = np.array([trail.visited.get(Sight(s.task.world, v), 0) for v in s.candidate_nodes])
         fewest = np.flatnonzero(visits == visits.min())
         return Move(int(rng.choice(fewest)))
+
+
+class SubgoalListener:
+    """VNLA: does what the advisor's sentence says, word by word; otherwise a monocular random walk.
+
+    The walk never stops by itself and prefers going forward, so what it reaches it owes to help.
+    """
+
+    privileged = False
+
+    def act(
+        self, observations: Observations, memory: object | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, object]:
+        pending = memory or [("", ()) for _ in observations]
+        actions: Actions = []
+        for i, o in enumerate(observations):
+            if o is None:
+                actions.append(None)
+                continue
+            heard, words = pending[i]
+            if o.instruction != heard or o.time_on_task == 0:
+                heard, words = o.instruction, heard_subgoal(o.instruction)
+            pending[i] = (heard, words[1:])
+            actions.append(_taken({words[0]: 1.0} if words else WANDER, o, rngs[i]))
+        return actions, pending
+
+
+WANDER = {"forward": 0.7, "left": 0.15, "right": 0.15}
+"""Probabilities of a listener's moves while it has nothing to go by."""
+
+
+def _taken(odds: dict[str, float], o: Observation, rng: np.random.Generator) -> Move | Stop:
+    """A move drawn from `odds` over WORDS and 'stop'; one that is masked becomes a turn to the left."""
+    moves = np.array([odds.get(w, 0.0) for w in (*WORDS, "stop")])
+    masked = np.append(~o.candidates.allowed, False)
+    moves[WORDS.index("left")] += moves[masked].sum()
+    moves[masked] = 0.0
+    choice = int(rng.choice(len(moves), p=moves)) if moves.max() < 1.0 else int(np.argmax(moves))
+    thought = Thought(moves.astype(np.float32))
+    return Stop(thought) if choice == len(WORDS) else Move(choice, thought)
+
+
+class VnlaAsking:
+    """A VNLA navigation policy with one of the program's askers in front of it (originals 4.6)."""
+
+    privileged = True
+
+    def __init__(self, navigation: Policy, ask: str) -> None:
+        """`ask`: 'none', 'first', 'random' or 'teacher'.
+
+        Raises:
+          ValueError: another word.
+        """
+        if ask not in ("none", "first", "random", "teacher"):
+            raise ValueError(f"unknown asker {ask!r}; use 'none', 'first', 'random' or 'teacher'")
+        self._navigation, self._ask = navigation, ask
+        self._inner_privileged = getattr(navigation, "privileged", False)
+
+    def act(
+        self, observations: Observations, memory: object | None, *,
+        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+    ) -> tuple[Actions, object]:
+        times, inner = memory or ([self._times(s, rng) for s, rng in zip(situations, rngs, strict=True)], None)
+        more = {"situations": situations} if self._inner_privileged else {}
+        actions, inner = self._navigation.act(observations, inner, rngs=rngs, **more)
+        for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
+            if o is not None and o.can_ask and self._wants(s, actions[i], times[i]):
+                actions[i] = Ask(o.can_ask[0], actions[i].thought)
+        return actions, (times, inner)
+
+    def _times(self, s: Situation, rng: np.random.Generator) -> frozenset[int]:
+        left = s.requests_left or 0
+        if self._ask != "random":
+            return frozenset()
+        return frozenset(int(t) for t in rng.choice(s.task.horizon, min(left, s.task.horizon), replace=False))
+
+    def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
+        if self._ask == "teacher":
+            return ask_reason(s, planned.thought) is not None
+        return self._ask == "first" or (self._ask == "random" and s.time in times)
 
 
 def _teacher_move(s: Situation) -> Move | Stop:

@@ -43,26 +43,36 @@ class PlainLanguage:
     def subgoal(self, words: Sequence[str]) -> str:
         """VNLA's 'hard' sub-goal language (originals 4.4): 'turn 60 degrees left , go forward 2 steps'.
 
-        Differs from the authors' program in one thing: repeated 'look up' or 'look down' is said
-        once instead of being dropped in silence.
+        Differs from the authors' program in one thing: repeated 'look up' or 'look down' becomes
+        'look 60 degrees up' instead of being dropped in silence.
         """
-        merged: list[tuple[str, int]] = []
-        for word in words:
-            if merged and merged[-1][0] == word:
-                merged[-1] = (word, merged[-1][1] + 1)
-            else:
-                merged.append((word, 1))
-        return " , ".join(_say(word, n) for word, n in merged)
+        return " , ".join(_say(word, len(list(group))) for word, group in itertools.groupby(words))
 
 
 def _say(word: str, times: int) -> str:
-    if word in ("left", "right"):
-        return f"turn {word}" if times == 1 else f"turn {30 * times} degrees {word}"
-    if word in ("up", "down"):
-        return f"look {word}"
+    if word == "stop":
+        return word
     if word == "forward":
         return "go forward" if times == 1 else f"go forward {times} steps"
-    return word
+    verb = "turn" if word in ("left", "right") else "look"
+    return f"{verb} {word}" if times == 1 else f"{verb} {30 * times} degrees {word}"
+
+
+def heard_subgoal(text: str) -> tuple[str, ...]:
+    """The primitive actions in the first sentence of a VNLA instruction; inverse of `subgoal`.
+
+    A plain request ('find a mug') gives ().
+    """
+    words: list[str] = []
+    for phrase in text.split(" . ")[0].split(" , "):
+        parts = phrase.split()
+        if parts[:2] == ["go", "forward"]:
+            words += ["forward"] * (int(parts[2]) if len(parts) > 2 else 1)
+        elif parts[:1] in (["turn"], ["look"]):
+            words += [parts[-1]] * (int(parts[1]) // 30 if len(parts) > 2 else 1)
+        elif parts == ["stop"]:
+            words.append("stop")
+    return tuple(words)
 
 
 def turn_words(angle: float) -> str:

@@ -1,0 +1,96 @@
+"""VNLA: 'find a towel in a bathroom' with an advisor and a request budget (dissertation 4.1.2, originals 4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.interface import TURNS, FindObject, Language, Pose, Task
+from embodied.tasks.find import Pool, build_pool, draw
+from embodied.tasks.goals import find_instances, goal_classes
+from embodied.teachers.vnla import MonocularPlan
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+
+@dataclass(frozen=True)
+class VnlaConfig:
+    """Limits of the VNLA program; the dissertation does not print them."""
+
+    fewest_nodes: int = 3
+    most_actions: int = 25
+    """Of the teacher, the final stop included, and of an episode (originals 4.2)."""
+    radius: float = 2.0
+    reach: float = 2.5
+    by_room: bool = True
+    """False gives the no-room variant: 'find a towel'."""
+    help_ratio: float = 0.4
+    help_steps: int = 4
+    """Budget 0.4 T / 4 for a time limit of T steps (originals 4.2)."""
+
+
+def vnla_pool(world: World, plan: MonocularPlan, *, seed: int, config: VnlaConfig = VnlaConfig()) -> Pool:
+    """Pairs that the teacher finishes in time, whichever way the agent looks at first."""
+    classes = goal_classes(find_instances(world, config.reach), by_room=config.by_room, nearest_only=True)
+    pool = build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_actions, kind="vnla")
+    return Pool(pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan, config)]).reshape(-1, 2))
+
+
+def _in_time(pair: np.ndarray, classes, plan: MonocularPlan, config: VnlaConfig) -> bool:
+    goals = classes[int(pair[0])].goal_nodes
+    poses = [Pose(int(pair[1]), turn) for turn in range(TURNS)]
+    if not np.isfinite(plan.cost(goals)[int(pair[1]) * 36 + 12]):
+        return False
+    return max(plan.count(p, goals) for p in poses) <= config.most_actions
+
+
+def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple[str, str], int]:
+    """Evaluation limits T from training: mean + 1.95 s.e.m. of teacher lengths per key, capped (originals 4.2).
+
+    Args:
+      lengths: (start room kind, end room kind or object class, teacher actions) of training tasks.
+        A pair with a single sample gets the cap, as an unseen pair does.
+    """
+    groups: dict[tuple[str, str], list[int]] = {}
+    for start, end, n in lengths:
+        groups.setdefault((start, end), []).append(n)
+    return {
+        key: cap if len(v) < 2 else round(min(cap, np.mean(v) + 1.95 * np.std(v, ddof=1) / math.sqrt(len(v))))
+        for key, v in sorted(groups.items())
+    }
+
+
+def vnla_task(
+    pool: Pool, index: int, world: World, plan: MonocularPlan, *, seed: int, language: Language,
+    limits: Mapping[tuple[str, str], int] | None = None, config: VnlaConfig = VnlaConfig(),
+) -> Task:
+    """Task `index` of the pool: a pure function of its arguments.
+
+    Its time limit is the teacher's own length in training (limits None), else what `time_limits`
+    learned for its rooms, but never less than the teacher needs: the program may set tasks that
+    cannot be finished, here none are.
+
+    Raises:
+      IndexError: the pool has no such task.
+    """
+    goal, start, rng = draw(pool, index, seed=seed, kind="vnla")
+    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
+    horizon = plan.count(start, goal.goal_nodes)
+    if limits is not None:
+        horizon = max(horizon, limits.get(limit_key(world, start.node, what), config.most_actions))
+    budget = config.help_ratio * horizon / config.help_steps
+    return Task(
+        f"{pool.world}/vnla/{index}", "vnla", pool.world, start, what, goal.goal_nodes,
+        language.request(what, rng=rng), radius=config.radius, horizon=horizon, budget=budget,
+    )
+
+
+def limit_key(world: World, start: int, goal: FindObject) -> tuple[str, str]:
+    """(start room kind, goal room kind), or the object class where no room is named."""
+    room = world.house.room_by_id[world.graph.room_of_node[start]].kind
+    return room, goal.room_kind or goal.object_class

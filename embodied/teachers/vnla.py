@@ -1,0 +1,204 @@
+"""VNLA's teachers: the shortest way in turns and steps, and the rules of when to ask (originals 4.1, 4.5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from embodied.geometry import wrap
+from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Pose, Situation, Stop, Thought
+from embodied.moves import WORDS, MonocularMoves, directions
+from embodied.teachers.shortest import nearest
+
+if TYPE_CHECKING:
+    from embodied.navgraph import NavGraph
+    from embodied.world import World
+
+ACTION = 1e-3
+"""Metres that one action weighs in planning: the shortest walk first, the fewest actions second."""
+
+
+class MonocularPlan:
+    """Shortest ways through the poses of one world, whose 'forward' goes where the camera looks.
+
+    A neighbour that is never nearest the middle of any view cannot be walked to directly, so the
+    shortest way in this action space may be longer than along the graph.
+    """
+
+    def __init__(self, world: World, moves: MonocularMoves) -> None:
+        nodes = len(world.graph.positions)
+        distance = np.asarray(world.graph.distance)
+        states = nodes * VIEWS
+        self.next = np.tile(np.arange(states)[:, None], (1, len(WORDS)))
+        self.weight = np.full((states, len(WORDS)), np.inf)
+        for state in range(states):
+            pose = pose_of(state)
+            candidates, poses = moves.at(world, pose)
+            for a in np.flatnonzero(candidates.allowed):
+                self.next[state, a] = state_of(poses[a])
+                self.weight[state, a] = distance[pose.node, poses[a].node] + ACTION
+        here, action = np.nonzero(np.isfinite(self.weight))
+        there, weight = self.next[here, action], self.weight[here, action]
+        self._backwards = csr_matrix((weight, (there, here)), shape=(states, states))
+        self._cost: dict[tuple[int, ...], np.ndarray] = {}
+
+    def cost(self, goals: tuple[int, ...]) -> np.ndarray:
+        """(states,) metres plus ACTION per action to the nearest of `goals`; inf where none can be reached."""
+        if goals not in self._cost:
+            sources = [g * VIEWS + v for g in goals for v in range(VIEWS)]
+            self._cost[goals] = dijkstra(self._backwards, indices=sources, min_only=True)
+        return self._cost[goals]
+
+    def action(self, pose: Pose, goals: tuple[int, ...]) -> int | None:
+        """Index into WORDS of the best move; None at a goal (stop)."""
+        if pose.node in goals:
+            return None
+        state = state_of(pose)
+        total = self.weight[state] + self.cost(goals)[self.next[state]]
+        return int(np.argmin(np.round(total, 9)))
+
+    def words(self, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
+        """The next `most` teacher actions, ending with 'stop' if it comes, and the pose they lead to (4.1)."""
+        words: list[str] = []
+        while len(words) < most:
+            action = self.action(pose, goals)
+            if action is None:
+                words.append("stop")
+                break
+            words.append(WORDS[action])
+            pose = pose_of(int(self.next[state_of(pose), action]))
+        return tuple(words), pose
+
+    def count(self, pose: Pose, goals: tuple[int, ...]) -> int:
+        """Actions of the teacher from `pose`, the final stop included.
+
+        Raises:
+          ValueError: no goal can be reached.
+        """
+        if not np.isfinite(self.cost(goals)[state_of(pose)]):
+            raise ValueError(f"none of the goals {goals} can be reached from {pose} in the monocular action space")
+        return len(self.words(pose, goals, most=100_000)[0])
+
+
+def state_of(pose: Pose) -> int:
+    return pose.node * VIEWS + pose.view
+
+
+def pose_of(state: int) -> Pose:
+    node, view = divmod(state, VIEWS)
+    return Pose(node, view % TURNS, view // TURNS - 1)
+
+
+def stepwise_action(graph: NavGraph, pose: Pose, goals: Sequence[int]) -> str:
+    """The authors' teacher (originals 4.1): level, turn, tilt, then 'forward'; for the goal-aware 'forward'.
+
+    Returns:
+      One of WORDS, or 'stop'.
+    """
+    goal = nearest(graph, pose.node, goals)
+    if goal == pose.node:
+        return "stop"
+    nodes, yaw, pitch = directions(graph, pose.node)
+    i = int(np.flatnonzero(nodes == int(graph.next_hop[pose.node, goal]))[0])
+    bearing, slope = float(wrap(yaw[i] - pose.yaw)), float(pitch[i] - pose.pitch)
+    if abs(bearing) > STEP:
+        return "left" if bearing > 0 else "right"
+    if slope > STEP and pose.tilt < 1:
+        return "up"
+    if slope < -STEP and pose.tilt > -1:
+        return "down"
+    return "forward"
+
+
+@dataclass(frozen=True)
+class AskRules:
+    """Thresholds of the help-request teacher (originals 4.5)."""
+
+    deviate: float = 8.0
+    """(a) metres from the shortest path."""
+    uncertain: float = 1.0
+    """(b) nats below the entropy of the uniform distribution over the six actions."""
+    unmoved: int = 9
+    """(c) equal entries at the end of the trail."""
+    only: tuple[str, ...] = ("arrive", "deviate", "uncertain", "unmoved", "remain")
+    """Rules in force, for the ablations (a and e; b to d)."""
+
+
+def ask_reason(situation: Situation, thought: Thought | None, rules: AskRules = AskRules()) -> str | None:
+    """The first rule that says to ask, in the order of originals 4.5; None if none does.
+
+    Args:
+      thought: what the policy was about to do; without it the rules about it do not fire.
+    """
+    s, graph = situation, situation.world.graph
+    if s.requests_left is not None and s.requests_left <= 0:
+        return None
+    here = s.trail[-1]
+    goal = nearest(graph, here, s.task.goal_nodes)
+    moves = None if thought is None or thought.moves is None else np.asarray(thought.moves, dtype=float)
+    if "arrive" in rules.only and moves is not None and here == goal and _best(moves) == "forward":
+        return "arrive"
+    if "deviate" in rules.only:
+        planned = graph.path(s.trail[0], goal)
+        if min(graph.distance[here, v] for v in planned) > rules.deviate:
+            return "deviate"
+    if "uncertain" in rules.only and moves is not None:
+        some = moves[moves > 0]
+        if math.log(len(moves)) + float((some * np.log(some)).sum()) < rules.uncertain:
+            return "uncertain"
+    last = s.trail[-rules.unmoved :]
+    if "unmoved" in rules.only and len(last) == rules.unmoved and len(set(last)) == 1:
+        return "unmoved"
+    if "remain" in rules.only and s.requests_left is not None and s.requests_left >= s.task.horizon - s.time:
+        return "remain"
+    return None
+
+
+def _best(moves: np.ndarray) -> str:
+    return (*WORDS, "stop")[int(np.argmax(moves))]
+
+
+class VnlaTeacher:
+    """Reference moves of the monocular action space and, given a thought, whether to ask."""
+
+    def __init__(self, moves: MonocularMoves | None = None, rules: AskRules = AskRules()) -> None:
+        self.moves, self.rules = moves or MonocularMoves(), rules
+        self._plans: dict[str, MonocularPlan] = {}
+
+    def plan(self, world: World) -> MonocularPlan:
+        """The plan of a world, made on first use."""
+        name = world.house.name
+        if name not in self._plans:
+            self._plans[name] = MonocularPlan(world, self.moves)
+        return self._plans[name]
+
+    def label(self, situation: Situation, thought: Thought | None = None) -> Label:
+        s = situation
+        action = self.plan(s.world).action(s.pose, s.targets)
+        move = Stop() if action is None else Move(action)
+        return Label(move, ask_reason(s, thought, self.rules) is not None)
+
+    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+        """Labels of a finished episode; the thought at an Ask step is what its policy was about to do."""
+        labels, trail, time, requests = [], [], 0, 0
+        for step in episode.steps:
+            if len(trail) <= time:
+                trail.append(step.pose.node)
+            left = None if episode.budget is None else episode.budget - requests
+            candidates, _ = self.moves.at(world, step.pose)
+            situation = Situation(
+                world, episode.task, step.pose, step.mode, step.targets, None, step.candidate_nodes, candidates,
+                time, requests, left, tuple(trail),
+            )
+            label = self.label(situation, step.action.thought)
+            asked = isinstance(step.action, Ask)
+            labels.append(Label(None if asked else label.move, label.ask if step.can_ask else None))
+            requests += asked
+            time += not asked
+        return tuple(labels)
