@@ -249,6 +249,27 @@ class VnlaAsking:
         return self._ask == "first" or (self._ask == "random" and s.time in times)
 
 
+class HalfwaySkyline:
+    """HARI with perfect navigation on sub-goals (Table 4.7, last row): it asks for a sub-goal, goes
+    there, says so, and asks again, until a sub-goal turns out to be the goal itself.
+
+    Knowing that is privileged; the authors' skyline learns when to ask.
+    """
+
+    privileged = True
+
+    def act(
+        self, observations: Observations, memory: object | None, *,
+        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+    ) -> tuple[Actions, object]:
+        return [None if o is None else self._one(o, s) for o, s in zip(observations, situations, strict=True)], ()
+
+    def _one(self, o: Observation, s: Situation) -> Action:
+        if len(s.goals) == 1 and s.pose.node != s.goals[0] and Intention.SUB in o.can_ask:
+            return Ask(Intention.SUB)
+        return _teacher_move(s)
+
+
 def _teacher_move(s: Situation) -> Move | Stop:
     return shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
 

@@ -5,52 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from embodied.house import House, Opening, Placement, Room, Storey
+from embodied.navgraph import NavGraph, graph_of
 
 FINISHES = ("oak_planks/0", "paint_white/0", "paint_white/0", "paint_white/0")
 
 
-@dataclass(frozen=True, eq=False)
-class HandGraph:
-    """A NavGraph made from positions and edges."""
-
-    positions: np.ndarray
-    ids: tuple[str, ...]
-    room_of_node: tuple[str, ...]
-    edges: np.ndarray
-    lengths: np.ndarray
-    distance: np.ndarray
-    next_hop: np.ndarray
-
-    def neighbours(self, node: int) -> tuple[int, ...]:
-        a, b = self.edges.T
-        return tuple(sorted({int(x) for x in np.concatenate([b[a == node], a[b == node]])}))
-
-    def path(self, start: int, goal: int) -> tuple[int, ...]:
-        nodes = [start]
-        while nodes[-1] != goal:
-            nodes.append(int(self.next_hop[nodes[-1], goal]))
-        return tuple(nodes)
-
-
-def hand_graph(positions, edges, rooms) -> HandGraph:
-    positions, edges = np.asarray(positions, dtype=float), np.asarray(edges)
-    lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
-    n = len(positions)
-    matrix = csr_matrix((lengths, edges.T), shape=(n, n))
-    distance, before = dijkstra(matrix, directed=False, return_predecessors=True)
-    next_hop = before.T.astype(np.int64).copy()
-    np.fill_diagonal(next_hop, np.arange(n))
-    return HandGraph(positions, tuple(f"n{i}" for i in range(n)), tuple(rooms), edges, lengths, distance, next_hop)
+def hand_graph(positions, edges, rooms) -> NavGraph:
+    return graph_of(np.asarray(positions, dtype=float), np.asarray(edges), tuple(f"n{i}" for i in range(len(positions))), tuple(rooms))
 
 
 @dataclass(frozen=True, eq=False)
 class HandWorld:
     house: House
-    graph: HandGraph
+    graph: NavGraph
 
     def sightings(self, node: int) -> tuple:
         return ()

@@ -1,0 +1,99 @@
+"""HARI's bag-of-features descriptions of places (dissertation 4.3.5 and appendix E)."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.interface import STEP, TURNS, Description, Feature
+from embodied.tasks.goals import NOT_OBJECTS
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+FARTHEST = 4
+"""Largest distance bin: five values, metres rounded down (appendix E)."""
+
+
+@dataclass(frozen=True)
+class DescriberConfig:
+    """Table E.2, and which of its two radii is used for goals (originals X23: 3 m there, 5 m in 4.3.5)."""
+
+    state_radius: float = 5.0
+    goal_radius: float = 3.0
+    most_objects: int = 20
+    same_room: bool = True
+    """Only objects of the node's own room: nobody describes what is behind a wall."""
+
+
+class Describer:
+    """rho and rho_A of one or several worlds; what it says depends on the place only.
+
+    Directions are absolute (steps of 30 degrees counter-clockwise from +x, as turns are), because
+    a description must mean the same wherever the listener looks (originals, section 6, open 4).
+    """
+
+    def __init__(self, frequent: Collection[str], config: DescriberConfig = DescriberConfig()) -> None:
+        """`frequent`: the object classes that sparse descriptions keep (the 100 most frequent)."""
+        self._frequent, self._config = frozenset(frequent), config
+        self._objects: dict[tuple[str, int, float], Description] = {}
+
+    def dense(self, world: World, node: int, *, goal: bool = False) -> Description:
+        """The room's name and at most 20 objects within 5 m (3 m of a goal), nearest first."""
+        return (self._room(world, node), *self._near(world, node, goal))
+
+    def sparse(self, world: World, node: int, *, goal: bool = False) -> Description:
+        """Only frequent objects; the room's name for goals only (4.3.5)."""
+        objects = tuple(f for f in self._near(world, node, goal) if f.name in self._frequent)
+        return (self._room(world, node), *objects) if goal else objects
+
+    def step(self, world: World, node: int, target: int) -> Description:
+        """The next optimal navigation action towards `target`: 'go' with its direction, or 'stop'."""
+        if node == target:
+            return (Feature("action", "stop"),)
+        offset = np.asarray(world.graph.positions)[int(world.graph.next_hop[node, target])] - np.asarray(
+            world.graph.positions)[node]
+        return (Feature("action", "go", *_bins(offset)),)
+
+    def _room(self, world: World, node: int) -> Feature:
+        return Feature("room", world.house.room_by_id[world.graph.room_of_node[node]].kind)
+
+    def _near(self, world: World, node: int, goal: bool) -> Description:
+        radius = self._config.goal_radius if goal else self._config.state_radius
+        key = (world.house.name, node, radius)
+        if key not in self._objects:
+            self._objects[key] = near_objects(world, node, radius, self._config)
+        return self._objects[key]
+
+
+def near_objects(world: World, node: int, radius: float, config: DescriberConfig) -> Description:
+    """Objects within `radius` metres (3-D, from eye to the middle of the object), nearest first."""
+    eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
+    found = []
+    for p in world.house.placements:
+        if p.object_class in NOT_OBJECTS or (config.same_room and p.room != room):
+            continue
+        offset = np.asarray(p.position) + [0.0, 0.0, p.size[2] / 2] - eye
+        distance = float(np.linalg.norm(offset))
+        if distance <= radius:
+            found.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset))))
+    return tuple(f for _, _, f in sorted(found, key=lambda x: x[:2])[: config.most_objects])
+
+
+def frequent_classes(worlds: Iterable[World], most: int = 100) -> tuple[str, ...]:
+    """The `most` most frequent object classes of some (training) houses, most frequent first."""
+    counts = Counter(p.object_class for w in worlds for p in w.house.placements if p.object_class not in NOT_OBJECTS)
+    return tuple(name for name, _ in sorted(counts.items(), key=lambda x: (-x[1], x[0]))[:most])
+
+
+def _bins(offset: np.ndarray) -> tuple[int, int, int]:
+    """(turn 0..11, tilt -1..1, distance 0..4) of an offset in metres."""
+    flat = math.hypot(offset[0], offset[1])
+    turn = round(math.atan2(offset[1], offset[0]) / STEP) % TURNS
+    tilt = max(-1, min(1, round(math.atan2(offset[2], flat) / STEP)))
+    return turn, tilt, min(FARTHEST, int(np.linalg.norm(offset)))

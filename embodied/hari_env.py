@@ -1,0 +1,153 @@
+"""HARI's intention environment: a goal stack, descriptions, and a cost for everything (4.3.4).
+
+The five intentions are our three actions: CUR, GOAL and SUB are `Ask`, DO is `Move` (towards the
+execution policy's choice) and DONE is `Stop`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from embodied.assistants.descriptions import Describer
+from embodied.env import HelpEnv
+from embodied.interface import (
+    Action,
+    Ask,
+    Assistant,
+    Description,
+    Episode,
+    Intention,
+    Mode,
+    Move,
+    Reply,
+    Stop,
+)
+from embodied.moves import Moves
+from embodied.tasks.goals import count_hops
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from embodied.world import World
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Operation costs gamma_a (4.3.6); the task error is counted in graph edges."""
+
+    cur: float = 0.01
+    goal: float = 0.01
+    sub: float = 0.01
+    do: float = 0.01
+
+    def of(self, action: Action) -> float:
+        """Cost of an action that does not end the episode; DONE on a sub-goal is free (4.3.4.4)."""
+        if isinstance(action, Move):
+            return self.do
+        return getattr(self, action.intention.value) if isinstance(action, Ask) else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class StackedGoal:
+    node: int
+    description: Description
+    patience: int
+    """DO actions left before the goal is dropped; unused for the main goal."""
+
+
+class HariEnv(HelpEnv):
+    """E-bar of 4.3.4.1. Decisions where the text is open (originals, section 6):
+
+    a sub-goal held for more than 3 times its shortest distance (in DO actions) is popped by itself
+    and at no cost (open 3); reaching the horizon pays the task error, so that shaping telescopes
+    (open 2); sub-goals are described densely (open 9).
+    """
+
+    def __init__(
+        self, worlds: Mapping[str, World], assistant: Assistant, describer: Describer,
+        *, costs: Costs = Costs(), moves: Moves | None = None,
+    ) -> None:
+        super().__init__(worlds, assistant, moves)
+        self._describer, self._costs = describer, costs
+        self._hops: dict[str, np.ndarray] = {}
+
+    def task_error(self, node: int, goal: int) -> float:
+        """c(s, a_done): edges on the shortest path from node to goal (4.3.6)."""
+        return float(self._hops_here()[node, goal])
+
+    def _hops_here(self) -> np.ndarray:
+        name = self.task.world
+        if name not in self._hops:
+            self._hops[name] = count_hops(self.world.graph.next_hop)
+        return self._hops[name]
+
+    def _begin(self) -> None:
+        goal = self.task.goal_nodes[0]
+        self._goals = [StackedGoal(goal, self._describer.sparse(self.world, goal, goal=True), 0)]  # G_1
+        self._state = self._describer.sparse(self.world, self.pose.node)
+
+    def _replied(self, reply: Reply) -> None:
+        """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
+        if reply.intention is Intention.CUR:
+            self._state = reply.description
+        elif reply.intention is Intention.GOAL:
+            top = self._goals[-1]
+            self._goals[-1] = StackedGoal(top.node, reply.description, top.patience)
+        else:
+            target = reply.subtask.target
+            patience = 3 * max(1, int(self.task_error(self.pose.node, target)))
+            self._goals.append(StackedGoal(target, reply.description, patience))
+            self.subtask = reply.subtask
+        self._on_top()
+
+    def _moved(self) -> None:
+        self._state = self._describer.sparse(self.world, self.pose.node)
+        if len(self._goals) > 1:
+            top = self._goals[-1]
+            self._goals[-1] = StackedGoal(top.node, top.description, top.patience - 1)
+            if top.patience <= 1:
+                self._goals.pop()
+        self._on_top()
+
+    def _stopped(self) -> None:
+        if len(self._goals) == 1:
+            self.ended = "stop"
+            return
+        self._goals.pop()
+        self._on_top()
+
+    def _on_top(self) -> None:
+        """g_t is the top of the stack."""
+        deep = len(self._goals) > 1
+        self.targets = (self._goals[-1].node,) if deep else self.task.goal_nodes
+        self.mode = Mode.SUB if deep else Mode.MAIN
+        if not deep:
+            self.subtask = None
+
+    def _cost(self, action: Action) -> float:
+        if isinstance(action, Stop) and len(self._goals) == 1:
+            return self.task_error(self.pose.node, self._goals[0].node)
+        return self._costs.of(action)
+
+    def _cost_of_limit(self) -> float:
+        return self.task_error(self.pose.node, self.task.goal_nodes[0])
+
+    def _stack(self) -> tuple[int, ...]:
+        return tuple(g.node for g in self._goals)
+
+    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
+        return self._state, tuple(g.description for g in self._goals)
+
+
+def shaped_costs(episode: Episode, hops: np.ndarray) -> list[float]:
+    """c-tilde_t = c_t + Phi(s_{t+1}, g_{t+1}) - Phi(s_t, g_t), with Phi = 0 after the end (4.20).
+
+    Args:
+      hops: (n, n) edges on the shortest paths (tasks.goals.count_hops).
+
+    They sum to the costs minus Phi(s_1, g_1) (4.21), whatever was done.
+    """
+    potential = [float(hops[s.pose.node, s.targets[0]]) for s in episode.steps] + [0.0]
+    return [s.cost + potential[t + 1] - potential[t] for t, s in enumerate(episode.steps)]

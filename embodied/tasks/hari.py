@@ -1,0 +1,54 @@
+"""HARI: reach the one place somebody had in mind (dissertation 4.3.5, appendix E)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from embodied.interface import FindObject, Language, Task
+from embodied.tasks.find import Pool, build_pool, draw
+from embodied.tasks.goals import GoalClass, find_instances
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+
+@dataclass(frozen=True)
+class HariConfig:
+    """Limits of 4.3.5 and Table E.2."""
+
+    fewest_nodes: int = 5
+    most_nodes: int = 10
+    """Nodes on the shortest path; 1 to 10 for pre-training (appendix E)."""
+    horizon: int = 30
+    reach: float = 2.5
+
+
+def hari_pool(
+    world: World, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None,
+) -> Pool:
+    """One request per object instance: the node nearest to it is what the human has in mind.
+
+    Args:
+      objects: object classes to ask for; None for all (the unseen-object condition holds some out).
+    """
+    classes = tuple(
+        GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1])
+        for x in find_instances(world, config.reach) if objects is None or x.object_class in objects
+    )
+    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hari")
+
+
+def hari_task(pool: Pool, index: int, *, seed: int, language: Language, config: HariConfig = HariConfig()) -> Task:
+    """Task `index` of the pool; success is to end exactly at the intended node.
+
+    Raises:
+      IndexError: the pool has no such task.
+    """
+    goal, start, rng = draw(pool, index, seed=seed, kind="hari")
+    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
+    return Task(
+        f"{pool.world}/hari/{index}", "hari", pool.world, start, what, goal.goal_nodes,
+        language.request(what, rng=rng), radius=0.0, horizon=config.horizon,
+    )

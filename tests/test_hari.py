@@ -1,0 +1,161 @@
+"""HARI: descriptions, the half-way rule, the goal stack, costs and the telescoping identity (4.21)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hand_worlds import grid_world, line_world, room, thing
+
+from embodied import metrics
+from embodied.assistants.descriptions import Describer, DescriberConfig, frequent_classes
+from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
+from embodied.env import ActionError
+from embodied.hari_env import Costs, HariEnv, shaped_costs
+from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
+from embodied.language.plain import PlainLanguage
+from embodied.policies import HalfwaySkyline, Shortest
+from embodied.rollout import play
+from embodied.tasks.goals import count_hops
+from embodied.tasks.hari import hari_pool, hari_task
+
+CUR, GOAL, SUB = Intention.CUR, Intention.GOAL, Intention.SUB
+TASK = Task("line/hari/0", "hari", "line", Pose(0), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug in a hall", 0.0, 30)
+
+
+def line_env(**options) -> HariEnv:
+    world, say = line_world(), Describer(())
+    return HariEnv({"line": world}, HariAssistant(say, **options), say)
+
+
+def grid_setup(assistant=lambda say: HariAssistant(say)):
+    world = grid_world()
+    say = Describer(frequent_classes([world], 3))
+    pool = hari_pool(world, seed=0)
+    tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(30)]
+    return world, tasks, lambda: HariEnv({"grid": world}, assistant(say), say)
+
+
+def test_the_half_way_rule():
+    assert [subgoal(tuple(range(n))) for n in (1, 2, 3, 4, 5, 6, 7, 8, 20)] == [0, 1, 1, 2, 2, 3, 3, 3, 3]
+
+
+def test_descriptions_name_the_room_and_what_is_near():
+    world = line_world()
+    dense = Describer(()).dense(world, 3, goal=True)
+    assert dense == (Feature("room", "hall"), Feature("object", "mug", 1, -1, 1)), "0.4 m east, 0.2 m north, 1.4 m down"
+    assert Describer(()).dense(world, 0) == (Feature("room", "hall"),), "the mug is more than 5 m away"
+    assert Describer(()).sparse(world, 3, goal=True) == (Feature("room", "hall"),), "a mug is not frequent"
+    assert Describer(("mug",)).sparse(world, 3) == dense[1:], "no room name for the state"
+    assert Describer(()).step(world, 1, 3) == (Feature("action", "go", 0, 0, 2),)
+    assert Describer(()).step(world, 3, 3) == (Feature("action", "stop"),)
+
+
+def test_at_most_twenty_objects_and_none_from_behind_the_wall():
+    world = line_world()
+    many = tuple(thing("mug", i, "hall_1", 1.0 + i / 20, 0.5) for i in range(1, 40))
+    house = dataclasses.replace(world.house, placements=many)
+    assert len(Describer(()).dense(dataclasses.replace(world, house=house), 0)) == 21
+    other = dataclasses.replace(
+        world.house, rooms=(*world.house.rooms, room("bedroom_1", "bedroom", 0, 2, 8, 4)),
+        placements=(thing("bed", 1, "bedroom_1", 1, 2.5),),
+    )
+    behind = dataclasses.replace(world, house=other)
+    assert len(Describer(()).dense(behind, 0)) == 1
+    assert len(Describer((), DescriberConfig(same_room=False)).dense(behind, 0)) == 2
+
+
+def test_the_stack_pushes_describes_pops_and_ends():
+    env = line_env()
+    o = env.reset(TASK)
+    assert (o.mode, o.goal_descriptions, o.state_description) == (Mode.MAIN, ((Feature("room", "hall"),),), ())
+    assert o.can_ask == (CUR, GOAL, SUB)
+    o = env.step(Ask(CUR))
+    assert o.state_description == (Feature("room", "hall"),)
+    o = env.step(Ask(GOAL))
+    assert len(o.goal_descriptions) == 1 and len(o.goal_descriptions[0]) == 2
+    o = env.step(Ask(SUB))
+    assert (env.situation.goals, o.mode, o.can_ask) == ((3, 2), Mode.SUB, (CUR, GOAL)), "the stack is full"
+    with pytest.raises(ActionError, match="sub"):
+        env.step(Ask(SUB))
+    for node in (1, 2):
+        o = env.step(Move(env.situation.candidate_nodes.index(node)))
+        assert o.state_description == (), "after moving, perception is sparse again"
+    o = env.step(Stop())
+    assert (env.situation.goals, o.mode) == ((3,), Mode.MAIN)
+    o = env.step(Ask(SUB))
+    assert o.goal_descriptions[1] == (Feature("action", "go", 0, 0, 2),), "one step away: the action itself"
+    env.step(Move(env.situation.candidate_nodes.index(3)))
+    env.step(Stop())
+    assert env.step(Stop()) is None
+    e = env.episode()
+    assert metrics.success(e, line_world().graph) == 1 and e.requests == 4
+    assert [s.cost for s in e.steps] == [0.01] * 5 + [0.0] + [0.01] * 2 + [0.0, 0.0]
+
+
+def test_stopping_away_from_the_goal_costs_the_edges_that_are_missing():
+    env = line_env()
+    env.reset(TASK)
+    env.step(Stop())
+    assert env.episode().steps[-1].cost == 3.0
+
+
+def test_a_sub_goal_is_given_up_after_three_times_its_distance():
+    env = line_env()
+    env.reset(TASK)
+    env.step(Ask(SUB))
+    for i in range(6):
+        assert len(env.situation.goals) == 2
+        env.step(Move(env.situation.candidate_nodes.index((i + 1) % 2)))
+    assert env.situation.goals == (3,)
+
+
+def test_a_stack_of_one_never_offers_sub_goals():
+    env = line_env(stack=1)
+    assert env.reset(TASK).can_ask == (CUR, GOAL)
+
+
+def test_shaped_costs_telescope_whatever_is_done():
+    """Eq 4.21: their sum is the sum of costs minus Phi(s_1, g_1)."""
+    world, tasks, make = grid_setup()
+    hops, env = count_hops(world.graph.next_hop), make()
+    for i, task in enumerate(tasks):
+        rng = np.random.default_rng(i)
+        o = env.reset(task)
+        while o is not None:
+            choices = [Move(k) for k in range(len(o.candidates))] + [Ask(q) for q in o.can_ask] + [Stop()]
+            o = env.step(choices[int(rng.integers(len(choices)))])
+        e = env.episode()
+        start = hops[task.start.node, task.goal_nodes[0]]
+        assert sum(shaped_costs(e, hops)) == pytest.approx(sum(s.cost for s in e.steps) - start)
+
+
+def test_the_expert_arrives_exactly_and_pays_for_its_steps_only():
+    world, tasks, make = grid_setup()
+    hops = count_hops(world.graph.next_hop)
+    for e in play(make, Shortest(), tasks, seed=0):
+        assert metrics.success(e, world.graph) == 1
+        assert sum(s.cost for s in e.steps) == pytest.approx(0.01 * hops[e.task.start.node, e.task.goal_nodes[0]])
+
+
+def test_the_skyline_reaches_every_goal_by_sub_goals():
+    world, tasks, make = grid_setup()
+    episodes = play(make, HalfwaySkyline(), tasks, seed=0)
+    assert all(metrics.success(e, world.graph) for e in episodes)
+    assert all(e.requests >= 2 for e in episodes)
+
+
+def test_the_uncooperative_assistant_answers_other_questions():
+    _, tasks, make = grid_setup(lambda say: Uncooperative(HariAssistant(say)))
+    env, heard = make(), set()
+    for seed in range(30):
+        env.reset(tasks[0], seed=seed)
+        env.step(Ask(CUR))
+        heard.add(env.last_step.reply.intention)
+    assert heard == {CUR, GOAL, SUB}
+
+
+def test_costs_are_configurable():
+    costs = Costs(cur=1, goal=2, sub=3, do=4)
+    assert [costs.of(a) for a in (Ask(CUR), Ask(GOAL), Ask(SUB), Move(0), Stop())] == [1, 2, 3, 4, 0]
