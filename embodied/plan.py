@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
@@ -72,8 +74,8 @@ def save_plan(house: House, path: Path, **options) -> None:
 
 
 def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Pillow's own scalable face, so that pictures agree between machines."""
-    return ImageFont.load_default(size=max(6.0, size))
+    """DejaVu Sans as Matplotlib ships it, so that pictures agree between machines."""
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size))
 
 
 class _Sheet:
@@ -262,7 +264,7 @@ def _draw_stair(sheet: _Sheet, stair) -> None:
 def _draw_graph(sheet: _Sheet, graph, path: tuple[int, ...]) -> None:
     for i, j in graph.edges:
         sheet.line((graph.positions[i][:2], graph.positions[j][:2]), 0.025, (196, 118, 88))
-    for a, b in zip(path, path[1:]):
+    for a, b in itertools.pairwise(path):
         sheet.line((graph.positions[a][:2], graph.positions[b][:2]), 0.08, (200, 60, 50))
     for k, p in enumerate(graph.positions):
         x, y = sheet.xy(p)

@@ -21,11 +21,12 @@ from embodied.generate.program import Space, draw_area, draw_program
 from embodied.house import House, HouseError, Room, Sky, Storey, check
 from embodied.seeds import stream
 
-__all__ = ["Draft", "HouseConfig", "STAGES", "generate_house"]
+__all__ = ["STAGES", "Draft", "HouseConfig", "generate_house"]
 
 TRIES = 900
 """Candidate plans per attempt."""
 ATTEMPTS = 12
+DEFAULT = HouseConfig()
 
 
 @dataclass(frozen=True)
@@ -41,17 +42,17 @@ class Draft:
     """Alternatives of one shape and area, among which the rooms stage chooses."""
     spaces: tuple[Space, ...] = ()
     plan: Plan | None = None
-    palette: Palette = Palette()
+    palette: Palette | None = None
     house: House | None = None
 
 
 def footprint(draft: Draft) -> Draft:
-    """Total area, shape and a dozen footprints of it."""
+    """Total area, shape and thirty footprints of it."""
     area = draw_area(draft.config, rng=stream(draft.seed, "house", "area"))
     rng = stream(draft.seed, "house", "footprint")
     shape = draw_shape(area, draft.config, rng=rng)
     return dataclasses.replace(
-        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(12)))
+        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(30)))
 
 
 def program(draft: Draft) -> Draft:
@@ -139,7 +140,7 @@ STAGES: Mapping[str, Callable[[Draft], Draft]] = {
 }
 
 
-def generate_house(seed: int, config: HouseConfig = HouseConfig(), catalogue: object | None = None,
+def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: object | None = None,
                    stages: Mapping[str, Callable[[Draft], Draft]] = STAGES) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 

@@ -7,6 +7,7 @@ are integers in decimetres.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,8 +104,9 @@ def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Foot
     """A footprint of `area` square metres with the corridors of its wings."""
     if shape == "rectangle":
         return _flat(area, rng) if area < 62 else _bar(area, rng)
-    return _bumped(area, shape, rng) if area < 150 and shape != "U" or (shape == "U" and area < 190) else (
-        _winged(area, shape, rng))
+    if area < (260 if shape == "U" else 150):
+        return _bumped(area, shape, rng)
+    return _winged(area, shape, rng)
 
 
 def _depths(rng: np.random.Generator, low: int, high: int) -> tuple[int, int]:
@@ -151,7 +153,7 @@ def _one_wing(shape, length, top, bottom, corridor, bumps, area, rng) -> Footpri
     for x0, x1, _ in bumps:
         edges += [x0, x1]
     edges = sorted({*(min(max(e, left), length - right) for e in edges), length - right})
-    for x0, x1 in zip(edges, edges[1:]):
+    for x0, x1 in itertools.pairwise(edges):
         extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
         strips.append(Strip("x", x0, 1, x1 - x0, bottom, -1, bottom + extra, x0, 0, x0 - left))
     band = Band("x", left, 1, length - left - right, bottom, bottom + corridor, (left == 0, right == 0))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +23,10 @@ ZONE = {
 """How private a room kind is: 0 at the public end of the spine."""
 
 
+KEPT = 6
+"""Candidates kept as parents."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """A plan on the 0.1 m grid: cells, the walls they share, and the ways between them."""
@@ -30,26 +36,70 @@ class Plan:
     score: float
 
 
-def draw_plan(footprints: list[Footprint], spaces: tuple[Space, ...], tries: int, *, rng: np.random.Generator) -> Plan | None:
-    """The best of `tries` candidates over `footprints`; None where none is walkable."""
-    best: Plan | None = None
+@dataclass(frozen=True)
+class Genome:
+    """The choices that make one candidate; a small change of it makes a similar plan."""
+
+    footprint: int
+    modules: int
+    """Seeds of the grouping into modules, of the assignment to rows and of the cutting."""
+    rows: int
+    cuts: int
+    privacy: tuple[float, ...]
+    """What is added to each space's ZONE."""
+
+
+def draw_plan(footprints: Sequence[Footprint], spaces: tuple[Space, ...], tries: int, *,
+              rng: np.random.Generator) -> Plan | None:
+    """The best of `tries` candidates: random ones first, then changes of the best so far.
+
+    Returns:
+      None where no candidate can be walked without crossing a private room.
+    """
+    best: list[tuple[float, Genome, Plan]] = []
     for k in range(tries):
-        cells = _candidate(footprints[k % len(footprints)], spaces, rng)
-        if cells is None:
-            continue
-        walls = walls_between(cells)
-        value = score(cells, walls)
-        if best is not None and value <= best.score:
-            continue
-        if not has_outer_doors(cells, walls):
-            continue
-        linked = connect(cells, walls)
-        if linked is None:
-            continue
-        value -= linked[1]
-        if best is None or value > best.score:
-            best = Plan(tuple(cells), tuple(linked[0]), value)
-    return best
+        if k < 0.45 * tries or not best:
+            genome = _random_genome(len(footprints), len(spaces), rng)
+        else:
+            genome = _changed(best[int(rng.integers(len(best)))][1], len(footprints), rng)
+        plan = _realised(footprints[genome.footprint], spaces, genome, best[-1][0] if len(best) == KEPT else -np.inf)
+        if plan is not None and all(plan.score != other for other, _, _ in best):
+            best = sorted([*best, (plan.score, genome, plan)], key=lambda b: -b[0])[:KEPT]
+    return best[0][2] if best else None
+
+
+def _random_genome(footprints: int, spaces: int, rng: np.random.Generator) -> Genome:
+    seeds = rng.integers(2**31, size=3).tolist()
+    return Genome(int(rng.integers(footprints)), *seeds, tuple(rng.normal(0, 0.45, spaces).tolist()))
+
+
+def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:
+    what = rng.random()
+    if what < 0.15:
+        return replace(genome, footprint=int(rng.integers(footprints)))
+    if what < 0.25:
+        return replace(genome, modules=int(rng.integers(2**31)))
+    if what < 0.4:
+        return replace(genome, rows=int(rng.integers(2**31)))
+    if what < 0.5:
+        return replace(genome, cuts=int(rng.integers(2**31)))
+    privacy = list(genome.privacy)
+    for k in rng.integers(len(privacy), size=int(rng.integers(1, 4))):
+        privacy[k] = float(rng.normal(0, 0.8))
+    return replace(genome, privacy=tuple(privacy))
+
+
+def _realised(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome, floor: float) -> Plan | None:
+    """The genome's plan, None where it cannot be built or scores below `floor`."""
+    cells = _candidate(footprint, spaces, genome)
+    if cells is None:
+        return None
+    walls = walls_between(cells)
+    value = score(cells, walls)
+    if value <= floor or not has_outer_doors(cells, walls):
+        return None
+    linked = connect(cells, walls)
+    return None if linked is None else Plan(tuple(cells), tuple(linked[0]), value - linked[1])
 
 
 def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
@@ -74,7 +124,8 @@ def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
     return Plan(cells, links, plan.score)
 
 
-def _candidate(footprint: Footprint, spaces: tuple[Space, ...], rng: np.random.Generator) -> list[Cell] | None:
+def _candidate(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome) -> list[Cell] | None:
+    rng = np.random.default_rng(genome.modules)
     modules = draw_modules(spaces, rng=rng)
     cells: list[Cell] = []
     for cap in footprint.caps:
@@ -82,10 +133,11 @@ def _candidate(footprint: Footprint, spaces: tuple[Space, ...], rng: np.random.G
         if chosen is None:
             return None
         modules = [m for m in modules if m not in chosen]
-    rows = _assign(footprint, modules, rng)
+    rows = _assign(footprint, modules, {id(s): p for s, p in zip(spaces, genome.privacy)},
+                   np.random.default_rng(genome.rows))
     if rows is None:
         return None
-    return _lay(footprint, rows, cells, rng)
+    return _lay(footprint, rows, cells, np.random.default_rng(genome.cuts))
 
 
 def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random.Generator) -> list[Module] | None:
@@ -148,9 +200,10 @@ def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random
     return cells
 
 
-def _assign(footprint: Footprint, modules: list[Module], rng: np.random.Generator) -> list[list[Module]] | None:
+def _assign(footprint: Footprint, modules: list[Module], privacy: dict[int, float],
+            rng: np.random.Generator) -> list[list[Module]] | None:
     """Modules to rows, from the public end to the private one."""
-    keys = [ZONE[m.main.kind] + rng.normal(0, 0.45) for m in modules]
+    keys = [ZONE[m.main.kind] + privacy[id(m.main)] for m in modules]
     order = sorted(range(len(modules)), key=lambda k: keys[k])
     rows: list[list[Module]] = [[] for _ in footprint.strips]
     used = [0.0] * len(rows)
@@ -188,7 +241,7 @@ def _lay(footprint: Footprint, rows: list[list[Module]], cells: list[Cell], rng:
     for s, row in zip(footprint.strips, rows):
         wanted = np.array([width(m, s.depth, corridor) for m in row], dtype=float)
         edges = [0, *np.round(np.cumsum(wanted) / wanted.sum() * s.length).astype(int).tolist()]
-        cuts.append(list(zip(edges, edges[1:])))
+        cuts.append(list(itertools.pairwise(edges)))
     reach: dict[tuple[int, int], int] = {}
     limits = []
     for b, band in enumerate(footprint.bands):

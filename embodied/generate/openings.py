@@ -95,7 +95,7 @@ def _is_wide(plan: Plan, link) -> bool:
 
 def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[tuple, tuple]:
     """The two jambs, in the sense that leaves `cell` on the left of a -> b."""
-    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
+    _, y0, x1, _ = (v / 10 for v in cell.rect)
     forward = abs(across - y0) < 1e-6 if axis == "x" else abs(across - x1) < 1e-6
     p, q = ((low, across), (high, across)) if axis == "x" else ((across, low), (across, high))
     return (p, q) if forward else (q, p)

@@ -7,6 +7,7 @@ reachable when a box is added.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -253,9 +254,11 @@ def room_space(house: House, room: Room) -> RoomSpace:
             keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation))
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
-    for stair in house.stairs:
-        if room.id in stair.rooms:
-            keepouts.extend(_stair_keepouts(stair, storey.elevation, storey.height))
+    flights = [
+        b for stair in house.stairs if room.id in stair.rooms
+        for b in _stair_keepouts(stair, storey.elevation, storey.height)
+    ]
+    keepouts.extend(flights)
     x0, y0, x1, y1 = floor.bounds
     origin = (x0 - CELL, y0 - CELL)
     shape = (int((y1 - y0) / CELL) + 3, int((x1 - x0) / CELL) + 3)
@@ -268,8 +271,8 @@ def room_space(house: House, room: Room) -> RoomSpace:
     space = RoomSpace(
         room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin,
     )
-    for b in keepouts:
-        if b.bottom - storey.elevation < 0.1 and b.top - storey.elevation > 2.3:  # stairs
+    for b in flights:
+        if b.top - storey.elevation > 2.3:
             cv2.fillConvexPoly(walk, space._cells(b.corners(radius - 0.02)), 0)
     return space
 
@@ -329,7 +332,7 @@ def _stair_keepouts(stair, z: float, height: float) -> list[Box]:
     boxes = []
     path = stair.path
     foot, head = path[0], path[-1]
-    for (ax, ay, _), (bx, by, _) in zip(path[:-1], path[1:]):
+    for (ax, ay, _), (bx, by, _) in itertools.pairwise(path):
         length = math.hypot(bx - ax, by - ay)
         if length < 1e-6:
             continue
