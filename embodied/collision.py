@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -71,7 +72,7 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
     return tuple(_box(low, high) for low, high in (*slabs, *bounds))
 
 
-def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
+def surface_points(parts: Sequence[MeshPart], n: int = 4000) -> np.ndarray:
     """(k, 3) points spread over the surface of `parts`, always the same ones; vertices included."""
     corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -96,9 +97,11 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tu
     cells = [np.clip(np.searchsorted(e, points[:, i], side="right") - 1, 0, len(e) - 2) for i, e in enumerate(edges)]
     shape = tuple(len(e) - 1 for e in edges)
     flat = np.ravel_multi_index(cells, shape)
-    lows, highs = np.full((np.prod(shape), 3), np.inf), np.full((np.prod(shape), 3), -np.inf)
-    np.minimum.at(lows, flat, points)
-    np.maximum.at(highs, flat, points)
+    order = np.argsort(flat, kind="stable")
+    filled_cells, first = np.unique(flat[order], return_index=True)
+    lows, highs = np.full((math.prod(shape), 3), np.inf), np.full((math.prod(shape), 3), -np.inf)
+    lows[filled_cells] = np.minimum.reduceat(points[order], first)
+    highs[filled_cells] = np.maximum.reduceat(points[order], first)
     lows, highs = lows.reshape(*shape, 3), highs.reshape(*shape, 3)
     occupied = np.isfinite(lows[..., 0])
     filled = ndimage.binary_fill_holes(occupied)

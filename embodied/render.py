@@ -14,6 +14,7 @@ from embodied import gl
 
 gl.prepare()
 
+import cv2
 import mujoco
 import numpy as np
 
@@ -27,6 +28,10 @@ QUALITIES = ("unlit", "baked")
 BACKENDS = ("classic",)
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
+SUPERSAMPLING = 2
+"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
+multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
+MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
 
@@ -90,12 +95,14 @@ class Renderer:
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
         gl.make_current()
-        model.vis.global_.offwidth = model.vis.global_.offheight = size
+        self._super = SUPERSAMPLING if gl.info().software else 1
+        model.vis.quality.offsamples = 0 if self._super > 1 else MULTISAMPLES
+        self._buffer = (size * self._super, size * self._super)
+        model.vis.global_.offheight, model.vis.global_.offwidth = self._buffer
         self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._buffer = (size, size)
-        self._drawn = _empty_scene(model, lit is not None)
+        self._drawn = _empty_scene(model)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
         self._option.geomgroup[VISUAL] = 1
@@ -116,14 +123,14 @@ class Renderer:
         """
         camera = camera_at(position, yaw, pitch, vfov)
         drawn = self._choose(camera, size, cull)
-        rgb = self._rgb(camera, size)
-        depth, ids = self._depth_and_ids(camera, size, drawn)
+        rgb = self._rgb(size)
+        depth, ids = self._depth_and_ids(size, drawn)
         return View(rgb, depth, ids)
 
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
         self._choose(camera, size, True)
-        return self._rgb(camera, size)
+        return self._rgb(size)
 
     def panorama(self, position, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
@@ -132,8 +139,8 @@ class Renderer:
         depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
         for k, camera in enumerate(face_cameras(position)):
             drawn = self._choose(camera, (s, s), True)
-            rgb[k] = self._rgb(camera, (s, s))
-            depth[k], ids[k] = self._depth_and_ids(camera, (s, s), drawn)
+            rgb[k] = self._rgb((s, s))
+            depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
         return Panorama(rgb, depth, ids)
 
     def seen(self, position, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +148,7 @@ class Renderer:
         depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
         for k, camera in enumerate(face_cameras(position)):
             drawn = self._choose(camera, (size, size), True)
-            depth[k], ids[k] = self._depth_and_ids(camera, (size, size), drawn)
+            depth[k], ids[k] = self._depth_and_ids((size, size), drawn)
         return depth, ids
 
     def close(self) -> None:
@@ -162,8 +169,8 @@ class Renderer:
         if self._mjr is None:
             raise RuntimeError("the renderer is closed; make a new one")
         gl.make_current()
-        if size[0] > self._buffer[0] or size[1] > self._buffer[1]:
-            self._buffer = (max(size[0], self._buffer[0]), max(size[1], self._buffer[1]))
+        if size[0] * self._super > self._buffer[0] or size[1] * self._super > self._buffer[1]:
+            self._buffer = tuple(max(n * self._super, b) for n, b in zip(size, self._buffer, strict=True))
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
         mask = self._is_visual
         if cull:
@@ -200,13 +207,16 @@ class Renderer:
         apart = self._data.geom_xpos - np.array(camera.position)
         return np.all(apart @ planes.T >= -self.scene.model.geom_rbound[:, None] - 1e-3, axis=1)
 
-    def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        rect, rgb = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
+    def _rgb(self, size: tuple[int, int]) -> np.ndarray:
+        height, width = size[0] * self._super, size[1] * self._super
+        rect, rgb = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        if self._super > 1:
+            rgb = cv2.resize(rgb, (size[1], size[0]), interpolation=cv2.INTER_AREA)
         return rgb[::-1]
 
-    def _depth_and_ids(self, camera: Camera, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _depth_and_ids(self, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A second pass that paints every geom in its number's colour."""
         flags = self._drawn.flags
         flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
@@ -249,10 +259,9 @@ def _check(house: House, quality: str, backend: str, size: int, lit: LitPages | 
         raise ValueError("quality 'baked' needs lit=..., the pages of embodied.light; 'unlit' takes none")
 
 
-def _empty_scene(model: mujoco.MjModel, lit: bool) -> mujoco.MjvScene:
+def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
-    off = ("SHADOW", "REFLECTION", "FOG", "HAZE", *(() if lit else ("CULL_FACE",)))
-    for name in off:
+    for name in ("SHADOW", "REFLECTION", "FOG", "HAZE"):
         scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
     return scene
 

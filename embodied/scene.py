@@ -64,20 +64,11 @@ def compile_scene(house: House, catalogue, *, free: Iterable[str] = (), collisio
       collisions: False leaves the collision boxes out, which a renderer does not need.
       lit: draw these pages instead of the house's own materials.
     """
-    spec = build_spec(house, catalogue, free=frozenset(free), collisions=collisions, lit=lit)
-    return scene_of(house, catalogue, spec, free=free, lit=lit)
-
-
-def scene_of(house: House, catalogue, spec: mujoco.MjSpec, *, free: Iterable[str] = (),
-             lit: LitPages | None = None) -> Scene:
-    """Compile a spec made by `build_spec`, and say whose every geom is."""
-    model = spec.compile()
-    names = owners(house)
+    parts = house_parts(house, catalogue) if lit is None else ()
+    spec = build_spec(house, catalogue, free=frozenset(free), collisions=collisions, lit=lit, parts=parts)
+    model, names = spec.compile(), owners(house)
     number = {name: i + 1 for i, name in enumerate(names)}
-    if lit is None:
-        labels = {p.owner: (p.kind, p.room) for p in house_parts(house, catalogue)}
-    else:
-        labels = {m.owner: (m.kind, m.room) for m in lit.meshes}
+    labels = {p.owner: (p.kind, p.room) for p in (parts if lit is None else lit.meshes)}
     owned, kinds, rooms = np.zeros(model.ngeom, np.int32), [], []
     for g in range(model.ngeom):
         owner = owner_of_name(model.geom(g).name)
@@ -105,8 +96,12 @@ def is_underfoot(p: Placement) -> bool:
 
 
 def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), collisions: bool = True,
-               lit: LitPages | None = None) -> mujoco.MjSpec:
+               lit: LitPages | None = None, parts: Sequence[Part] | None = None) -> mujoco.MjSpec:
     """The house as an MjSpec.
+
+    Args:
+      free, collisions, lit: as for `compile_scene`.
+      parts: house_parts(house, catalogue) where the caller has them already.
 
     Raises:
       ValueError: `free` names something that is no placement, or is asked for together with `lit`.
@@ -118,12 +113,10 @@ def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), c
     spec = _empty_spec(house)
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:
-        parts = house_parts(house, catalogue)
         _light(spec)
         _add_sky(spec)
-        _add_parts(spec, parts, bodies)
+        _add_parts(spec, house_parts(house, catalogue) if parts is None else parts, bodies)
     else:
-        parts = ()
         spec.visual.headlight.active = 0
         _add_pages(spec, lit)
     if collisions:
@@ -155,11 +148,11 @@ def _empty_spec(house: House) -> mujoco.MjSpec:
 def _light(spec: mujoco.MjSpec) -> None:
     """Soft light from all sides without shadows, the same for every camera: cube faces join."""
     head = spec.visual.headlight
-    head.active, head.ambient, head.diffuse, head.specular = 1, [0.40] * 3, [0.0] * 3, [0.0] * 3
+    head.active, head.ambient, head.diffuse, head.specular = 1, [0.63, 0.62, 0.60], [0.0] * 3, [0.0] * 3
     for direction, strength in LIGHTS:
         spec.worldbody.add_light(
             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=direction, pos=[0, 0, 3], castshadow=False,
-            ambient=[0, 0, 0], diffuse=[strength, strength * 0.985, strength * 0.95], specular=[0.08] * 3)
+            ambient=[0, 0, 0], diffuse=[strength, strength * 0.985, strength * 0.95], specular=[0.1] * 3)
 
 
 def _add_sky(spec: mujoco.MjSpec) -> None:
@@ -167,10 +160,7 @@ def _add_sky(spec: mujoco.MjSpec) -> None:
                      rgb1=[0.50, 0.68, 0.90], rgb2=[0.93, 0.95, 0.97], width=128, height=128)
 
 
-LIGHTS = (
-    ((0.25, 0.35, -1.0), 0.42), ((0.0, 0.0, 1.0), 0.46), ((1.0, 0.25, -0.15), 0.30), ((-1.0, -0.2, -0.15), 0.22),
-    ((-0.2, 1.0, -0.15), 0.38), ((0.2, -1.0, -0.15), 0.26),
-)
+LIGHTS = (((0.35, 0.5, -0.8), 0.34), ((-0.85, -0.5, 0.15), 0.30), ((0.0, 0.0, 1.0), 0.30))
 """Direction and strength of the fill lights: floor, ceiling and the four ways a wall can face."""
 
 
@@ -302,13 +292,16 @@ def _add_collisions(spec: mujoco.MjSpec, house: House, catalogue, bodies: Mappin
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
         for i in range(len(room.polygon)):
             _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
+    known: dict[tuple, tuple[collision.Box, ...]] = {}
     for p in house.placements:
         if is_underfoot(p):
             continue
-        asset = catalogue.assets[p.asset]
-        boxes = placement_boxes(catalogue, p)
+        key = (p.asset, p.size, p.params)
+        if key not in known:
+            known[key] = placement_boxes(catalogue, p)
+        boxes = known[key]
         if p.id in bodies:
-            _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(asset))
+            _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(catalogue.assets[p.asset]))
         else:
             frame = spec.worldbody.add_frame(pos=p.position, quat=yaw_quat(p.yaw))
             _add_boxes(spec.worldbody, p.id, boxes, frame=frame)
