@@ -69,7 +69,7 @@ class FeedForward(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """(..., h) -> (..., h)."""
-        return self.norm(x + self.dropout(self.narrow(self.dropout(F.relu(self.wide(x))))))
+        return self.norm(x + self.dropout(self.narrow(F.relu(self.wide(x)))))
 
 
 class DotAttend(nn.Module):

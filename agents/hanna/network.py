@@ -17,10 +17,15 @@ import dataclasses
 from dataclasses import dataclass
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
 from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, slot_distribution, target_similarity
+
+
+SHORT = 12
+"""Words up to which an instruction is encoded with the short ones."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,9 @@ class HannaConfig:
 class Memory:
     """What one network carries from step to step, for B agents. Keys and values are projected."""
 
-    text: Tensor
-    """(B, L, h) M^text; with `text_mask` (B, L) bool."""
+    text_keys: Tensor
+    text_values: Tensor
+    """(B, L, h) M^text, with `text_mask` (B, L) bool."""
     text_mask: Tensor
     inter_state: Tensor
     """(B, h) h_{t-1}^inter."""
@@ -139,7 +145,8 @@ class StateNetwork(nn.Module):
         inter_keys, inter_values = self.inter_attend.empty(batch, like)
         intra_keys, intra_values = self.intra_attend.empty(batch, like)
         return Memory(
-            text=zero[:, None].expand(-1, length, -1), text_mask=seen.expand(-1, length),
+            text_keys=zero[:, None].expand(-1, length, -1), text_values=zero[:, None].expand(-1, length, -1),
+            text_mask=seen.expand(-1, length),
             inter_state=zero, inter_keys=inter_keys, inter_values=inter_values, inter_mask=seen,
             local_time=zero, global_time=zero, intra_keys=intra_keys, intra_values=intra_values,
             intra_inputs=zero[:, None], intra_states=zero[:, None], similar_mask=seen[:, :0],
@@ -161,7 +168,7 @@ class StateNetwork(nn.Module):
         Returns:
           h_t^intra (B, h) and the memory after this step.
         """
-        text, text_mask = self._read(m, percept)
+        m = self._read(m, percept)
         m = self._reset(m, percept.new_task) if self.config.reset_inter_task else m
 
         local_time = self.local_time(m.local_time)  # (B, h) D.1
@@ -171,8 +178,8 @@ class StateNetwork(nn.Module):
         inter_in = self.inter_in(torch.cat([scene, previous, delta], -1)) + local_time  # (B, h) q^inter, D.7
         inter, inter_keys = self.inter_attend(inter_in, m.inter_keys, m.inter_values, m.inter_mask)  # (B, h) D.6
 
-        words = self.text_attend.key(text), self.text_attend.value(text)
-        said = self.text_feed(self.text_attend(inter, *words, text_mask))  # (B, h) c^text, D.9 and D.10
+        read = self.text_attend(inter, m.text_keys, m.text_values, m.text_mask)  # (B, h) tilde c^text, D.10
+        said = self.text_feed(read)  # (B, h) c^text, D.9
         here = self.current_attend(said, percept.current)  # (B, D) c^cur, D.11
         there = self.target_attend(said, percept.target)  # (B, D) c^tgt, D.12
 
@@ -189,8 +196,8 @@ class StateNetwork(nn.Module):
             beta = torch.sigmoid(self.gate(torch.cat([tentative, past], -1)))  # (B, h) D.17
             state = tentative - beta * past  # (B, h) D.16
 
-        return state, Memory(
-            text=text, text_mask=text_mask, inter_state=inter, inter_keys=inter_keys,
+        return state, dataclasses.replace(
+            m, inter_state=inter, inter_keys=inter_keys,
             inter_values=self.inter_attend.append_value(m.inter_values, inter),
             inter_mask=torch.cat([m.inter_mask, seen[:, :1]], 1),
             local_time=local_time, global_time=global_time, intra_keys=intra_keys,
@@ -200,13 +207,22 @@ class StateNetwork(nn.Module):
             similar_mask=similar_mask,
         )
 
-    def _read(self, m: Memory, percept: Percept) -> tuple[Tensor, Tensor]:
-        """M^text (B, L, h) and its mask, read anew for the agents whose instruction changed (D.5)."""
-        rows = percept.new_task.nonzero()[:, 0]
-        if not len(rows):
-            return m.text, m.text_mask
-        text = m.text.index_copy(0, rows, self.text_encoder(percept.tokens[rows]))
-        return text, percept.tokens != 0
+    def _read(self, m: Memory, percept: Percept) -> Memory:
+        """M^text read anew for the agents whose instruction changed (D.5).
+
+        Short and long instructions are encoded apart, because padding costs as much as words.
+        """
+        lengths = (percept.tokens != 0).sum(1)
+        keys, values = m.text_keys, m.text_values
+        for rows in ((percept.new_task & (lengths <= SHORT)).nonzero()[:, 0],
+                     (percept.new_task & (lengths > SHORT)).nonzero()[:, 0]):
+            if len(rows):
+                width = int(lengths[rows].max())
+                text = self.text_encoder(percept.tokens[rows, :width])  # (k, width, h)
+                wide = (0, 0, 0, keys.shape[1] - width)
+                keys = keys.index_copy(0, rows, F.pad(self.text_attend.key(text), wide))
+                values = values.index_copy(0, rows, F.pad(self.text_attend.value(text), wide))
+        return dataclasses.replace(m, text_keys=keys, text_values=values, text_mask=percept.tokens != 0)
 
     @staticmethod
     def _reset(m: Memory, who: Tensor) -> Memory:

@@ -118,8 +118,8 @@ class HannaPolicy:
             )
             rng = rngs[position]
             index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
-            wants = self.ask_rule(float(asks[row]), o.time, memory.last_ask[row], rng)
-            if wants and Intention.HELP in o.can_ask:
+            can_ask = Intention.HELP in o.can_ask
+            if can_ask and self.ask_rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
                 actions[position] = Ask(Intention.HELP, thought)
                 chosen.append(0)  # its own move is discarded; the last action reads as stop
                 last_ask.append(o.time)

@@ -1,0 +1,93 @@
+"""HannaAgent: trained networks with all that is needed to act again, and their file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import safetensors
+import safetensors.torch
+import torch
+
+from agents.hanna.asking import RULES
+from agents.hanna.lstm import LstmNetwork
+from agents.hanna.network import HannaNetwork
+from agents.hanna.policy import HannaPolicy, choose_likeliest
+from agents.imitation.config import MODELS, TrainingConfig
+from agents.vision.bank import FeatureBank
+from agents.vision.resnet import read_weights
+from agents.vocabulary import Vocabulary
+from assets.cache import atomic_path
+
+FORMAT = "embodied-agent-1"
+SHIPPED = Path(__file__).resolve().parent.parent / "weights" / "hanna_mini.safetensors"
+"""The agent of this repository; see weights/README.md."""
+
+
+@dataclass(frozen=True, eq=False)
+class HannaAgent:
+    network: HannaNetwork | LstmNetwork
+    vocabulary: Vocabulary
+    config: TrainingConfig
+    encoder_digest: str
+    """Of the encoder whose features it learned from; others mean nothing to it."""
+    feature_size: int
+
+    def policy(self, bank: FeatureBank) -> HannaPolicy:
+        """The agent acting: likeliest actions, its own rule of asking.
+
+        Raises:
+          ValueError: features of another encoder.
+        """
+        if bank.digest != self.encoder_digest:
+            raise ValueError(
+                f"the features come from encoder {bank.digest[:12]}, the agent learned from {self.encoder_digest[:12]}; "
+                "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
+            )
+        return HannaPolicy(
+            self.network, self.vocabulary, bank, choose=choose_likeliest, ask_rule=RULES[self.config.ask_rule][1],
+            instruction_length=self.config.instruction_length, turn_to_agent=self.config.turn_to_agent,
+            read_assistance=self.config.read_assistance,
+        )
+
+
+def new_agent(config: TrainingConfig, vocabulary: Vocabulary, encoder_digest: str, feature_size: int) -> HannaAgent:
+    """An untrained agent; its weights follow from config.seed."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        network = MODELS[config.model](config.network_config(len(vocabulary), feature_size))
+    return HannaAgent(network, vocabulary, config, encoder_digest, feature_size)
+
+
+def save_agent(agent: HannaAgent, path: Path) -> None:
+    """Write weights in half precision, with settings and vocabulary, atomically."""
+    settings = {
+        "format": FORMAT, "config": agent.config.to_json(), "encoder": agent.encoder_digest,
+        "feature_size": str(agent.feature_size), "vocabulary": json.dumps(agent.vocabulary.words),
+    }
+    tensors = {k: v.detach().cpu().half().contiguous() for k, v in agent.network.state_dict().items()}
+    with atomic_path(Path(path)) as temporary:
+        safetensors.torch.save_file(tensors, temporary, metadata=settings)
+
+
+def load_agent(path: Path = SHIPPED) -> HannaAgent:
+    """Read what `save_agent` wrote, ready to act.
+
+    Raises:
+      ValueError: truncated, or of another format.
+    """
+    tensors = read_weights(Path(path))
+    with safetensors.safe_open(path, "pt") as f:
+        settings = f.metadata() or {}
+    if settings.get("format") != FORMAT:
+        raise ValueError(
+            f"{path}: format {settings.get('format')!r}, this version reads {FORMAT!r}; "
+            "train the agent again with `embodied train hanna`"
+        )
+    config = TrainingConfig.from_json(settings["config"])
+    vocabulary = Vocabulary(tuple(json.loads(settings["vocabulary"])))
+    agent = new_agent(config, vocabulary, settings["encoder"], int(settings["feature_size"]))
+    agent.network.load_state_dict({k: v.float() for k, v in tensors.items()})
+    agent.network.eval()
+    return agent

@@ -1,0 +1,116 @@
+"""TrainingConfig: the hyperparameters of dissertation Table D.1 and the ablations of D.2, in one record.
+
+Three rows of Table D.1 belong to the world and live there: gamma = 0.25 with the teacher
+(embodied.teachers.hanna), the attention radius with the assistant (embodied.assistants.anna), the
+success radius with the task (embodied.tasks.hanna).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from agents.hanna.asking import RULES
+from agents.hanna.lstm import LstmNetwork
+from agents.hanna.network import HannaConfig, HannaNetwork
+
+MODELS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """The defaults are Table D.1; SCALES holds the smaller settings."""
+
+    model: str = "hanna"
+    """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
+    hidden_size: int = 256
+    navigation_embedding: int = 256
+    ask_embedding: int = 128
+    self_heads: int = 8
+    """Number of self-attention heads."""
+    text_heads: int = 8
+    """Number of instruction-attention heads."""
+    dropout: float = 0.3
+    iterations: int = 30_000
+    learning_rate: float = 1e-4
+    """Of Adam."""
+    weight_decay: float = 5e-4
+    """The authors' program's; the text does not mention it (X12)."""
+    batch: int = 32
+    """Episodes per update."""
+    training_steps: int = 20
+    """Horizon of training episodes."""
+    instruction_length: int = 50
+    """Words of an instruction that are read."""
+    alpha: float = 1.0
+    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than 'learned'."""
+    evaluation_steps: int = 50
+    evaluation_batch: int = 32
+    """Has no influence on results here, only on speed."""
+    ask_rule: str = "learned"
+    """Key of hanna.asking.RULES: who decides when to ask."""
+    read_assistance: bool = True
+    """False: on routes there is only the target image (Table 4.4)."""
+    reset_inter_task: bool = True
+    """False: ablation of Table D.2."""
+    predict_reasons: bool = True
+    """False: ablation of Table D.2."""
+    similarity_attention: bool = True
+    """False: ablation of Table D.2 (beta = 0)."""
+    turn_to_agent: bool = True
+    """Views in the agent's frame; False: in absolute order, as in the authors' program (X27)."""
+    validate_every: int = 500
+    """Updates between validations."""
+    validation_tasks: int = 200
+    """Tasks of each validation."""
+    checkpoint_minutes: float = 3.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.model not in MODELS:
+            raise ValueError(f"model must be one of {sorted(MODELS)}, got {self.model!r}")
+        if self.ask_rule not in RULES:
+            raise ValueError(f"ask_rule must be one of {sorted(RULES)}, got {self.ask_rule!r}")
+        for name in ("iterations", "batch", "training_steps", "evaluation_steps", "evaluation_batch", "validate_every",
+                     "instruction_length"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("learning_rate", "checkpoint_minutes"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if self.alpha < 0:
+            raise ValueError(f"alpha must not be negative, got {self.alpha}")
+
+    def network_config(self, words: int, feature_size: int) -> HannaConfig:
+        """The sizes of the networks for a vocabulary and an encoder."""
+        return HannaConfig(
+            words=words, feature_size=feature_size, hidden_size=self.hidden_size,
+            navigation_embedding=self.navigation_embedding, ask_embedding=self.ask_embedding,
+            self_heads=self.self_heads, text_heads=self.text_heads, dropout=self.dropout,
+            reset_inter_task=self.reset_inter_task, predict_reasons=self.predict_reasons,
+            similarity_attention=self.similarity_attention,
+        )
+
+    def to_json(self) -> str:
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+    @staticmethod
+    def from_json(text: str) -> TrainingConfig:
+        """Read what `to_json` wrote; unknown fields are refused."""
+        body: dict[str, Any] = json.loads(text)
+        known = {f.name for f in dataclasses.fields(TrainingConfig)}
+        if unknown := sorted(set(body) - known):
+            raise ValueError(f"settings have the unknown fields {unknown}; they were written by another version")
+        return TrainingConfig(**body)
+
+
+SCALES: dict[str, TrainingConfig] = {
+    "mini": TrainingConfig(
+        hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
+        iterations=2000, learning_rate=5e-4, batch=64, validate_every=200,
+    ),
+    "paper": TrainingConfig(),
+}
+"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU."""

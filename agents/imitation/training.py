@@ -1,0 +1,322 @@
+"""The training loop of HANNA: play, be corrected, learn; validate on unseen houses; keep the best.
+
+    for update in ...:
+        episodes = play tasks with the sampling policies          (collect)
+        labels = teacher.relabel(episodes)                        (collect)
+        loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (losses)
+        Adam step
+
+Every random draw is named by (seed, update), so a run that was stopped goes on exactly as if it
+had not been, and a run folder is continued by calling `train` on it again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from agents.hanna.agent import HannaAgent, save_agent
+from agents.hanna.asking import RULES
+from agents.hanna.policy import for_training
+from agents.imitation.checkpoint import Progress, load_checkpoint, save_checkpoint
+from agents.imitation.collect import Experience, collect, imitation_loss
+from agents.imitation.losses import IGNORE
+from agents.vision.bank import FeatureBank
+from embodied import metrics
+from embodied.env import HelpEnv
+from embodied.interface import Ask, Episode, Task, Teacher
+from embodied.rollout import play
+from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+Note = Callable[[str], None]
+
+
+class TrainingError(RuntimeError):
+    """Training cannot go on; the last checkpoint is intact."""
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Tasks of some houses and the environment they are played in."""
+
+    worlds: Mapping[str, World]
+    tasks: Sequence[Task]
+    make_env: Callable[[], HelpEnv]
+    bank: FeatureBank
+
+
+@dataclass
+class Clock:
+    """Seconds spent on each kind of work since the last report."""
+
+    spent: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def on(self, what: str) -> Iterator[None]:
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - began
+
+
+def train(
+    agent: HannaAgent, training: Split, validation: Split, teacher: Teacher, folder: Path, *,
+    minutes: float | None = None, note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> Progress:
+    """Train `agent` in place, from `folder`'s checkpoint if there is one.
+
+    Writes checkpoint.pt (last state), best.safetensors (best validation success), settings.json,
+    validation.jsonl and TensorBoard scalars into `folder`.
+
+    Args:
+      minutes: stop after this long in this session, as if interrupted.
+      on_validation: called with the update and the validation episodes, e.g. to record them.
+
+    Raises:
+      TrainingError: a loss or gradient is not a number any more, or memory ran out.
+      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+      CheckpointError, OSError.
+    """
+    config, folder = agent.config, Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    optimizer = torch.optim.Adam(agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay)
+    checkpoint = folder / "checkpoint.pt"
+    progress = load_checkpoint(checkpoint, agent, optimizer) if checkpoint.exists() else Progress()
+    if progress.update:
+        note(f"continuing after update {progress.update}")
+    (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
+    learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0])
+    report = Report(folder, config.iterations, progress, note)
+    began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
+
+    def now() -> Progress:
+        return dataclasses.replace(progress, seconds=before + time.monotonic() - began)
+
+    with stop_signal() as stop:
+        try:
+            while progress.update < config.iterations:
+                numbers = learn_once(agent, optimizer, learner, training, teacher, progress.update, report.clock)
+                progress = dataclasses.replace(progress, update=progress.update + 1)
+                report.add(progress.update, numbers, now().seconds)
+                last = progress.update == config.iterations
+                if progress.update % config.validate_every == 0 or last:
+                    with report.clock.on("validation"):
+                        progress = validate(agent, validation, progress, folder, report, now().seconds, on_validation)
+                late = minutes is not None and time.monotonic() - began > 60 * minutes
+                if time.monotonic() - saved > 60 * config.checkpoint_minutes or last or late or stop.is_set():
+                    save_checkpoint(checkpoint, agent, optimizer, now())
+                    saved = time.monotonic()
+                if stop.is_set():
+                    note(f"stopped after update {progress.update}; the same command goes on from there")
+                    raise KeyboardInterrupt
+                if late and not last:
+                    note(f"time is up after update {progress.update}; the same command goes on from there")
+                    break
+        finally:
+            report.close()
+    agent.network.eval()
+    return now()
+
+
+def learn_once(
+    agent: HannaAgent, optimizer: torch.optim.Optimizer, learner: Any, training: Split, teacher: Teacher,
+    update: int, clock: Clock,
+) -> dict[str, float]:
+    """One update; returns the numbers to report.
+
+    Raises:
+      TrainingError: the loss or a gradient is not finite (weights are as before), or memory ran out.
+    """
+    config = agent.config
+    tasks = tasks_of_update(training.tasks, update, config.batch, config.seed)
+    tasks = [dataclasses.replace(t, horizon=config.training_steps) for t in tasks]
+    try:
+        with dropout_of(config.seed, update):
+            agent.network.train()
+            with clock.on("play"):
+                experience = collect(
+                    training.make_env, learner, tasks, teacher, training.worlds, seed=seed_of(config.seed, update)
+                )
+            with clock.on("backward"):
+                losses = imitation_loss(experience.said, experience.targets, config.alpha, len(tasks))
+                optimizer.zero_grad(set_to_none=True)
+                (losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]).backward()
+    except torch.OutOfMemoryError as e:
+        raise TrainingError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
+    norm = torch.nn.utils.get_total_norm([p.grad for p in agent.network.parameters() if p.grad is not None])
+    if not all(math.isfinite(float(x.detach())) for x in (*losses, norm)):
+        raise TrainingError(
+            f"update {update}: loss {float(losses[0].detach()):.3g} + {float(losses[1].detach()):.3g}, gradient {float(norm):.3g}, not finite; "
+            "the last checkpoint is intact, lower the learning rate or alpha and begin from it"
+        )
+    with clock.on("backward"):
+        optimizer.step()
+    return numbers_of(experience, losses, float(norm), training.worlds)
+
+
+def tasks_of_update(tasks: Sequence[Task], update: int, batch: int, seed: int) -> list[Task]:
+    """The tasks of one update: every task once per pass, each pass in its own random order."""
+    chosen = []
+    for k in range(update * batch, (update + 1) * batch):
+        turn, place = divmod(k, len(tasks))
+        chosen.append((turn, place))
+    orders = {turn: stream(seed, "tasks", turn).permutation(len(tasks)) for turn in sorted({t for t, _ in chosen})}
+    return [tasks[int(orders[turn][place])] for turn, place in chosen]
+
+
+def seed_of(seed: int, update: int) -> int:
+    """The seed of the episodes of one update."""
+    return int(stream(seed, "update", update).integers(2**31))
+
+
+@contextmanager
+def dropout_of(seed: int, update: int) -> Iterator[None]:
+    """PyTorch's own draws (dropout) follow from (seed, update) inside, and are as before outside."""
+    devices = list(range(torch.cuda.device_count()))
+    with torch.random.fork_rng(devices=devices):
+        torch.manual_seed(int(stream(seed, "dropout", update).integers(2**31)))
+        yield
+
+
+def numbers_of(
+    experience: Experience, losses: Sequence[torch.Tensor], norm: float, worlds: Mapping[str, World]
+) -> dict[str, float]:
+    """What a researcher wants to know about one update."""
+    said, wanted, episodes = experience.said, experience.targets, experience.episodes
+    moves, asks = wanted.moves != IGNORE, wanted.asks != IGNORE
+    right = (said.moves.argmax(-1) == wanted.moves)[moves].float().mean()
+    numbers = {
+        "loss navigation": float(losses[0].detach()), "loss asking": float(losses[1].detach()), "gradient": norm,
+        "right moves": float(right), "steps": float(sum(len(e.steps) for e in episodes)),
+        "success": sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes),
+        "requests": sum(e.requests for e in episodes) / len(episodes),
+    }
+    if asks.any():
+        wished = wanted.asks[asks] == 1
+        numbers["should ask"] = float(wished.float().mean())
+        numbers["right asks"] = float(((said.asks.argmax(-1)[asks] == 1) == wished).float().mean())
+    return numbers
+
+
+def validate(
+    agent: HannaAgent, split: Split, progress: Progress, folder: Path, report: Report, seconds: float,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None,
+) -> Progress:
+    """Play validation tasks with the likeliest actions; keep the agent if it is the best so far."""
+    config = agent.config
+    tasks = [dataclasses.replace(t, horizon=config.evaluation_steps) for t in split.tasks[: config.validation_tasks]]
+    agent.network.eval()
+    with torch.inference_mode():
+        episodes = play(
+            split.make_env, agent.policy(split.bank), tasks, seed=config.seed, batch=config.evaluation_batch
+        )
+    values = {
+        name: sum(f(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
+        for name, f in metrics.PER_EPISODE.items()
+    }
+    values["request share"] = sum(isinstance(s.action, Ask) for e in episodes for s in e.steps) / max(
+        1, sum(len(e.steps) for e in episodes)
+    )
+    report.validated(progress.update, values, len(episodes), seconds)
+    if on_validation is not None:
+        on_validation(progress.update, episodes)
+    if values["success"] > progress.best:
+        progress = dataclasses.replace(progress, best=values["success"], best_update=progress.update)
+        save_agent(agent, folder / "best.safetensors")
+    return progress
+
+
+class Report:
+    """Owns the progress line, validation.jsonl and TensorBoard's scalars of one session."""
+
+    EVERY = 20
+    """Updates per progress line."""
+
+    def __init__(self, folder: Path, iterations: int, progress: Progress, note: Note) -> None:
+        from torch.utils.tensorboard import SummaryWriter  # slow to import, wanted by training only
+
+        self.folder, self.iterations, self.note = folder, iterations, note
+        self.clock = Clock()
+        self.best = (progress.best, progress.best_update)
+        self._writer = SummaryWriter(str(folder), purge_step=progress.update + 1)
+        self._sums: dict[str, float] = {}
+        self._counts: dict[str, int] = {}
+        self._since = time.monotonic()
+
+    def add(self, update: int, numbers: Mapping[str, float], seconds: float) -> None:
+        """Count one update in; say how it goes every EVERY updates."""
+        for name, value in numbers.items():
+            self._sums[name] = self._sums.get(name, 0.0) + value
+            self._counts[name] = self._counts.get(name, 0) + 1
+        if update % self.EVERY and update != self.iterations:
+            return
+        mean = {name: total / self._counts[name] for name, total in self._sums.items()}
+        for name, value in mean.items():
+            self._writer.add_scalar(f"train/{name}", value, update)
+        passed = time.monotonic() - self._since
+        pace = self._sums["steps"] / passed
+        shares = ", ".join(f"{what} {100 * s / passed:.0f} %" for what, s in sorted(self.clock.spent.items()))
+        self._writer.add_scalar("train/steps per second", pace, update)
+        done = self._counts["steps"]
+        left = (self.iterations - update) * passed / done / 60
+        self.note(
+            f"{update}/{self.iterations}  loss {mean['loss navigation']:.2f} + {mean['loss asking']:.2f}  right moves "
+            f"{100 * mean['right moves']:.0f} %  asks {100 * mean.get('right asks', math.nan):.0f} %  success "
+            f"{100 * mean['success']:.0f} %  requests {mean['requests']:.1f}  |  {pace:.0f} steps/s ({shares})  "
+            f"{seconds / 60:.1f} min, {left:.0f} to go"
+        )
+        self._sums, self._counts, self.clock.spent = {}, {}, {}
+        self._since = time.monotonic()
+
+    def validated(self, update: int, values: Mapping[str, float], episodes: int, seconds: float) -> None:
+        """Write a validation down."""
+        for name, value in values.items():
+            self._writer.add_scalar(f"validation/{name}", value, update)
+        line = {"update": update, "minutes": round(seconds / 60, 2), "episodes": episodes, **values}
+        with open(self.folder / "validation.jsonl", "a") as f:
+            f.write(json.dumps(line) + "\n")
+        better = values["success"] > self.best[0]
+        self.best = (values["success"], update) if better else self.best
+        self.note(
+            f"validation on {episodes} unseen tasks after {update} updates: success {100 * values['success']:.1f} %, SPL "
+            f"{100 * values['spl']:.1f} %, {values['requests']:.1f} requests, {values['steps']:.1f} steps, ends "
+            f"{values['navigation error']:.1f} m away" + ("; the best so far" if better else "")
+        )
+
+    def close(self) -> None:
+        self._writer.close()
+
+
+@contextmanager
+def stop_signal() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C sets, so that the update at hand can end; the second interrupts at once."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def once(number: int, frame: Any) -> None:
+        event.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, once)
+    try:
+        yield event
+    finally:
+        signal.signal(signal.SIGINT, before)

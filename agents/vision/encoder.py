@@ -1,0 +1,164 @@
+"""Encoder: the network that turns a panorama into 36 x D features, with its file and its digest."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import safetensors
+import safetensors.torch
+import torch
+from torch import Tensor
+
+from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise, read_weights
+from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from assets.cache import atomic_path
+
+FORMAT = "embodied-encoder-1"
+SHIPPED = Path(__file__).resolve().parent.parent / "weights" / "encoder.safetensors"
+"""The encoder of this repository, trained on our own renders; see weights/README.md."""
+MARGIN = 3 * CELL
+"""Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""
+
+
+@dataclass(frozen=True, eq=False)
+class Encoder:
+    """A frozen network and what is done with its output."""
+
+    network: ResNet
+    name: str
+    """Key of resnet.ARCHITECTURES."""
+    sharing: str = "strip"
+    """'strip': one look at the panorama, views are windows of the feature map; 'views': every view
+    is looked at alone, as the VLN literature does with ImageNet networks."""
+    mean: Tensor | None = None
+    """(D,) subtracted from features; None leaves them as the network gives them."""
+    mix: Tensor | None = None
+    """(D, D) that whitens features after the mean is gone: x -> (x - mean) @ mix."""
+
+    @property
+    def size(self) -> int:
+        """D."""
+        return self.network.architecture.size
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Hex SHA-256 over weights and settings: two encoders with one digest give the same features."""
+        h = hashlib.sha256(json.dumps([FORMAT, self.name, self.sharing]).encode())
+        for name, tensor in sorted(_tensors(self).items()):
+            h.update(name.encode() + tensor.detach().cpu().half().contiguous().numpy().tobytes())
+        return h.hexdigest()
+
+    @torch.no_grad()
+    def encode_strips(self, strips: np.ndarray) -> np.ndarray:
+        """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
+        return self._finish(pool_views(strip_map(self.network, self._send(strips)))).cpu().numpy()
+
+    @torch.no_grad()
+    def encode_views(self, views: np.ndarray) -> np.ndarray:
+        """(n, 36, H, W, 3) uint8 -> (n, 36, D) float32, each view alone."""
+        n = len(views)
+        flat = self._send(views.reshape(-1, *views.shape[2:]))
+        out = torch.cat([self.network.features(normalise(part)) for part in flat.split(36)])
+        return self._finish(out.view(n, views.shape[1], -1)).cpu().numpy()
+
+    def to(self, device: torch.device | str) -> Encoder:
+        """The encoder on another device (the network moves with it)."""
+        move = lambda t: None if t is None else t.to(device)
+        return Encoder(self.network.to(device), self.name, self.sharing, move(self.mean), move(self.mix))
+
+    def _finish(self, features: Tensor) -> Tensor:
+        if self.mean is not None:
+            features = features - self.mean
+        return features if self.mix is None else features @ self.mix
+
+    def _send(self, images: np.ndarray) -> Tensor:
+        return torch.from_numpy(np.ascontiguousarray(images)).to(next(self.network.parameters()).device)
+
+
+def strip_map(network: ResNet, strips: Tensor) -> Tensor:
+    """(n, 192, 576, 3) uint8 -> (n, D, 12, 36) feature map of strips; left and right ends know each other."""
+    if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.architecture.stride != CELL:
+        raise ValueError(
+            f"expected strips (n, {HEIGHT}, {WIDTH}, 3) and a network of stride {CELL}, got {tuple(strips.shape)} and "
+            f"stride {network.architecture.stride}; use sharing 'views' for other networks"
+        )
+    wide = torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2)
+    wide = normalise(wide).contiguous(memory_format=torch.channels_last)
+    return network.feature_map(wide)[..., MARGIN // CELL : -(MARGIN // CELL)]
+
+
+def pool_views(maps: Tensor) -> Tensor:
+    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window."""
+    weights = torch.from_numpy(windows()).to(maps.device).view(36, ROWS * COLUMNS)
+    return torch.einsum("vc,ndc->nvd", weights, maps.flatten(2))
+
+
+def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
+    """Mean (D,) and mix (D, D) after which `features` (n, D) have no mean and unit covariance.
+
+    Directions with less than `floor` of the mean variance are damped, not blown up.
+    """
+    mean = features.mean(0)
+    centred = (features - mean).double()
+    values, vectors = torch.linalg.eigh(centred.T @ centred / len(features))
+    scale = (values + floor * values.mean()).rsqrt()
+    return mean, ((vectors * scale) @ vectors.T).float()
+
+
+def random_encoder(name: str = "compact", *, seed: int, sharing: str = "strip") -> Encoder:
+    """An untrained encoder: the floor that training has to beat."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return Encoder(ResNet(ARCHITECTURES[name]).eval(), name, sharing)
+
+
+def imagenet_encoder(name: str, weights: Path) -> Encoder:
+    """A torchvision network with its weights from disk; every view is looked at alone."""
+    return Encoder(load_torchvision(name, read_weights(weights)), name, "views")
+
+
+def save_encoder(encoder: Encoder, path: Path) -> None:
+    """Write half-precision weights and settings atomically."""
+    settings = {"format": FORMAT, "name": encoder.name, "sharing": encoder.sharing, "digest": encoder.digest}
+    tensors = {k: v.detach().cpu().half().contiguous() for k, v in _tensors(encoder).items()}
+    with atomic_path(Path(path)) as temporary:
+        safetensors.torch.save_file(tensors, temporary, metadata=settings)
+
+
+def load_encoder(path: Path = SHIPPED) -> Encoder:
+    """Read what `save_encoder` wrote.
+
+    Raises:
+      ValueError: truncated, of another format, or not the weights its digest names.
+    """
+    path = Path(path)
+    tensors = read_weights(path)
+    with safetensors.safe_open(path, "pt") as f:
+        settings = f.metadata() or {}
+    if settings.get("format") != FORMAT:
+        raise ValueError(
+            f"{path}: format {settings.get('format')!r}, this version reads {FORMAT!r}; "
+            "train the encoder again with `embodied train vision`"
+        )
+    tensors = {k: v.float() for k, v in tensors.items()}
+    mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
+    network = ResNet(ARCHITECTURES[settings["name"]])
+    counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
+    network.load_state_dict({**counters, **tensors})
+    encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix)
+    if encoder.digest != settings["digest"]:
+        raise ValueError(f"{path}: contents do not fit the digest {settings['digest'][:12]}; the file was changed")
+    return encoder
+
+
+def _tensors(encoder: Encoder) -> dict[str, Tensor]:
+    """Everything that decides features; counters of batches do not."""
+    body = {k: v for k, v in encoder.network.state_dict().items() if not k.endswith("num_batches_tracked")}
+    extra = {k: v for k, v in (("mean", encoder.mean), ("mix", encoder.mix)) if v is not None}
+    return {**body, **extra}
+

@@ -1,0 +1,137 @@
+"""What a strip shows, as labels for training: objects, rooms and distances per cell of the feature map."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from assets.cache import atomic_path
+from assets.records import ROOM_KINDS
+from embodied.house import House
+from embodied.parts import owners
+
+VISIBLE = 0.003
+"""An object class counts as visible in a view if it covers this share of the picture."""
+NEAREST = 0.1
+"""Metres; distances are clipped from below before their logarithm is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class HouseStrips:
+    """Every node of one house: pictures and labels; n is the number of nodes."""
+
+    name: str
+    classes: tuple[str, ...]
+    """Object classes and parts of the shell ('wall', 'door', 'outdoor'), sorted."""
+    rgb: np.ndarray
+    """(n, 192, 576, 3) uint8."""
+    share: np.ndarray
+    """(n, 12, 36, C) uint8, share of each cell that each class covers, times 255, rounded up."""
+    rooms: np.ndarray
+    """(n, 12, 36) int8, kind (index into ROOM_KINDS) of the room most of a cell shows; -1 for none."""
+    log_depth: np.ndarray
+    """(n, 12, 36) float16, mean natural logarithm of the distance along the ray, metres."""
+    room: np.ndarray
+    """(n,) int8, kind of the room the node is in."""
+
+    def save(self, path: Path) -> None:
+        with atomic_path(Path(path)) as temporary, open(temporary, "wb") as f:
+            np.savez_compressed(
+                f, classes=np.array(self.classes), rgb=self.rgb, share=self.share, rooms=self.rooms,
+                log_depth=self.log_depth, room=self.room,
+            )
+
+    @staticmethod
+    def load(path: Path) -> HouseStrips:
+        """Read what `save` wrote; the house's name is the file's stem."""
+        try:
+            with np.load(path, allow_pickle=False) as f:
+                return HouseStrips(
+                    Path(path).stem, tuple(str(c) for c in f["classes"]), f["rgb"], f["share"], f["rooms"],
+                    f["log_depth"], f["room"],
+                )
+        except (ValueError, KeyError, EOFError) as e:
+            raise ValueError(f"{path}: not a file of strips, or truncated ({e}); delete it and render again") from e
+
+
+def shell_class(owner: str) -> str:
+    """'wall' of 'kitchen_1/wall_3', 'door' of 'door_2/leaf', 'stairs', 'outdoor'."""
+    place, piece = owner.split("/")
+    if piece.split("_")[0] in ("floor", "ceiling", "skirting", "wall", "stairs"):
+        return piece.split("_")[0]
+    return place.rstrip("0123456789").rstrip("_")
+
+
+def classes_of(houses: Sequence[House]) -> tuple[str, ...]:
+    """Every class that may be seen in `houses`, sorted."""
+    names = {p.object_class for house in houses for p in house.placements}
+    shell = {shell_class(o) for house in houses for o in owners(house) if "/" in o}
+    return tuple(sorted(names | shell))
+
+
+def ids_to_labels(house: House, classes: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(m + 1,) class and (m + 1,) room kind of each instance id, -1 where there is none; id 0 is nothing."""
+    number = {c: i for i, c in enumerate(classes)}
+    kind = {r.id: ROOM_KINDS.index(r.kind) for r in house.rooms}
+    object_class, room = [-1], [-1]
+    for owner in owners(house):
+        placed = house.placement_by_id.get(owner)
+        object_class.append(number.get(placed.object_class if placed else shell_class(owner), -1))
+        room.append(kind.get(placed.room if placed else owner.split("/")[0], -1))
+    return np.array(object_class), np.array(room)
+
+
+@functools.cache
+def _cells() -> np.ndarray:
+    """(192, 576) index of the cell each pixel is in."""
+    rows, columns = np.indices((HEIGHT, WIDTH)) // CELL
+    return rows * COLUMNS + columns
+
+
+def cell_labels(
+    ids: np.ndarray, depth: np.ndarray, object_class: np.ndarray, room: np.ndarray, classes: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Labels of one strip.
+
+    Args:
+      ids: (192, 576) int instance ids.
+      depth: (192, 576) metres along the ray.
+      object_class, room: of each id, as `ids_to_labels` gives them.
+      classes: C.
+
+    Returns:
+      share (12, 36, C) uint8, rooms (12, 36) int8, log_depth (12, 36) float16; see HouseStrips.
+    """
+    cells, n = _cells(), ROWS * COLUMNS
+    seen = object_class[ids]
+    share = _count(cells, seen, n, classes) / CELL**2  # (432, C)
+    kinds = _count(cells, room[ids], n, len(ROOM_KINDS))  # (432, kinds)
+    most = np.where(kinds.max(1) > 0, kinds.argmax(1), -1)
+    logs = np.log(np.maximum(depth, NEAREST)).reshape(ROWS, CELL, COLUMNS, CELL).mean((1, 3))
+    return (
+        np.ceil(share * 255).astype(np.uint8).reshape(ROWS, COLUMNS, classes),
+        most.astype(np.int8).reshape(ROWS, COLUMNS), logs.astype(np.float16),
+    )
+
+
+def _count(cells: np.ndarray, values: np.ndarray, n: int, size: int) -> np.ndarray:
+    """(n, size) how many pixels of each cell have each value; negative values are not counted."""
+    known = values >= 0
+    return np.bincount(cells[known] * size + values[known], minlength=n * size).reshape(n, size)
+
+
+def visible_in_views(share: np.ndarray) -> np.ndarray:
+    """(n, 12, 36, C) uint8 shares of cells -> (n, 36, C) bool, classes that cover VISIBLE of a view."""
+    n, classes = len(share), share.shape[-1]
+    flat = share.reshape(n, ROWS * COLUMNS, classes).astype(np.float32) / 255
+    return np.einsum("vc,nck->nvk", windows().reshape(36, -1), flat, optimize=True) >= VISIBLE
+
+
+def mean_log_depth_of_views(log_depth: np.ndarray) -> np.ndarray:
+    """(n, 12, 36) -> (n, 36)."""
+    return np.einsum("vrc,nrc->nv", windows(), log_depth.astype(np.float32))

@@ -1,0 +1,193 @@
+"""Residual networks (He et al. 2016) whose parameters carry torchvision's names.
+
+ImageNet weights that somebody has on disk (`resnet18-....pth` to `resnet152-....pth`, version 1 or
+2) therefore load unchanged. The compact network that ships with this repository is the same class
+with narrower stages, one block each, and without the last halving of resolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import safetensors
+import safetensors.torch
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of ImageNet's RGB in [0, 1]; what torchvision's weights expect."""
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """What tells one residual network from another."""
+
+    block: str
+    """'basic' (two 3x3 convolutions) or 'bottleneck' (1x1, 3x3, 1x1, four times as wide at the end)."""
+    counts: tuple[int, int, int, int]
+    """Blocks in each stage."""
+    widths: tuple[int, int, int, int] = (64, 128, 256, 512)
+    stem: int = 64
+    """Channels of the first convolution."""
+    strides: tuple[int, int, int, int] = (1, 2, 2, 2)
+
+    @property
+    def size(self) -> int:
+        """D, channels of the last feature map."""
+        return self.widths[-1] * EXPANSION[self.block]
+
+    @property
+    def stride(self) -> int:
+        """Pixels per cell of the last feature map."""
+        return 4 * self.strides[0] * self.strides[1] * self.strides[2] * self.strides[3]
+
+
+EXPANSION = {"basic": 1, "bottleneck": 4}
+ARCHITECTURES: dict[str, Architecture] = {
+    "compact": Architecture("basic", (1, 1, 1, 1), (32, 64, 128, 192), 32, (1, 2, 2, 1)),
+    "resnet18": Architecture("basic", (2, 2, 2, 2)),
+    "resnet34": Architecture("basic", (3, 4, 6, 3)),
+    "resnet50": Architecture("bottleneck", (3, 4, 6, 3)),
+    "resnet101": Architecture("bottleneck", (3, 4, 23, 3)),
+    "resnet152": Architecture("bottleneck", (3, 8, 36, 3)),
+}
+
+
+class BasicBlock(nn.Module):
+    def __init__(self, inputs: int, width: int, stride: int):
+        super().__init__()
+        self.conv1 = nn.Conv2d(inputs, width, 3, stride, 1, bias=False)
+        self.bn1 = nn.BatchNorm2d(width)
+        self.conv2 = nn.Conv2d(width, width, 3, 1, 1, bias=False)
+        self.bn2 = nn.BatchNorm2d(width)
+        self.downsample = _downsample(inputs, width, stride)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = F.relu(self.bn1(self.conv1(x)))
+        y = self.bn2(self.conv2(y))
+        return F.relu(y + (x if self.downsample is None else self.downsample(x)))
+
+
+class Bottleneck(nn.Module):
+    """The stride sits in the 3x3 convolution, as in torchvision ("ResNet v1.5")."""
+
+    def __init__(self, inputs: int, width: int, stride: int):
+        super().__init__()
+        outputs = width * EXPANSION["bottleneck"]
+        self.conv1 = nn.Conv2d(inputs, width, 1, bias=False)
+        self.bn1 = nn.BatchNorm2d(width)
+        self.conv2 = nn.Conv2d(width, width, 3, stride, 1, bias=False)
+        self.bn2 = nn.BatchNorm2d(width)
+        self.conv3 = nn.Conv2d(width, outputs, 1, bias=False)
+        self.bn3 = nn.BatchNorm2d(outputs)
+        self.downsample = _downsample(inputs, outputs, stride)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = F.relu(self.bn1(self.conv1(x)))
+        y = F.relu(self.bn2(self.conv2(y)))
+        y = self.bn3(self.conv3(y))
+        return F.relu(y + (x if self.downsample is None else self.downsample(x)))
+
+
+def _downsample(inputs: int, outputs: int, stride: int) -> nn.Module | None:
+    if stride == 1 and inputs == outputs:
+        return None
+    return nn.Sequential(nn.Conv2d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm2d(outputs))
+
+
+class ResNet(nn.Module):
+    """Images to a feature map; `fc` classifies its average, when there are classes."""
+
+    def __init__(self, architecture: Architecture, classes: int = 0):
+        super().__init__()
+        a = architecture
+        self.architecture = a
+        block = {"basic": BasicBlock, "bottleneck": Bottleneck}[a.block]
+        self.conv1 = nn.Conv2d(3, a.stem, 7, 2, 3, bias=False)
+        self.bn1 = nn.BatchNorm2d(a.stem)
+        inputs = a.stem
+        for i, (count, width, stride) in enumerate(zip(a.counts, a.widths, a.strides, strict=True), 1):
+            blocks = []
+            for j in range(count):
+                blocks.append(block(inputs, width, stride if j == 0 else 1))
+                inputs = width * EXPANSION[a.block]
+            setattr(self, f"layer{i}", nn.Sequential(*blocks))
+        self.fc = nn.Linear(inputs, classes) if classes else None
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+
+    def feature_map(self, images: Tensor) -> Tensor:
+        """(n, 3, H, W) normalised images -> (n, D, H / stride, W / stride)."""
+        x = F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
+        return self.layer4(self.layer3(self.layer2(self.layer1(x))))
+
+    def features(self, images: Tensor) -> Tensor:
+        """(n, 3, H, W) -> (n, D), the average of the feature map: what VLN calls ResNet features."""
+        return self.feature_map(images).mean((2, 3))
+
+    def forward(self, images: Tensor) -> Tensor:
+        """(n, 3, H, W) -> (n, classes) logits."""
+        if self.fc is None:
+            raise RuntimeError("this network was built without classes; use `features`, or build it with classes")
+        return self.fc(self.features(images))
+
+
+def normalise(images: Tensor) -> Tensor:
+    """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as ImageNet weights expect."""
+    mean = torch.tensor(MEAN, device=images.device).view(1, 3, 1, 1)
+    deviation = torch.tensor(DEVIATION, device=images.device).view(1, 3, 1, 1)
+    return (images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation
+
+
+def read_weights(path: Path) -> dict[str, Tensor]:
+    """Tensors of a .safetensors file or of a PyTorch file that holds nothing but tensors.
+
+    Raises:
+      ValueError: the file is truncated, of another kind, or would have to run code to be read.
+    """
+    path = Path(path)
+    try:
+        if path.suffix == ".safetensors":
+            return safetensors.torch.load_file(path)
+        weights = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError:
+        raise
+    except Exception as e:  # torch and safetensors raise half a dozen kinds for a damaged file
+        raise ValueError(f"{path}: cannot be read as weights ({e}); download or train it again") from e
+    if not isinstance(weights, Mapping) or not all(isinstance(v, Tensor) for v in weights.values()):
+        raise ValueError(f"{path}: expected a state dict (name -> tensor), got {type(weights).__name__}")
+    return dict(weights)
+
+
+def load_torchvision(name: str, weights: Mapping[str, Tensor]) -> ResNet:
+    """The network `name` ('resnet18' to 'resnet152') with a state dict of torchvision's layout; `fc` is dropped.
+
+    Raises:
+      ValueError: unknown network, or weights of another one.
+    """
+    if name not in ARCHITECTURES:
+        raise ValueError(f"unknown network {name!r}; known are {sorted(ARCHITECTURES)}")
+    network = ResNet(ARCHITECTURES[name])
+    body = {k: v for k, v in weights.items() if not k.startswith("fc.")}
+    _check_names(name, network.state_dict(), body)
+    network.load_state_dict(body)
+    return network.eval()
+
+
+def _check_names(name: str, expected: Mapping[str, Tensor], got: Mapping[str, Tensor]) -> None:
+    missing = sorted(set(expected) - set(got))
+    unknown = sorted(set(got) - set(expected))
+    wrong = [k for k in expected if k in got and expected[k].shape != got[k].shape]
+    if missing or unknown or wrong:
+        raise ValueError(
+            f"these are not the weights of {name}: {len(missing)} missing ({_some(missing)}), {len(unknown)} unknown "
+            f"({_some(unknown)}), {len(wrong)} of another shape ({_some(wrong)}); name the network they belong to"
+        )
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "") if names else "none"

@@ -1,0 +1,203 @@
+"""Teaching the encoder to see, on our own renders: which objects, which room, how far.
+
+Every cell of the feature map learns which classes it shows, which kind of room it looks into and
+how far away things are; every one of the 36 views learns which classes are visible in it and in
+what room the camera stands. Labels come from the simulator's own ids and depths and cost nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
+from agents.vision.labels import HouseStrips, visible_in_views
+from agents.vision.resnet import ARCHITECTURES, ResNet
+from agents.vision.strip import CELL, COLUMNS
+from assets.records import ROOM_KINDS
+from embodied.seeds import stream
+
+
+@dataclass(frozen=True)
+class VisionConfig:
+    """How the encoder is trained."""
+
+    network: str = "compact"
+    """Key of resnet.ARCHITECTURES."""
+    epochs: int = 6
+    batch: int = 8
+    """Strips per update."""
+    learning_rate: float = 2e-3
+    """Highest rate of a one-cycle schedule."""
+    weight_decay: float = 1e-2
+    least_views: int = 50
+    """A class is learned if it is visible in at least this many training views."""
+    seed: int = 0
+
+
+class Heads(nn.Module):
+    """Linear readers of the feature map (cells) and of the pooled features (views)."""
+
+    def __init__(self, size: int, classes: int):
+        super().__init__()
+        self.cell_objects = nn.Conv2d(size, classes, 1)
+        self.cell_room = nn.Conv2d(size, len(ROOM_KINDS), 1)
+        self.cell_depth = nn.Conv2d(size, 1, 1)
+        self.view_objects = nn.Linear(size, classes)
+        self.view_room = nn.Linear(size, len(ROOM_KINDS))
+
+
+@dataclass(frozen=True, eq=False)
+class StripBatch:
+    """Strips and labels of n nodes as tensors."""
+
+    rgb: Tensor
+    """(n, 192, 576, 3) uint8."""
+    share: Tensor
+    """(n, 12, 36, C) uint8."""
+    visible: Tensor
+    """(n, 36, C) bool."""
+    rooms: Tensor
+    """(n, 12, 36) int64, -1 for none."""
+    log_depth: Tensor
+    """(n, 12, 36) float32."""
+    room: Tensor
+    """(n,) int64."""
+
+
+def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+    """Sum of the five losses, and each as a number."""
+    maps = strip_map(network, batch.rgb)  # (n, D, 12, 36)
+    views = pool_views(maps)  # (n, 36, D)
+    cells = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # (n, C, 12, 36): covers 3 % of the cell
+    parts = {
+        "cell objects": F.binary_cross_entropy_with_logits(heads.cell_objects(maps), cells) * 10,
+        "cell room": F.cross_entropy(heads.cell_room(maps), batch.rooms, ignore_index=-1) * 0.5,
+        "cell depth": F.smooth_l1_loss(heads.cell_depth(maps)[:, 0], batch.log_depth),
+        "view objects": F.binary_cross_entropy_with_logits(heads.view_objects(views), batch.visible.float()) * 5,
+        "view room": F.cross_entropy(
+            heads.view_room(views).flatten(0, 1), batch.room.repeat_interleave(views.shape[1])
+        ) * 0.5,
+    }
+    return sum(parts.values()), {name: float(value.detach()) for name, value in parts.items()}
+
+
+def batches(
+    houses: Sequence[HouseStrips], classes: Sequence[int], size: int, *, rng: np.random.Generator
+) -> Iterator[StripBatch]:
+    """One pass over all nodes in random order, each strip rolled, perhaps mirrored, and recoloured."""
+    where = [(h, i) for h, house in enumerate(houses) for i in range(len(house.rgb))]
+    order = rng.permutation(len(where))
+    classes = np.asarray(classes)
+    for start in range(0, len(order) - len(order) % size, size):
+        chosen = [where[k] for k in order[start : start + size]]
+        rgb, share, rooms, depth, room = [], [], [], [], []
+        for h, i in chosen:
+            house, turn, mirror = houses[h], int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
+            rgb.append(recolour(turned(house.rgb[i], turn * CELL, mirror), rng=rng))
+            share.append(turned(house.share[i], turn, mirror)[..., classes])
+            rooms.append(turned(house.rooms[i], turn, mirror))
+            depth.append(turned(house.log_depth[i], turn, mirror))
+            room.append(house.room[i])
+        share = np.stack(share)
+        yield StripBatch(
+            torch.from_numpy(np.stack(rgb)), torch.from_numpy(share), torch.from_numpy(visible_in_views(share)),
+            torch.from_numpy(np.stack(rooms).astype(np.int64)), torch.from_numpy(np.stack(depth).astype(np.float32)),
+            torch.from_numpy(np.array(room, dtype=np.int64)),
+        )
+
+
+def turned(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
+    """A strip or its labels (rows, columns, ...) as seen after turning, and in a mirror."""
+    rolled = np.roll(strip, columns, 1)
+    return rolled[:, ::-1] if mirror else rolled
+
+
+def recolour(image: np.ndarray, *, rng: np.random.Generator) -> np.ndarray:
+    """(H, W, 3) uint8 with another exposure, white balance and gamma: lighting must not matter."""
+    gain = rng.uniform(0.7, 1.35) * rng.uniform(0.93, 1.07, 3)
+    gamma = rng.uniform(0.8, 1.25)
+    ramp = (np.arange(256)[:, None] / 255) ** gamma * gain
+    table = np.clip(ramp * 255, 0, 255).astype(np.uint8)  # (256, 3)
+    return np.ascontiguousarray(np.stack([table[image[..., c], c] for c in range(3)], -1))
+
+
+def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
+    """Indices of the classes visible in at least `least` views of `houses`."""
+    count = sum(visible_in_views(h.share).sum((0, 1)) for h in houses)
+    return [int(i) for i in np.flatnonzero(count >= least)]
+
+
+def train_encoder(
+    houses: Sequence[HouseStrips], config: VisionConfig, *, note: Callable[[str], None] = print
+) -> tuple[Encoder, Heads, list[str]]:
+    """The encoder, its heads, and the names of the classes the heads speak of.
+
+    Raises:
+      ValueError: no strips, or strips with different classes.
+      FloatingPointError: the loss is no longer a number.
+    """
+    if not houses or len({h.classes for h in houses}) != 1:
+        raise ValueError("training needs strips of at least one house, all with the same list of classes")
+    classes = frequent_classes(houses, config.least_views)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        network = ResNet(ARCHITECTURES[config.network])
+        heads = Heads(network.architecture.size, len(classes))
+    network = network.to(memory_format=torch.channels_last).train()
+    parameters = [*network.parameters(), *heads.parameters()]
+    optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
+    nodes = sum(len(h.rgb) for h in houses)
+    updates = config.epochs * (nodes // config.batch)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, total_steps=max(updates, 1))
+    note(f"{nodes} strips of {len(houses)} houses, {len(classes)} classes, {updates} updates")
+    done, began, smooth = 0, time.monotonic(), {}
+    for epoch in range(config.epochs):
+        for batch in batches(houses, classes, config.batch, rng=stream(config.seed, "vision", "epoch", epoch)):
+            loss, parts = vision_loss(network, heads, batch)
+            if not torch.isfinite(loss):
+                raise FloatingPointError(f"vision loss became {float(loss)} at update {done}; lower the learning rate")
+            optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            optimizer.step()
+            schedule.step()
+            done += 1
+            smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
+            if done % 25 == 0 or done == updates:
+                rate = done * config.batch / (time.monotonic() - began)
+                terms = ", ".join(f"{k} {v:.3f}" for k, v in smooth.items())
+                note(f"update {done}/{updates} (epoch {epoch + 1}), {rate:.1f} strips/s: {terms}")
+    network.eval()
+    heads.eval()
+    return Encoder(network, config.network), heads, [houses[0].classes[i] for i in classes]
+
+
+def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Encoder:
+    """The encoder with features decorrelated over the views of `houses`.
+
+    Raw features are all positive, so any two views have a cosine near one and the target
+    similarity of D.1 says little; after whitening it is near zero for different places.
+    """
+    features = [encoder.encode_strips(h.rgb[i : i + batch]) for h in houses for i in range(0, len(h.rgb), batch)]
+    mean, mix = whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
+    return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
+
+
+def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config: VisionConfig, folder: Path) -> None:
+    """encoder.safetensors (half precision), heads.safetensors and classes.json in `folder`."""
+    import safetensors.torch
+
+    from assets.cache import atomic_path, write_json
+
+    save_encoder(encoder, folder / "encoder.safetensors")
+    with atomic_path(folder / "heads.safetensors") as temporary:
+        safetensors.torch.save_file({k: v.half().contiguous() for k, v in heads.state_dict().items()}, temporary)
+    write_json(folder / "classes.json", {"classes": list(classes), "config": json.loads(json.dumps(vars(config)))})
