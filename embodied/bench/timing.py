@@ -1,0 +1,81 @@
+"""Timing a thing several times and saying what came out."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One line of a benchmark table."""
+
+    name: str
+    value: float
+    """Median over the repeats."""
+    unit: str
+    """'ms', 's', '1/s', 'MiB' or 'x' (a ratio)."""
+    low: float
+    high: float
+    """10th and 90th percentile."""
+    repeats: int
+    aim: float | None = None
+    """What the project promises; None where it promises nothing."""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the aim is met; rates and ratios must reach it, the rest must stay below."""
+        if self.aim is None:
+            return None
+        return self.value >= self.aim if self.unit in ("1/s", "x") else self.value <= self.aim
+
+
+def measure(name: str, body: Callable[[], object], unit: str = "ms", *, repeats: int = 9, warm: int = 1,
+            per: int = 1, aim: float | None = None) -> Measure:
+    """Time `body` `repeats` times after `warm` untimed calls.
+
+    Args:
+      per: how many things one call does; times are given per thing, rates per second.
+    """
+    for _ in range(warm):
+        body()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        body()
+        seconds.append((time.perf_counter() - start) / per)
+    scale = {"ms": 1e3, "s": 1.0}
+    values = [1.0 / s for s in seconds] if unit == "1/s" else [s * scale[unit] for s in seconds]
+    return from_values(name, values, unit, aim=aim)
+
+
+def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | None = None) -> Measure:
+    """A line from values that were measured already."""
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return Measure(name, float(middle), unit, float(low), float(high), len(values), aim)
+
+
+def ratio(name: str, slow: Measure, fast: Measure) -> Measure:
+    """How many times `fast` is faster than `slow`, both from one run."""
+    value = slow.value / fast.value
+    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, min(slow.repeats, fast.repeats))
+
+
+def machine() -> dict[str, object]:
+    """What the numbers were made on."""
+    return {"cores": os.cpu_count(), "machine": platform.machine(), "system": platform.platform(),
+            "python": platform.python_version(), "load": [round(x, 2) for x in os.getloadavg()]}
+
+
+def table(measures: Sequence[Measure]) -> str:
+    """The measures as a Markdown table."""
+    lines = ["| measured | median | 10-90 % | n | aim |", "|---|---|---|---|---|"]
+    for m in measures:
+        aim = "" if m.aim is None else f"{'>=' if m.unit in ('1/s', 'x') else '<='} {m.aim:g} {'met' if m.met else 'MISSED'}"
+        lines.append(f"| {m.name} | {m.value:.4g} {m.unit} | {m.low:.4g}-{m.high:.4g} | {m.repeats} | {aim} |")
+    return "\n".join(lines)

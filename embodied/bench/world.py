@@ -1,0 +1,111 @@
+"""House, scene, panorama and step benchmarks: the table of what the main line costs."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+from tqdm import tqdm
+
+from assets.catalogue import Catalogue
+from embodied.bench.timing import Measure, from_values, measure, ratio
+from embodied.env import HelpEnv
+from embodied.generate import HouseConfig, generate_house
+from embodied.house import House
+from embodied.interface import Move
+from embodied.language.plain import PlainLanguage
+from embodied.navgraph import NavGraph, build_graph
+from embodied.render import Renderer, face_cameras
+from embodied.scene import compile_scene
+from embodied.tasks.find import find_pool, find_task
+from embodied.world import open_world
+
+LARGE = HouseConfig(area=(370.0, 390.0))
+"""A house of about 125 viewpoints, the mean of Matterport3D."""
+TYPICAL = HouseConfig(area=(110.0, 130.0))
+
+
+def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
+    """Layout and furnishing of a 125-node house."""
+    seeds = iter(range(seed, seed + 10_000))
+    yield measure("layout and furnishing, 125-node house", lambda: generate_house(next(seeds), LARGE, catalogue), "s", repeats=7, aim=1.0)
+    house = generate_house(seed, LARGE, catalogue)
+    yield measure("navigation graph of it", lambda: build_graph(house, catalogue), "s", repeats=5)
+    yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
+
+
+def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
+    """Cube faces, panoramas and resampled views, and the naive way beside them."""
+    house = generate_house(seed, LARGE, catalogue)
+    with open_world(house, catalogue, cache, size=256, quality=quality) as world:
+        renderer, eyes = world.renderer, world.graph.positions
+        nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
+        cameras = [c for n in nodes for c in face_cameras(eyes[n])]
+        face = measure(f"256x256 cube face, rgb, {quality}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras],
+                       per=len(cameras), repeats=5, aim=10.0 if quality == "unlit" else 12.0)
+        yield face
+        yield measure(f"256 panorama, six faces of rgb, {quality}", lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
+                      per=len(nodes), repeats=3, aim=60.0)
+        yield measure(f"256 panorama with depth and ids, {quality}", lambda: [renderer.panorama(eyes[n]) for n in nodes], per=len(nodes), repeats=3)
+        panorama = renderer.panorama(eyes[0])
+        yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15, aim=15.0)
+    naive = measure("the naive way: a new mujoco.Renderer per view, all rooms", naive_view(house, catalogue, eyes[0]), repeats=3)
+    yield naive
+    yield ratio("naive view over our face", naive, face)
+
+
+def naive_view(house: House, catalogue: Catalogue, eye: np.ndarray) -> Callable[[], None]:
+    """One 256x256 view as MuJoCo's tutorials draw it."""
+    import mujoco
+
+    model = compile_scene(house, catalogue).model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.lookat, camera.distance, camera.azimuth, camera.elevation = eye + [1, 0, 0], 1.0, 0.0, 0.0
+
+    def draw() -> None:
+        with mujoco.Renderer(model, 256, 256, max_geom=4 * model.ngeom) as renderer:
+            renderer.update_scene(data, camera)
+            renderer.render()
+
+    return draw
+
+
+def steps(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
+    """Environment steps, no pixels decoded."""
+    house = generate_house(seed, LARGE, catalogue)
+    with open_world(house, catalogue, cache) as world:
+        task = find_task(find_pool(world, seed=seed), 0, seed=seed, language=PlainLanguage())
+        env = HelpEnv({world.name: world})
+        count = 4000
+
+        def walk() -> None:
+            observation = None
+            for i in range(count):
+                if observation is None:
+                    observation = env.reset(task)
+                observation = env.step(Move(i % len(observation.candidates)))
+
+        yield measure("environment steps, no pixels decoded", walk, "1/s", per=count, repeats=7, aim=20_000.0)
+
+
+def memory(catalogue: Catalogue, cache: Path, seed: int, count: int) -> Iterator[Measure]:
+    """Resident memory while `count` houses are made, drawn once and dropped."""
+    process, values = psutil.Process(), []
+    for i in tqdm(range(count), "houses loaded and dropped", unit="house"):
+        house = generate_house(seed + i, TYPICAL, catalogue)
+        graph: NavGraph = build_graph(house, catalogue)
+        with Renderer(house, catalogue, size=64) as renderer:
+            renderer.panorama(graph.positions[0])
+        gc.collect()
+        values.append(process.memory_info().rss / 2**20)
+    third = max(count // 3, 1)
+    yield from_values(f"memory after {count} houses", values[-1:], "MiB", aim=2048.0)
+    growth = np.median(values[-third:]) - np.median(values[third:2 * third] if count >= 3 else values)
+    yield from_values("growth over the last third", [float(growth)], "MiB", aim=100.0)
+
+

@@ -1,0 +1,61 @@
+"""Measure speed and memory here, as medians, and compare with what the project promises.
+
+houses, pictures, steps and memory make the table of the main line; light compares the ways of
+drawing with a path tracer. Close other programs first: the numbers are only as good as the quiet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from dataclasses import asdict
+from pathlib import Path
+
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+
+PARTS = ("houses", "pictures", "steps", "memory", "light")
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("part", nargs="*", help="what to measure (default: houses, pictures, steps)")
+    parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
+    parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how pictures are drawn (default: unlit)")
+    parser.add_argument("--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)")
+    parser.add_argument("--out", type=Path, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures")
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from embodied import gl
+    from embodied.bench import timing, world
+
+    catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
+    if unknown := sorted(set(parts) - set(PARTS)):
+        raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
+    if "light" in parts:
+        return light(args, catalogue)
+    lines = {
+        "houses": lambda: world.houses(catalogue, args.seed),
+        "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality),
+        "steps": lambda: world.steps(catalogue, args.cache, args.seed),
+        "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
+    }
+    measures = []
+    for m in itertools.chain.from_iterable(lines[p]() for p in parts):
+        note(timing.table([m]).splitlines()[-1])
+        measures.append(m)
+    facts = {"renderer": str(gl.info()), **timing.machine(), "seed": args.seed}
+    head = f"{facts['renderer']}; {facts['cores']} cores, {facts['system']}, seed {args.seed}\n\n"
+    show(args, {**facts, "measures": [asdict(m) for m in measures]}, head + timing.table(measures))
+    return 0
+
+
+def light(args: argparse.Namespace, catalogue) -> int:
+    """The comparison of all ways of drawing."""
+    from embodied.light.bench import compare
+
+    report = compare(catalogue, args.cache, args.out, seed=args.seed)
+    show(args, report.facts, report.text)
+    return 0
