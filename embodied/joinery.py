@@ -77,8 +77,15 @@ def hole_frame(house: House, opening: Opening) -> _Hole:
     half = house.inner_wall / 2
     far = -half if opening.rooms[1] is not None else -(house.outer_wall - half)
     z = house.storey_of(room).elevation
-    return _Hole(opening, float(np.linalg.norm(q - p)), (float(p[0]), float(p[1]), z),
-                 math.atan2(d[1], d[0]), half, far, (opening.hinge == "a") != flipped)
+    return _Hole(
+        opening,
+        float(np.linalg.norm(q - p)),
+        (float(p[0]), float(p[1]), z),
+        math.atan2(d[1], d[0]),
+        half,
+        far,
+        (opening.hinge == "a") != flipped,
+    )
 
 
 def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish]) -> list[Part]:
@@ -120,10 +127,15 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
     strip = hole.world(quads([[(0, y0, 0), (hole.length, y0, 0), (hole.length, y1, 0), (0, y1, 0)]]))
     strip = Shape(strip.vertices, strip.faces, strip.normals, strip.vertices[:, :2].copy())
     owner = f"{o.id}/threshold"
-    parts = [Part(owner, "floor", first.id, part(finish(second.floor_finish), turned_uv(strip, floor_turn(house))), owner)]
+    parts = [
+        Part(owner, "floor", first.id, part(finish(second.floor_finish), turned_uv(strip, floor_turn(house))), owner)
+    ]
     if first.floor_finish != second.floor_finish:
-        bar = box([LINING if o.kind != "passage" else 0, y1 - 0.028, -0.001],
-                  [hole.length - (LINING if o.kind != "passage" else 0), y1 - 0.002, 0.0035], 0.0015)
+        bar = box(
+            [LINING if o.kind != "passage" else 0, y1 - 0.028, -0.001],
+            [hole.length - (LINING if o.kind != "passage" else 0), y1 - 0.002, 0.0035],
+            0.0015,
+        )
         parts.append(Part(owner, "floor", first.id, part(METAL, hole.world(bar)), owner + "#bar"))
     return parts
 
@@ -146,7 +158,7 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
     y1 = y0 + 0.07
     french = o.kind == "french_window" or o.sill < 0.05
     frame, panes, handles = _sashes(house, hole, y0, y1, french)
-    parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1, hole.inside, False))]
+    parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1 - 0.01, hole.inside, False))]
     outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
     parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
     parts.append(_part(hole, "frame", "opening", frame_finish, frame))
@@ -157,7 +169,9 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
         parts += _threshold(house, hole, y1, hole.inside, finish)
     else:
         board = [box([0.0, y1, o.sill - 0.002], [hole.length, hole.inside, o.sill + 0.022])]
-        board.append(box([-0.035, hole.inside, o.sill - 0.002], [hole.length + 0.035, hole.inside + 0.04, o.sill + 0.022], 0.005))
+        board.append(
+            box([-0.035, hole.inside, o.sill - 0.002], [hole.length + 0.035, hole.inside + 0.04, o.sill + 0.022], 0.005)
+        )
         stone = stream(house.seed, "joinery", "sill").random() < 0.4
         parts.append(_part(hole, "sill", "opening", STONE_SILL if stone else frame_finish, *board))
     return parts
@@ -170,14 +184,19 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
     outer, sash = 0.045, 0.055
     count = max(1, min(6, round(w / (0.85 if french else 0.95))))
     bars = stream(house.seed, "joinery", "bars").random() < 0.3
-    frame = _ring(0, w, z0, z1, outer, y0, y1, 0.004)
+    frame = _ring(0, w, z0, z1, outer, y0, y1, 0.0)
     cells = np.linspace(outer, w - outer, count + 1)
     panes, handles = [], []
     for i in range(count):
         x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
         b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
         frame += _ring(x0, x1, b0, b1, sash, y0 + 0.012, y1 + 0.012, 0.006, low=0.12 if french else sash)
-        gx0, gx1, gz0, gz1 = x0 + sash - 0.006, x1 - sash + 0.006, b0 + (0.12 if french else sash) - 0.006, b1 - sash + 0.006
+        gx0, gx1, gz0, gz1 = (
+            x0 + sash - 0.006,
+            x1 - sash + 0.006,
+            b0 + (0.12 if french else sash) - 0.006,
+            b1 - sash + 0.006,
+        )
         ym = (y0 + y1) / 2
         pane = quads([[(gx1, ym, gz0), (gx0, ym, gz0), (gx0, ym, gz1), (gx1, ym, gz1)]])
         panes.append(two_sided(pane))
@@ -195,8 +214,17 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
     return joined(*frame), joined(*panes), handles
 
 
-def _ring(x0: float, x1: float, z0: float, z1: float, width: float, y0: float, y1: float,
-          bevel: float, low: float | None = None) -> list[Shape]:
+def _ring(
+    x0: float,
+    x1: float,
+    z0: float,
+    z1: float,
+    width: float,
+    y0: float,
+    y1: float,
+    bevel: float,
+    low: float | None = None,
+) -> list[Shape]:
     """Four boards around a rectangle; `low` is the height of the bottom one."""
     low = width if low is None else low
     return [
@@ -221,8 +249,17 @@ def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Pa
     wood = finish(o.leaf_finish or "paint_white/0")
     outdoors = o.rooms[1] is None
     y0 = hole.inside - 0.10 if outdoors else hole.outside
-    parts = [_part(hole, "frame", "opening", wood, *_lining(hole, y0, hole.inside),
-                   *_casing(hole, hole.inside, 1.0), *([] if outdoors else _casing(hole, hole.outside, -1.0)))]
+    parts = [
+        _part(
+            hole,
+            "frame",
+            "opening",
+            wood,
+            *_lining(hole, y0, hole.inside),
+            *_casing(hole, hole.inside, 1.0),
+            *([] if outdoors else _casing(hole, hole.outside, -1.0)),
+        )
+    ]
     if outdoors:
         parts.append(_part(hole, "reveal", "wall", finish(facade_finish(house)), _tunnel(hole, hole.outside, y0, True)))
     parts += _threshold(house, hole, y0, hole.inside, finish)
@@ -236,12 +273,18 @@ def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Pa
 def _lining(hole: _Hole, y0: float, y1: float) -> list[Shape]:
     w, head, t = hole.length, hole.opening.head, LINING
     stop = y1 - 0.045
-    boards = [box([0, y0, 0], [t, y1, head]), box([w - t, y0, 0], [w, y1, head]), box([t, y0, head - t], [w - t, y1, head])]
+    boards = [
+        box([0, y0, 0], [t, y1, head]),
+        box([w - t, y0, 0], [w, y1, head]),
+        box([t, y0, head - t], [w - t, y1, head]),
+    ]
     if hole.opening.kind in ("door", "front_door", "back_door"):
         s = t + 0.012
-        boards += [box([t, y0 + 0.004, 0], [s, stop, head - t], 0.002),
-                   box([w - s, y0 + 0.004, 0], [w - t, stop, head - t], 0.002),
-                   box([s, y0 + 0.004, head - s], [w - s, stop, head - t], 0.002)]
+        boards += [
+            box([t, y0 + 0.004, 0], [s, stop, head - t], 0.002),
+            box([w - s, y0 + 0.004, 0], [w - t, stop, head - t], 0.002),
+            box([s, y0 + 0.004, head - s], [w - s, stop, head - t], 0.002),
+        ]
     return boards
 
 
@@ -254,7 +297,14 @@ def _casing(hole: _Hole, y: float, side: float) -> list[Shape]:
     outer = np.array([(-wide, 0), (-wide, head + wide), (w + wide, head + wide), (w + wide, 0)])
     ridge = inner + (outer - inner) * 0.72
     lip = inner + (outer - inner) * 0.06
-    lines = [(inner, 0.0), (inner, thick * 0.55), (lip, thick * 0.7), (ridge, thick), (outer, thick * 0.9), (outer, 0.0)]
+    lines = [
+        (inner, 0.0),
+        (inner, thick * 0.55),
+        (lip, thick * 0.7),
+        (ridge, thick),
+        (outer, thick * 0.9),
+        (outer, 0.0),
+    ]
     corners = []
     for (a, ya), (b, yb) in itertools.pairwise(lines):
         for k in range(3):
@@ -282,7 +332,9 @@ def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
     wood_shape, panes = _leaf(width, height, thick, "glazed" if glazed else style)
     handle = _lever(width - 0.06, thick)
     parts = []
-    for n, at_origin in enumerate((hole.hinge_at_origin, not hole.hinge_at_origin) if pair else (hole.hinge_at_origin,)):
+    for n, at_origin in enumerate(
+        (hole.hinge_at_origin, not hole.hinge_at_origin) if pair else (hole.hinge_at_origin,)
+    ):
         side = 1.0 if at_origin else -1.0
         x = LINING + 0.003 if at_origin else hole.length - LINING - 0.003
         pivot = hole.point(x, hole.inside + CASING[1], 0.006)
@@ -303,13 +355,19 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
     if style == "flat":
         return box([0, -thick, 0], [width, 0, height], 0.0025), None
     stile, top, lock = 0.105, 0.11, 0.15
-    rows = {"two_panels": [(0.2, 0.95), (0.95 + lock, height - top)], "four_panels": [(0.2, 0.85), (0.85 + lock, height - top)],
-            "three_panels": [(0.2, 0.75), (0.75 + 0.1, 1.35), (1.35 + 0.1, height - top)],
-            "glazed": [(0.22, 0.85), (0.85 + 0.12, height - top)]}[style]
+    rows = {
+        "two_panels": [(0.2, 0.95), (0.95 + lock, height - top)],
+        "four_panels": [(0.2, 0.85), (0.85 + lock, height - top)],
+        "three_panels": [(0.2, 0.75), (0.75 + 0.1, 1.35), (1.35 + 0.1, height - top)],
+        "glazed": [(0.22, 0.85), (0.85 + 0.12, height - top)],
+    }[style]
     columns = [(stile, width - stile)]
     if style == "four_panels" and width > 0.5:
         columns = [(stile, width / 2 - 0.045), (width / 2 + 0.045, width - stile)]
-    shapes = [box([0, -thick, 0], [stile, 0, height], 0.002), box([width - stile, -thick, 0], [width, 0, height], 0.002)]
+    shapes = [
+        box([0, -thick, 0], [stile, 0, height], 0.002),
+        box([width - stile, -thick, 0], [width, 0, height], 0.002),
+    ]
     heights = [0.0, *(z for row in rows for z in row), height]
     for z0, z1 in zip(heights[::2], heights[1::2]):
         shapes.append(box([stile, -thick, z0], [width - stile, 0, z1], 0.0015))
@@ -341,8 +399,12 @@ def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
         corners.append(quad[::-1] if not flip else quad)
         for k in range(4):
             m = (k + 1) % 4
-            quad = [(outer[k][0], face, outer[k][1]), (outer[m][0], face, outer[m][1]),
-                    (inner[m][0], face + sign * sunk, inner[m][1]), (inner[k][0], face + sign * sunk, inner[k][1])]
+            quad = [
+                (outer[k][0], face, outer[k][1]),
+                (outer[m][0], face, outer[m][1]),
+                (inner[m][0], face + sign * sunk, inner[m][1]),
+                (inner[k][0], face + sign * sunk, inner[k][1]),
+            ]
             corners.append(quad[::-1] if not flip else quad)
     return _grain_up(quads(np.asarray(corners, float)))
 
@@ -352,7 +414,12 @@ def _lever(x: float, thick: float) -> Shape:
     z, shapes = 1.03, []
     for y, out in ((0.0, 1.0), (-thick, -1.0)):
         rose = moved(turned(cylinder(0.025, 0, 0.009, 0.003, 14), -out * math.pi / 2, "x"), x, y, z)
-        path = [(x, y + out * 0.004, z), (x, y + out * 0.045, z), (x - 0.012, y + out * 0.055, z), (x - 0.12, y + out * 0.055, z)]
+        path = [
+            (x, y + out * 0.004, z),
+            (x, y + out * 0.045, z),
+            (x - 0.012, y + out * 0.055, z),
+            (x - 0.12, y + out * 0.055, z),
+        ]
         key = moved(turned(cylinder(0.018, 0, 0.006, 0.0, 12), -out * math.pi / 2, "x"), x, y, z - 0.09)
         shapes += [rose, tube(path, 0.0095, 10), key]
     return joined(*shapes)
@@ -363,5 +430,7 @@ def _sections(hole: _Hole) -> list[Shape]:
     o, y = hole.opening, hole.inside - 0.06
     count = max(3, round(o.head / 0.5))
     edges = np.linspace(0.0, o.head - LINING, count + 1)
-    return [box([LINING, y - 0.04, a + 0.002], [hole.length - LINING, y, b - 0.002], 0.004)
-            for a, b in itertools.pairwise(edges)]
+    return [
+        box([LINING, y - 0.04, a + 0.002], [hole.length - LINING, y, b - 0.002], 0.004)
+        for a, b in itertools.pairwise(edges)
+    ]

@@ -39,7 +39,13 @@ def outdoor_parts(house: House, finish: Callable[[str], Finish]) -> list[Part]:
         roofs += lids
     parts = [
         Part("outdoor/facade", "outdoor", "", part(finish(facade_finish(house)), *walls), "outdoor/facade"),
-        Part("outdoor/roof", "outdoor", "", part(Finish(color=(0.35, 0.34, 0.33, 1.0), roughness=0.9), *roofs), "outdoor/roof"),
+        Part(
+            "outdoor/roof",
+            "outdoor",
+            "",
+            part(Finish(color=(0.35, 0.34, 0.33, 1.0), roughness=0.9), *roofs),
+            "outdoor/roof",
+        ),
     ]
     return parts
 

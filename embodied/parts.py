@@ -15,8 +15,9 @@ __all__ = ["Meshes", "Part", "house_parts", "owners"]
 class Meshes(typing.Protocol):
     """What this module needs of a catalogue."""
 
-    def mesh(self, key: str, size: tuple[float, float, float],
-             params: tuple[tuple[str, str | float], ...] = ()) -> tuple[MeshPart, ...]: ...
+    def mesh(
+        self, key: str, size: tuple[float, float, float], params: tuple[tuple[str, str | float], ...] = ()
+    ) -> tuple[MeshPart, ...]: ...
 
     def finish(self, material_key: str) -> Finish: ...
 

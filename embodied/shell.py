@@ -88,8 +88,9 @@ def _part(owner: str, kind: str, room: Room, finish: Finish, shape: Shape) -> Pa
 # ------------------------------------------------------------------ walls
 
 
-def hole_of(house: House, room: Room, opening: Opening, p: np.ndarray,
-            q: np.ndarray) -> tuple[float, float, float, float] | None:
+def hole_of(
+    house: House, room: Room, opening: Opening, p: np.ndarray, q: np.ndarray
+) -> tuple[float, float, float, float] | None:
     """The hole of `opening` in the face from p to q of `room`, see `hole_on`."""
     if room.id not in opening.rooms:
         return None
@@ -135,8 +136,7 @@ def _door_cuts(house: House, room: Room, p: np.ndarray, q: np.ndarray) -> list[t
     return sorted(cuts)
 
 
-def _board(a: np.ndarray, b: np.ndarray, fa: np.ndarray, fb: np.ndarray, z: float,
-           cap_a: bool, cap_b: bool) -> Shape:
+def _board(a: np.ndarray, b: np.ndarray, fa: np.ndarray, fb: np.ndarray, z: float, cap_a: bool, cap_b: bool) -> Shape:
     """One skirting board from a to b on the wall, fa to fb on its front: front, rounded top, cut ends."""
     top, shoulder = z + SKIRTING_HEIGHT, z + SKIRTING_HEIGHT - 0.008
     length = float(np.linalg.norm(b - a))
@@ -150,8 +150,7 @@ def _board(a: np.ndarray, b: np.ndarray, fa: np.ndarray, fb: np.ndarray, z: floa
         [at(fb, shoulder), at(fa, shoulder), at(ia, top), at(ib, top)],
         [at(ib, top), at(ia, top), at(a, top), at(b, top)],
     ]
-    uv = [[(0, v0), (length, v0), (length, v1), (0, v1)]
-          for v0, v1 in ((0.0, 0.072), (0.072, 0.08), (0.08, 0.09))]
+    uv = [[(0, v0), (length, v0), (length, v1), (0, v1)] for v0, v1 in ((0.0, 0.072), (0.072, 0.08), (0.08, 0.09))]
     if cap_a:
         corners.append([at(fa, z), at(a, z), at(a, top), at(fa, shoulder)])
     if cap_b:

@@ -68,7 +68,10 @@ def stair_parts(house: House, stair: Stair, finish: Callable[[str], Finish]) -> 
             off = side * s * (half + 0.012) + [0, 0, 0.02]
             risers.append(bar(a + off, b + off, 0.024, 0.30, 0.003))
     owner = f"{stair.id}/stairs"
-    parts = [Part(owner, "opening", room.id, part(wood, *treads), owner), Part(owner, "opening", room.id, part(paint, *risers), owner + "#risers")]
+    parts = [
+        Part(owner, "opening", room.id, part(wood, *treads), owner),
+        Part(owner, "opening", room.id, part(paint, *risers), owner + "#risers"),
+    ]
     low = house.storey_of(room).elevation + house.storey_of(room).height
     high = house.storey_of(upper).elevation
     ring = np.asarray(shapely.geometry.polygon.orient(well(stair)).exterior.coords)[:-1]

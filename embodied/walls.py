@@ -24,8 +24,9 @@ def inset(polygon: Sequence[Sequence[float]], distance: float) -> np.ndarray:
     return p + distance * (n + m) / (1.0 + np.sum(n * m, axis=1, keepdims=True))
 
 
-def hole_on(p: np.ndarray, q: np.ndarray, opening: Opening, floor: float,
-            distance: float) -> tuple[float, float, float, float] | None:
+def hole_on(
+    p: np.ndarray, q: np.ndarray, opening: Opening, floor: float, distance: float
+) -> tuple[float, float, float, float] | None:
     """The hole of `opening` in the wall face from p to q, or None where it is in another wall.
 
     Args:
@@ -46,8 +47,14 @@ def hole_on(p: np.ndarray, q: np.ndarray, opening: Opening, floor: float,
     return float(s0), floor + opening.sill, float(s1), floor + opening.head
 
 
-def wall_face(p: np.ndarray, q: np.ndarray, z0: float, z1: float,
-              holes: Sequence[tuple[float, float, float, float]], along: float = 0.0) -> Shape:
+def wall_face(
+    p: np.ndarray,
+    q: np.ndarray,
+    z0: float,
+    z1: float,
+    holes: Sequence[tuple[float, float, float, float]],
+    along: float = 0.0,
+) -> Shape:
     """The upright rectangle over p-q with rectangular holes, facing left of the direction p to q.
 
     Args:

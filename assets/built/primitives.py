@@ -44,8 +44,11 @@ def part(finish: Finish, *shapes: Shape) -> MeshPart:
     """`shapes` as one mesh of `finish`, uv divided by its tile."""
     s = joined(*shapes)
     return MeshPart(
-        s.vertices.astype(np.float32), s.faces.astype(np.int32), s.normals.astype(np.float32),
-        (s.uv / (finish.tile or 1.0)).astype(np.float32), finish,
+        s.vertices.astype(np.float32),
+        s.faces.astype(np.int32),
+        s.normals.astype(np.float32),
+        (s.uv / (finish.tile or 1.0)).astype(np.float32),
+        finish,
     )
 
 
@@ -172,8 +175,14 @@ def extruded(polygon: shapely.Polygon, z0: float, z1: float, bevel: float = 0.0)
     if bevel:
         # The chamfer: a flat ring between outline and inset, split along matching corners.
         for ring, inner in zip(rings, [top.exterior, *top.interiors]):
-            p, q = np.asarray(ring.coords)[:-1], np.asarray(shapely.geometry.polygon.orient(
-                shapely.Polygon(inner), 1 if ring is rings[0] else -1).exterior.coords)[:-1]
+            p, q = (
+                np.asarray(ring.coords)[:-1],
+                np.asarray(
+                    shapely.geometry.polygon.orient(
+                        shapely.Polygon(inner), 1 if ring is rings[0] else -1
+                    ).exterior.coords
+                )[:-1],
+            )
             q = np.roll(q, -int(np.argmin(np.linalg.norm(q - p[0], axis=1))), axis=0)
             shapes.append(_band_between(p, z1 - bevel, q, z1))
     return joined(*shapes)
@@ -213,9 +222,9 @@ def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shap
         i, s = f // 2, 1.0 if f % 2 else -1.0
         j, k = (i + 1) % 3, (i + 2) % 3
         corner = signs if s > 0 else signs[::-1]
-        v = vertices[4 * f: 4 * f + 4]
+        v = vertices[4 * f : 4 * f + 4]
         v[:, i], v[:, j], v[:, k] = s * half[i], corner[:, 0] * (half[j] - bevel), corner[:, 1] * (half[k] - bevel)
-        normals[4 * f: 4 * f + 4, i] = s
+        normals[4 * f : 4 * f + 4, i] = s
         faces += [[4 * f, 4 * f + 1, 4 * f + 2], [4 * f, 4 * f + 2, 4 * f + 3]]
     if bevel > 0:
         faces += _bevel_faces(vertices)
@@ -302,8 +311,9 @@ def lathe(profile: Sequence[Sequence[float]], segments: int = 24, crease: float 
     angle = np.linspace(0, 2 * np.pi, segments + 1)
     c, s = np.cos(angle), np.sin(angle)
     vertices = np.stack([rows[:, :1] * c, rows[:, :1] * s, np.repeat(rows[:, 1:], segments + 1, 1)], axis=-1)
-    normals = np.stack([row_normals[:, :1] * c, row_normals[:, :1] * s,
-                        np.repeat(row_normals[:, 1:], segments + 1, 1)], axis=-1)
+    normals = np.stack(
+        [row_normals[:, :1] * c, row_normals[:, :1] * s, np.repeat(row_normals[:, 1:], segments + 1, 1)], axis=-1
+    )
     along = np.zeros(len(rows))
     for a, b in bands:
         along[b] = along[a] + np.linalg.norm(rows[b] - rows[a])
@@ -327,7 +337,9 @@ def cylinder(radius: float, z0: float, z1: float, bevel: float = 0.0, segments: 
     b = min(bevel, radius * 0.45, (z1 - z0) * 0.45)
     if b <= 0:
         return lathe([(0, z0), (radius, z0), (radius, z1), (0, z1)], segments)
-    return lathe([(0, z0), (radius - b, z0), (radius, z0 + b), (radius, z1 - b), (radius - b, z1), (0, z1)], segments, 0.9)
+    return lathe(
+        [(0, z0), (radius - b, z0), (radius, z0 + b), (radius, z1 - b), (radius - b, z1), (0, z1)], segments, 0.9
+    )
 
 
 def ball(radius: float, segments: int = 16, rings: int = 9) -> Shape:
@@ -335,8 +347,13 @@ def ball(radius: float, segments: int = 16, rings: int = 9) -> Shape:
     return lathe(np.column_stack([np.abs(np.cos(t)) * radius * (np.abs(t) < 1.57), np.sin(t) * radius]), segments, 2.0)
 
 
-def tube(path: Sequence[Sequence[float]], radius: float | Sequence[float], segments: int = 8,
-         closed: bool = False, caps: bool = True) -> Shape:
+def tube(
+    path: Sequence[Sequence[float]],
+    radius: float | Sequence[float],
+    segments: int = 8,
+    closed: bool = False,
+    caps: bool = True,
+) -> Shape:
     """A round pipe along `path` (k, 3); `radius` in metres, one or one per point."""
     p = np.asarray(path, float)
     k = len(p)
@@ -382,7 +399,9 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
     """
     p = np.asarray(points, float)
     normals = _grid_normals(p)
-    across = np.concatenate([np.zeros((len(p), 1)), np.cumsum(np.linalg.norm(np.diff(p, axis=1), axis=2), axis=1)], axis=1)
+    across = np.concatenate(
+        [np.zeros((len(p), 1)), np.cumsum(np.linalg.norm(np.diff(p, axis=1), axis=2), axis=1)], axis=1
+    )
     up = np.concatenate([np.zeros((1, p.shape[1])), np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=2), axis=0)])
     uv = np.stack([across, up], axis=-1)
     front = _grid(p, normals, uv)
@@ -413,8 +432,9 @@ def _grid(points: np.ndarray, normals: np.ndarray, uv: np.ndarray) -> Shape:
     return Shape(points.reshape(-1, 3), faces, normals.reshape(-1, 3), uv.reshape(-1, 2))
 
 
-def pillow(width: float, depth: float, height: float, cells: int = 14, roundness: float = 0.35,
-           waves: np.ndarray | None = None) -> Shape:
+def pillow(
+    width: float, depth: float, height: float, cells: int = 14, roundness: float = 0.35, waves: np.ndarray | None = None
+) -> Shape:
     """A stuffed cushion lying flat: pointed corners, a seam around its middle, origin at its centre.
 
     waves: optional (cells + 1, cells + 1) metres added to the upper side, zero at the rim.
@@ -432,8 +452,17 @@ def pillow(width: float, depth: float, height: float, cells: int = 14, roundness
     return joined(top, reversed_shape(low))
 
 
-def folds(width: float, height: float, count: float, depth: float, *, rng: np.random.Generator,
-          columns: int | None = None, rows: int = 8, gather: float = 0.0) -> np.ndarray:
+def folds(
+    width: float,
+    height: float,
+    count: float,
+    depth: float,
+    *,
+    rng: np.random.Generator,
+    columns: int | None = None,
+    rows: int = 8,
+    gather: float = 0.0,
+) -> np.ndarray:
     """Grid (rows + 1, columns + 1, 3) of hanging cloth in the xz plane facing -y, z from 0 to height.
 
     `count` folds of +-`depth` metres, irregular in width and swing; `gather` narrows it toward the top.

@@ -1,0 +1,58 @@
+"""Material: what a procedural material is called, where it belongs and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from assets.materials.maps import Maps
+
+ROLES = (
+    "floor_wood",
+    "floor_tile",
+    "carpet",
+    "wall_paint",
+    "accent_paint",
+    "wallpaper",
+    "wall_tile",
+    "ceiling",
+    "brick",
+    "stone",
+    "concrete",
+    "fabric",
+    "upholstery",
+    "curtain",
+    "leather",
+    "wood",
+    "door",
+    "metal",
+    "worktop",
+    "cabinet",
+    "facade",
+    "outdoor_floor",
+    "wicker",
+    "plaster",
+    "rug",
+)
+"""What a material may be used for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    key: str
+    """'<maker>/<variant>'."""
+    family: str
+    """What it is: 'wood', 'tile', 'carpet', 'paint', 'wallpaper', 'stone', 'fabric', 'metal', ..."""
+    roles: tuple[str, ...]
+    """Where it belongs, from ROLES."""
+    name: str
+    """'oak planks', 'sage green paint'."""
+    colours: tuple[str, ...]
+    materials: tuple[str, ...]
+    tile: float
+    """Side of the square the maps cover, metres."""
+    pixels: int
+    recipe: Callable[..., Maps]
+    """recipe(pixels, tile, rng=...)."""
+    specular: float = 0.5
+    metallic: float = 0.0

@@ -1,0 +1,325 @@
+"""Tiles with grout, stone, brick, concrete, terrazzo and worktops."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from assets.materials.maps import Layout, Maps, blurred, coordinates, fbm, look_up, mix, noise, rgb, smooth_step
+
+
+def tiles(
+    n: int,
+    tile: float,
+    layout,
+    surface,
+    grout: tuple[float, float, float] = (0.72, 0.70, 0.66),
+    joint: float = 0.003,
+    bevel: float = 0.0015,
+    tone: float = 0.015,
+    gloss: float = 0.15,
+    waviness: float = 0.0,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Tiles laid by `layout(n, tile)` whose faces `surface(x, y, n, rng=rng)` paints.
+
+    Args:
+      surface: x, y (n, n) in tiles, shifted per piece -> colour (n, n, 3), roughness to add, height.
+      joint: width of the grout, metres.
+      waviness: hand-made unevenness, metres of height per piece.
+    """
+    pieces: Layout = layout(n, tile)
+    pixel = tile / n
+    u, v = coordinates(n, tile)
+    shift = rng.random((pieces.count, 2))
+    x, y = u / tile + shift[pieces.piece, 0], v / tile + shift[pieces.piece, 1]
+    color, rough, height = surface(x, y, n, rng=rng)
+    lightness = np.clip(rng.normal(0, tone, pieces.count), -2.2 * tone, 2.2 * tone)
+    color = color * (1 + lightness[pieces.piece])[..., None]
+    inside = smooth_step(pieces.edge, joint / 2 - pixel * 0.4, joint / 2 + pixel * 0.6)
+    grain = noise(n, 1.2, 1.2, rng=rng)
+    dirt = fbm(n, 3, 30, 1.0, rng=rng)
+    filler = rgb(grout) * (1 + 0.05 * grain + 0.05 * dirt)[..., None]
+    shade = 1 - 0.10 * (1 - smooth_step(pieces.edge, joint / 2, joint / 2 + bevel + pixel))
+    color = filler * (1 - inside)[..., None] + color * (inside * shade)[..., None]
+    slope = smooth_step(pieces.edge, joint / 2, joint / 2 + max(bevel, pixel))
+    tilt = rng.normal(0, 1, (pieces.count, 2))
+    lie = waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
+    height = inside * (height + lie) + 0.0012 * slope
+    rough = np.where(inside > 0.5, gloss + rough, 0.88)
+    return Maps(
+        np.clip(color, 0.01, 0.98).astype(np.float32),
+        height.astype(np.float32),
+        np.clip(rough, 0.05, 1).astype(np.float32),
+    )
+
+
+# ------------------------------------------------------------------ faces of tiles and slabs
+
+
+def glaze(color, mottle: float = 0.008):
+    """Glazed ceramic, nearly one colour."""
+
+    def surface(x, y, n, *, rng):
+        cloud = look_up(fbm(n, 3, 60, 1.3, rng=rng), x, y)
+        return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud, 2e-5 * cloud
+
+    return surface
+
+
+def matt(color, speck: float = 0.025, cloudiness: float = 0.016):
+    """Unglazed stoneware and cement: clouds and fine grain."""
+
+    def surface(x, y, n, *, rng):
+        cloud = look_up(fbm(n, 2, 120, 1.2, rng=rng), x, y)
+        grain = look_up(noise(n, 0.8, 0.8, rng=rng), x, y)
+        return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud, 3e-5 * grain
+
+    return surface
+
+
+def marble(base, vein, amount: float = 0.7, second=None):
+    """Veined marble: ridges of warped noise, some sharp, most faint."""
+
+    def surface(x, y, n, *, rng):
+        # Whole-number shears keep the period; veins run long along the diagonal.
+        p, q = x + y, 2 * (x - y)
+        wx, wy = fbm(n, 1.5, 14, 1.8, rng=rng), fbm(n, 3, 40, 1.6, rng=rng)
+        p = p + 0.05 * look_up(wx, x, y) + 0.008 * look_up(wy, x, y)
+        q = q + 0.06 * look_up(wx, y, x) + 0.012 * look_up(wy, y, x)
+        x2, y2 = x + 0.03 * look_up(wx, x, y), y + 0.03 * look_up(wy, x, y)
+        wide = np.abs(look_up(fbm(n, 0.9, 7, 1.6, rng=rng), p, q))
+        thin = np.abs(look_up(fbm(n, 1.8, 16, 1.4, rng=rng), p, q + 0.3))
+        presence = smooth_step(look_up(fbm(n, 1.5, 8, 1.3, rng=rng), x, y), -0.6, 1.6)
+        cloud = look_up(fbm(n, 1.5, 90, 1.3, rng=rng), x2, y2)
+        strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
+        faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
+        t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
+        color = mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t)
+        if second is not None:
+            color = mix(color, rgb(second), 0.6 * smooth_step(cloud, 0.7, 2.0))
+        return color, 0.02 * t, 0 * t
+
+    return surface
+
+
+def slate(base, warm=(0.40, 0.34, 0.28), rust: float = 0.25):
+    """Cleft slate: layered relief and rusty patches."""
+
+    def surface(x, y, n, *, rng):
+        relief = look_up(fbm(n, 2, 150, 1.5, rng=rng), x, y)
+        layers = np.abs((relief * 1.6) % 1.0 - 0.5)
+        cloud = look_up(fbm(n, 2, 40, 1.4, rng=rng), x, y)
+        color = rgb(base) * (1 + 0.10 * relief + 0.05 * cloud)[..., None]
+        color = mix(color, rgb(warm), rust * smooth_step(cloud, 0.6, 2.0))
+        return color, 0.06 * relief, 6e-4 * relief + 3e-4 * layers
+
+    return surface
+
+
+def terracotta(base=(0.70, 0.42, 0.29), pale=(0.80, 0.58, 0.44)):
+    """Fired clay: mottled from red to straw."""
+
+    def surface(x, y, n, *, rng):
+        cloud = look_up(fbm(n, 1.5, 50, 1.5, rng=rng), x, y)
+        grain = look_up(noise(n, 0.9, 0.9, rng=rng), x, y)
+        color = mix(rgb(base), rgb(pale), np.clip(0.35 + 0.28 * cloud, 0, 1)) * (1 + 0.025 * grain)[..., None]
+        return color, 0.04 * cloud, 1.5e-4 * cloud + 3e-5 * grain
+
+    return surface
+
+
+def travertine(base=(0.83, 0.76, 0.66), dark=(0.70, 0.60, 0.48)):
+    """Layered limestone with small holes."""
+
+    def surface(x, y, n, *, rng):
+        bands = look_up(fbm(n, 2, 60, 1.2, 7.0, rng=rng), x, y)
+        cloud = look_up(fbm(n, 2, 100, 1.3, rng=rng), x, y)
+        pits = smooth_step(look_up(noise(n, 5.0, 1.4, rng=rng), x, y) + 0.4 * bands, 2.1, 2.6)
+        color = (
+            mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
+        )
+        return color, 0.2 * pits, -6e-4 * pits
+
+    return surface
+
+
+# ------------------------------------------------------------------ without joints
+
+
+def slab(n: int, tile: float, surface, gloss: float, *, rng: np.random.Generator) -> Maps:
+    """One endless face of stone."""
+    u, v = coordinates(n, tile)
+    color, rough, height = surface(u / tile, v / tile, n, rng=rng)
+    return Maps(
+        np.clip(color, 0.01, 0.98).astype(np.float32),
+        np.asarray(height, np.float32) + np.zeros((n, n), np.float32),
+        np.clip(gloss + rough, 0.05, 1).astype(np.float32),
+    )
+
+
+def granite(
+    n: int, tile: float, colors, weights, grain: float = 0.004, gloss: float = 0.12, *, rng: np.random.Generator
+) -> Maps:
+    """Crystals of several minerals: each pixel shows the mineral whose noise is largest there."""
+    size = grain / (tile / n)
+    best, color = np.full((n, n), -np.inf, np.float32), np.zeros((n, n, 3), np.float32)
+    for c, w in zip(colors, weights):
+        f = 0.75 * noise(n, size, size, rng=rng) + 0.5 * noise(n, size * 0.4, size * 0.4, rng=rng) + w
+        shade = rgb(c) * (1 + 0.08 * noise(n, size * 0.5, size * 0.5, rng=rng))[..., None]
+        edge = smooth_step(f - best, -0.08, 0.08)
+        color = color * (1 - edge)[..., None] + shade * edge[..., None]
+        best = np.maximum(best, f)
+    cloud = fbm(n, 3, 12, 1.0, rng=rng)
+    color *= (1 + 0.03 * cloud)[..., None]
+    return Maps(np.clip(color, 0.01, 0.97), np.zeros((n, n), np.float32), np.full((n, n), gloss, np.float32))
+
+
+def terrazzo(
+    n: int, tile: float, base, chips, size: float = 0.014, cover: float = 0.45, *, rng: np.random.Generator
+) -> Maps:
+    """Broken stone chips in cement, ground flat."""
+    color = np.round(rgb(base, (n, n)) * 255).astype(np.uint8)
+    placed, area = 0.0, n * n
+    pixel = tile / n
+    for _ in range(20000):
+        if placed > cover * area * 1.25:
+            break
+        r = size / pixel * float(np.clip(rng.lognormal(-0.5, 0.55), 0.15, 1.8))
+        angle = np.sort(rng.random(rng.integers(4, 8))) * 2 * np.pi
+        shape = (
+            np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.6, 1.0)], 1)
+            * r
+            * rng.uniform(0.7, 1.0, (len(angle), 1))
+        )
+        spin = rng.uniform(0, 6.28)
+        shape = shape @ np.array([[np.cos(spin), -np.sin(spin)], [np.sin(spin), np.cos(spin)]])
+        at = rng.random(2) * n
+        tint = rgb(chips[rng.integers(len(chips))]) * rng.normal(1, 0.06)
+        tint = tuple(float(c) for c in np.clip(tint * 255, 4, 250))
+        for dx in (-n, 0, n):
+            for dy in (-n, 0, n):
+                p = shape + at + [dx, dy]
+                if p.max() < 0 or p[:, 0].min() > n or p[:, 1].min() > n or p[:, 0].max() < 0 or p[:, 1].max() < 0:
+                    continue
+                cv2.fillPoly(color, [np.round(p * 16).astype(np.int32)], tint, cv2.LINE_AA, 4)
+        placed += 1.6 * r * r
+    fine = noise(n, 0.8, 0.8, rng=rng)
+    out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
+    return Maps(np.clip(out, 0.01, 0.98), np.zeros((n, n), np.float32), np.full((n, n), 0.22, np.float32))
+
+
+def concrete(
+    n: int,
+    tile: float,
+    base=(0.60, 0.59, 0.57),
+    contrast: float = 0.03,
+    gloss: float = 0.75,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Cast or trowelled cement: clouds, fine grain, a few air holes."""
+    cloud = fbm(n, 3.5, 200, 1.05, rng=rng)
+    sweep = fbm(n, 3, 40, 1.5, 2.5, rng=rng)
+    grain = noise(n, 0.8, 0.8, rng=rng)
+    holes = smooth_step(noise(n, 2.2, 2.2, rng=rng), 3.15, 3.5)
+    color = (
+        rgb(base)
+        * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
+        * (1 - 0.45 * holes)[..., None]
+    )
+    height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
+    return Maps(
+        np.clip(color, 0.02, 0.97).astype(np.float32), height, np.clip(gloss + 0.06 * sweep, 0.1, 1).astype(np.float32)
+    )
+
+
+def brick(
+    n: int,
+    tile: float,
+    columns: int,
+    rows: int,
+    color,
+    mortar=(0.70, 0.67, 0.62),
+    spread: float = 0.10,
+    painted: bool = False,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Brickwork in running bond with rough edges; `painted` covers bricks and mortar with one coat."""
+    u, v = coordinates(n, tile)
+    wave_x, wave_y = fbm(n, 8, 200, 1.0, rng=rng), fbm(n, 8, 200, 1.0, rng=rng)
+    width, height = tile / columns, tile / rows
+    uu, vv = u + 0.0011 * wave_x, v + 0.0011 * wave_y
+    r = np.floor(vv / height).astype(int)
+    x = uu + (r % 2) * 0.5 * width
+    c = np.floor(x / width).astype(int)
+    a, b = x - c * width, vv - r * height
+    edge = np.minimum(np.minimum(a, width - a), np.minimum(b, height - b))
+    piece = (r % rows) * columns + c % columns
+    count = rows * columns
+    face = smooth_step(edge, 0.0045, 0.0075)
+    cloud, grain = fbm(n, 4, 150, 1.1, rng=rng), noise(n, 1.0, 1.0, rng=rng)
+    tone = np.clip(rng.normal(0, spread, count), -0.22, 0.2)
+    burnt = (rng.random(count) < 0.10) * rng.uniform(0.1, 0.3, count)
+    clay = rgb(color) * (1 + tone[piece] - burnt[piece] + 0.05 * cloud + 0.03 * grain)[..., None]
+    clay = clay * (1 + rng.normal(0, 0.025, (count, 1)) * [1.0, 0.0, -1.0])[piece]
+    filler = rgb(mortar) * (1 + 0.04 * grain + 0.05 * cloud)[..., None]
+    relief = 0.005 * face + 5e-4 * cloud * face + 1.2e-4 * grain
+    mixed = filler * (1 - face)[..., None] + clay * face[..., None]
+    if painted:
+        shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
+        mixed = rgb(color) * (shade * (1 + 0.012 * cloud))[..., None]
+    return Maps(
+        np.clip(mixed, 0.02, 0.97).astype(np.float32),
+        relief.astype(np.float32),
+        np.full((n, n), 0.6 if painted else 0.88, np.float32),
+    )
+
+
+def rubble(
+    n: int,
+    tile: float,
+    base=(0.62, 0.57, 0.50),
+    across: int = 5,
+    mortar=(0.64, 0.61, 0.56),
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Natural stone walling: cells of jittered points, flat courses, each stone its own shade."""
+    rows = int(across * 1.7)
+    py, px = np.meshgrid(np.arange(rows), np.arange(across), indexing="ij")
+    points = np.stack(
+        [
+            (px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape)) / across,
+            (py + rng.uniform(-0.2, 0.2, px.shape)) / rows,
+        ],
+        -1,
+    ).reshape(-1, 2)
+    u, v = coordinates(n, tile)
+    bend = fbm(n, 4, 60, 1.5, rng=rng)
+    x, y = u / tile + 0.0025 * bend, v / tile + 0.0025 * np.roll(bend, n // 3, 0)
+    first, second = np.full((n, n), 9.0), np.full((n, n), 9.0)
+    owner = np.zeros((n, n), int)
+    for k, p in enumerate(points):
+        dx = (x - p[0] + 0.5) % 1 - 0.5
+        dy = ((y - p[1] + 0.5) % 1 - 0.5) * 1.35
+        d = np.sqrt(dx**2 + dy**2)
+        closer = d < first
+        second = np.where(closer, first, np.minimum(second, d))
+        owner = np.where(closer, k, owner)
+        first = np.where(closer, d, first)
+    edge = (second - first) * tile / 2
+    face = smooth_step(edge, 0.004, 0.012)
+    tone = np.clip(rng.normal(0, 0.10, len(points)), -0.2, 0.2)
+    hue = rng.normal(0, 0.03, (len(points), 1)) * [1.0, 0.3, -1.0]
+    cloud, grain = fbm(n, 5, 200, 1.1, rng=rng), noise(n, 1, 1, rng=rng)
+    stone = rgb(base) * (1 + tone[owner] + 0.07 * cloud + 0.03 * grain)[..., None] * (1 + hue[owner])
+    color = rgb(mortar) * (1 + 0.05 * cloud)[..., None] * (1 - face)[..., None] + stone * face[..., None]
+    dome = smooth_step(edge, 0.0, 0.03)
+    return Maps(
+        np.clip(color, 0.02, 0.97).astype(np.float32),
+        (0.012 * dome + 0.0012 * cloud * face).astype(np.float32),
+        np.full((n, n), 0.9, np.float32),
+    )

@@ -1,0 +1,23 @@
+"""All materials by key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from assets.materials.list_cloth import cloth_materials
+from assets.materials.list_floors import floor_materials
+from assets.materials.list_walls import wall_materials
+from assets.materials.material import ROLES, Material
+
+
+def _build() -> Mapping[str, Material]:
+    made = [*wall_materials(), *floor_materials(), *cloth_materials()]
+    keys = [m.key for m in made]
+    assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)
+    assert all(r in ROLES for m in made for r in m.roles)
+    return MappingProxyType({m.key: m for m in sorted(made, key=lambda m: m.key)})
+
+
+MATERIALS: Mapping[str, Material] = _build()
+"""Every material by key, keys sorted."""

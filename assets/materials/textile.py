@@ -1,0 +1,155 @@
+"""Carpets, woven and felted cloth, velvet, leather, wicker."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assets.materials.maps import Maps, coordinates, fbm, mix, noise, rgb, smooth_step
+
+
+def weave(
+    n: int,
+    tile: float,
+    warp,
+    weft,
+    threads: int,
+    over: int = 1,
+    irregular: float = 0.05,
+    slubs: float = 0.3,
+    fuzz: float = 0.05,
+    rough: float = 0.92,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Warp and weft threads crossing: plain weave (over=1) or twill (over=2 or 3).
+
+    Args:
+      warp, weft: sRGB of the upright and the level threads, or tuples of colours cycled thread by thread.
+      threads: threads per tile in each direction; a multiple of 2 * over * the number of colours.
+      slubs: how uneven the threads' thickness is.
+    """
+    u, v = coordinates(n, tile)
+    x, y = u / tile * threads, v / tile * threads
+    swing = fbm(n, 3, 40, 1.2, rng=rng)
+    x, y = x + 0.12 * swing, y + 0.12 * np.roll(swing, n // 2, 1)
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = x - i - 0.5, y - j - 0.5
+    i, j = i % threads, j % threads
+    up = ((i + j) % 2 == 0) if over == 1 else ((i + j) % (2 * over) < over)
+    round_warp, round_weft = np.cos(np.pi * fx) ** 0.7, np.cos(np.pi * fy) ** 0.7
+    tone_warp, tone_weft = rng.normal(0, irregular, threads), rng.normal(0, irregular, threads)
+    fibre_up, fibre_level = noise(n, 0.6, 9, rng=rng), noise(n, 9, 0.6, rng=rng)
+    thick_up, thick_level = noise(n, 1.5, 40, rng=rng), noise(n, 40, 1.5, rng=rng)
+    lift_warp = np.cos(np.pi * fy * (1 if over == 1 else 0.6))
+    lift_weft = np.cos(np.pi * fx * (1 if over == 1 else 0.6))
+    a = _cycle(warp)[i % len(_cycle(warp))] * (1 + tone_warp[i] + fuzz * fibre_up + 0.10 * slubs * thick_up)[..., None]
+    b = (
+        _cycle(weft)[j % len(_cycle(weft))]
+        * (1 + tone_weft[j] + fuzz * fibre_level + 0.10 * slubs * thick_level)[..., None]
+    )
+    shade_a = 0.62 + 0.38 * round_warp * (0.7 + 0.3 * lift_warp)
+    shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
+    color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
+    height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
+    height = height * 0.35 * tile / threads + 0.02 * tile / threads * (fibre_up + fibre_level)
+    return Maps(
+        np.clip(color, 0.01, 0.97).astype(np.float32), height.astype(np.float32), np.full((n, n), rough, np.float32)
+    )
+
+
+def _cycle(color) -> np.ndarray:
+    c = np.asarray(color, np.float32)
+    return c[None] if c.ndim == 1 else c
+
+
+def pile(
+    n: int,
+    tile: float,
+    color,
+    second=None,
+    loop: float = 0.004,
+    depth: float = 0.12,
+    tracks: float = 0.02,
+    rough: float = 0.97,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Carpet: tufts of `loop` metres, each catching the light a little differently."""
+    size = loop / (tile / n)
+    tuft = noise(n, size, size, rng=rng)
+    fine = noise(n, size * 0.35, size * 0.35, rng=rng)
+    brushed = fbm(n, 3, 20, 1.2, rng=rng)
+    base = rgb(color, (n, n))
+    if second is not None:
+        base = mix(base, rgb(second), smooth_step(noise(n, size * 0.8, size * 0.8, rng=rng), -0.3, 0.9))
+    color = base * (1 + depth * (0.6 * tuft + 0.55 * fine) / 1.6 + tracks * brushed)[..., None]
+    height = loop * 0.25 * (tuft + 0.5 * fine)
+    return Maps(
+        np.clip(color, 0.01, 0.97).astype(np.float32), height.astype(np.float32), np.full((n, n), rough, np.float32)
+    )
+
+
+def sisal(n: int, tile: float, color=(0.70, 0.61, 0.47), ribs: int = 64, *, rng: np.random.Generator) -> Maps:
+    """Boucle of plant fibre in level ribs."""
+    u, v = coordinates(n, tile)
+    bumps = ribs * 1
+    swing = fbm(n, 4, 60, 1.2, rng=rng)
+    row = v / tile * ribs + 0.10 * swing
+    j = np.floor(row).astype(int)
+    x = u / tile * bumps + 0.5 * (j % 2) + 0.15 * np.roll(swing, n // 3, 0)
+    lump = np.cos(np.pi * (row - j - 0.5)) ** 0.6 * (0.6 + 0.4 * np.cos(2 * np.pi * x))
+    tone = rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * noise(n, 3, 1, rng=rng)
+    out = rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]
+    return Maps(
+        np.clip(out, 0.02, 0.97).astype(np.float32),
+        (0.002 * lump).astype(np.float32),
+        np.full((n, n), 0.95, np.float32),
+    )
+
+
+def felt(n: int, tile: float, color, mottle: float = 0.012, rough: float = 0.95, *, rng: np.random.Generator) -> Maps:
+    """Velvet, felt, fleece: no threads to see, soft shading in the nap."""
+    nap = noise(n, 1.6, 2.4, rng=rng)
+    cloud = fbm(n, 5, 60, 1.2, rng=rng)
+    out = rgb(color) * (1 + 0.05 * nap + mottle * cloud)[..., None]
+    return Maps(
+        np.clip(out, 0.01, 0.97).astype(np.float32),
+        (1.2e-4 * nap).astype(np.float32),
+        np.full((n, n), rough, np.float32),
+    )
+
+
+def leather(n: int, tile: float, color, gloss: float = 0.45, *, rng: np.random.Generator) -> Maps:
+    """Grained leather: a net of fine creases around pebbles."""
+    a, b = noise(n, 4.5, 4.5, rng=rng), noise(n, 4.5, 4.5, rng=rng)
+    crease = np.exp(-((np.abs(a) / 0.16) ** 1.2)) + np.exp(-((np.abs(b) / 0.16) ** 1.2))
+    cloud = fbm(n, 6, 60, 1.1, rng=rng)
+    out = rgb(color) * (1 - 0.11 * np.clip(crease, 0, 1) + 0.018 * cloud)[..., None]
+    return Maps(
+        np.clip(out, 0.01, 0.97).astype(np.float32),
+        (-1.6e-4 * crease).astype(np.float32),
+        np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1).astype(np.float32),
+    )
+
+
+def printed(base: Maps, motif: np.ndarray, color) -> Maps:
+    """`base` cloth with `motif` (n, n) in [0, 1] printed in `color`, the threads still showing."""
+    shade = base.color.mean(-1, keepdims=True) / max(float(base.color.mean()), 1e-6)
+    t = motif[..., None]
+    return Maps(
+        np.clip(base.color * (1 - t) + rgb(color) * shade * t, 0.01, 0.97).astype(np.float32),
+        base.height,
+        base.roughness,
+    )
+
+
+def stripes_motif(n: int, count: int, share: float = 0.5, upright: bool = True) -> np.ndarray:
+    x = (np.arange(n) + 0.5) / n * count % 1
+    band = smooth_step(share / 2 - np.abs(x - 0.5), -0.02, 0.02)
+    return np.broadcast_to(band[None] if upright else band[:, None], (n, n)).copy()
+
+
+def check_motif(n: int, count: int) -> np.ndarray:
+    """Gingham: half tone where stripes run, full where they cross."""
+    s = stripes_motif(n, count)
+    return 0.5 * (s + s.T)

@@ -1,0 +1,182 @@
+"""Wood: floors by pattern and species, and wood for furniture and doors."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from assets.materials.maps import Layout, Maps, fbm, look_up, mix, noise, planks, rgb, smooth_step
+
+
+@dataclass(frozen=True)
+class Species:
+    early: tuple[float, float, float]
+    """sRGB of spring wood."""
+    late: tuple[float, float, float]
+    """sRGB of summer wood: the dark lines."""
+    pore: tuple[float, float, float]
+    contrast: float = 0.8
+    """Of the rings, 0 to 1."""
+    pores: float = 0.5
+    """How many open pores show, 0 to 1."""
+    ring: float = 0.006
+    """Distance of growth rings, metres."""
+    tone: float = 0.07
+    """Standard deviation of lightness from board to board."""
+    rays: float = 0.0
+    """Silvery flecks across the grain."""
+    knots: float = 0.0
+    """Knots per square metre."""
+
+
+SPECIES = {
+    "oak": Species((0.755, 0.615, 0.455), (0.615, 0.465, 0.31), (0.44, 0.30, 0.18), 0.75, 0.8, 0.006, 0.055, 0.4, 0.25),
+    "light oak": Species((0.82, 0.72, 0.57), (0.72, 0.60, 0.45), (0.56, 0.44, 0.31), 0.7, 0.7, 0.006, 0.045, 0.3, 0.2),
+    "grey oak": Species((0.64, 0.59, 0.53), (0.53, 0.48, 0.42), (0.39, 0.34, 0.29), 0.75, 0.8, 0.006, 0.055, 0.3, 0.3),
+    "smoked oak": Species((0.42, 0.31, 0.22), (0.31, 0.22, 0.15), (0.20, 0.14, 0.09), 0.75, 0.8, 0.006, 0.06, 0.2, 0.2),
+    "walnut": Species((0.45, 0.31, 0.21), (0.30, 0.19, 0.12), (0.20, 0.12, 0.08), 0.8, 0.4, 0.008, 0.09),
+    "maple": Species((0.85, 0.74, 0.59), (0.78, 0.64, 0.48), (0.68, 0.53, 0.37), 0.5, 0.1, 0.007, 0.035),
+    "ash": Species((0.84, 0.75, 0.61), (0.69, 0.57, 0.43), (0.56, 0.44, 0.31), 0.9, 0.6, 0.008, 0.04),
+    "pine": Species((0.86, 0.71, 0.49), (0.74, 0.53, 0.31), (0.66, 0.45, 0.25), 0.85, 0.0, 0.008, 0.04, 0.0, 1.6),
+    "wenge": Species((0.27, 0.20, 0.155), (0.17, 0.12, 0.09), (0.11, 0.075, 0.055), 0.9, 0.7, 0.004, 0.06),
+    "beech": Species((0.80, 0.63, 0.47), (0.73, 0.54, 0.39), (0.60, 0.42, 0.28), 0.5, 0.2, 0.006, 0.035, 0.5),
+    "cherry": Species((0.66, 0.42, 0.28), (0.56, 0.33, 0.20), (0.44, 0.24, 0.14), 0.6, 0.2, 0.007, 0.05),
+    "teak": Species((0.61, 0.43, 0.27), (0.48, 0.32, 0.18), (0.34, 0.21, 0.11), 0.7, 0.5, 0.007, 0.06),
+    "mahogany": Species((0.44, 0.23, 0.15), (0.34, 0.16, 0.10), (0.22, 0.10, 0.06), 0.6, 0.6, 0.006, 0.05),
+}
+
+
+def floor(
+    n: int, tile: float, layout, species: str, gloss: float = 0.38, groove: float = 0.0012, *, rng: np.random.Generator
+) -> Maps:
+    """A wooden floor: `layout(n, tile)` or `layout(n, tile, rng=rng)` gives the boards."""
+    pieces = layout(n, tile, rng=rng) if _draws(layout) else layout(n, tile)
+    return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
+
+
+def _draws(layout) -> bool:
+    inner = layout.func if isinstance(layout, functools.partial) else layout
+    return inner is planks
+
+
+def furniture(
+    n: int,
+    tile: float,
+    species: str,
+    strips: int = 5,
+    gloss: float = 0.42,
+    lacquer: float = 0.0,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Glued panels without grooves, the grain along u running on over the tile's border."""
+    t = (np.arange(n) + 0.5) / n * tile
+    u, v = np.meshgrid(t, t[::-1])
+    width = tile / strips
+    k = np.floor(v / width).astype(int)
+    across = v - k * width - width / 2
+    layout = Layout(k, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips)
+    kind = SPECIES[species]
+    calm = Species(
+        kind.early, kind.late, kind.pore, kind.contrast, kind.pores, kind.ring, kind.tone * 0.25, kind.rays, 0.0
+    )
+    maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=rng)
+    return Maps(maps.color, maps.height * (1 - lacquer), maps.roughness * (1 - 0.4 * lacquer))
+
+
+def boards(
+    n: int,
+    tile: float,
+    layout: Layout,
+    species: Species,
+    gloss: float,
+    groove: float,
+    endless: bool = False,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """Every piece of `layout` sawn from its own place of its own log.
+
+    A board cuts the growth rings, cylinders about the pith, in a plane at some distance from it:
+    near the pith that draws cathedrals, far from it straight lines.
+    """
+    count, pixel = layout.count, tile / n
+    piece = layout.piece
+    plain = rng.random(count) < 0.6
+    pith_across = np.where(
+        plain, rng.normal(0, 0.035, count), rng.choice([-1, 1], count) * rng.uniform(0.10, 0.35, count)
+    )
+    pith_depth = np.where(plain, rng.uniform(0.015, 0.07, count), rng.uniform(0.0, 0.05, count))
+    slope = np.zeros(count) if endless else rng.normal(0, 0.02, count)
+    flip = rng.choice([-1.0, 1.0], count)
+    start, lane = rng.random(count), rng.random(count)
+    ring = species.ring * rng.uniform(0.75, 1.35, count)
+
+    along, across = layout.along, layout.across
+    x = along / tile + start[piece] if not endless else along / tile
+    y = across / tile + lane[piece]
+    if endless:
+        x = x + np.round(start[piece] * n) / n
+    slow = look_up(fbm(n, 1.0, 24, 1.8, 4.0, rng=rng), x, y * 3)
+    fine = look_up(fbm(n, 4.0, 200, 1.2, 14.0, rng=rng), x, y)
+    depth = pith_depth[piece] + slope[piece] * along + 0.010 * slow
+    radius = np.hypot(across * flip[piece] - pith_across[piece], depth)
+    phase = radius / ring[piece] + 0.10 * fine
+    drift = np.abs(np.gradient(phase, axis=1)) + np.abs(np.gradient(phase, axis=0))
+    visible = np.clip(1.5 - 2.6 * drift, 0.0, 1) * np.clip(
+        1.35 - 0.5 * drift / max(pixel / species.ring, 1e-6), 0.35, 1
+    )
+    f = phase - np.floor(phase)
+    dark = np.where(f < 0.85, (f / 0.85) ** 2.4, 1 - (f - 0.85) / 0.15)
+    each = look_up(noise(n, 1, 1, rng=rng), np.floor(phase) * 0.137 + lane[piece], lane[piece] * np.ones_like(phase))
+    dark = dark * (0.75 + 0.3 * np.tanh(each)) * visible + 0.33 * (1 - visible)
+
+    streak = look_up(noise(n, 70, 0.7, rng=rng), x, y)
+    hair = look_up(noise(n, 22, 0.35, rng=rng), x, y)
+    color = mix(
+        rgb(species.early), rgb(species.late), np.clip(species.contrast * dark + 0.09 * streak + 0.06 * fine, 0, 1.15)
+    )
+    pore = species.pores * smooth_step(hair + 0.8 * (dark - 0.4), 1.0, 2.4)
+    color = mix(color, rgb(species.pore), 0.75 * pore)
+    if species.rays:
+        fleck = look_up(noise(n, 3.0, 1.2, rng=rng), x, y)
+        color += (species.rays * 0.05 * smooth_step(fleck, 1.5, 2.6) * (~plain)[piece])[..., None]
+    if species.knots:
+        color = _knots(color, layout, species, tile, rng=rng)
+    tone = np.clip(rng.normal(0, species.tone, count), -2 * species.tone, 2 * species.tone)
+    warmth = np.clip(rng.normal(0, 0.1 * species.tone, count), -0.01, 0.01)
+    color = color * (1 + tone[piece])[..., None] * (1 + warmth[piece][..., None] * rgb((1.0, 0.0, -1.0)))
+    height = -2.5e-5 * dark - 5e-5 * pore + 1e-5 * streak
+    rough = gloss + 0.05 * dark + 0.10 * pore + 0.02 * streak
+    if groove > 0:
+        cut = 1 - smooth_step(layout.edge, groove * 0.35, groove * 0.35 + max(groove, pixel * 0.9))
+        color = color * (1 - 0.55 * cut)[..., None]
+        height = height - 6e-4 * cut
+        rough = rough + 0.25 * cut
+        height = height + rng.normal(0, 5e-5, count)[piece] * (1 - cut)
+    return Maps(
+        np.clip(color, 0.01, 0.98).astype(np.float32),
+        height.astype(np.float32),
+        np.clip(rough, 0.08, 1).astype(np.float32),
+    )
+
+
+def _knots(color: np.ndarray, layout: Layout, species: Species, tile: float, *, rng: np.random.Generator) -> np.ndarray:
+    """Round dark knots with a bright halo, each inside its own board."""
+    n = len(color)
+    mask = np.zeros((n, n), np.float32)
+    for k in range(layout.count):
+        for _ in range(rng.poisson(species.knots * tile * tile / layout.count)):
+            inside = np.flatnonzero(layout.piece.reshape(-1) == k)
+            if len(inside) == 0:
+                continue
+            at = inside[rng.integers(len(inside))]
+            a0, c0 = layout.along.reshape(-1)[at], layout.across.reshape(-1)[at]
+            size = rng.uniform(0.006, 0.014)
+            mine = layout.piece == k
+            d = np.hypot((layout.along - a0) / 1.5, layout.across - c0) / size
+            mask = np.maximum(mask, np.where(mine, np.exp(-(d**2) * 1.2), 0))
+    swirl = 1 - 0.25 * np.sin(mask * 22) * (mask > 0.05)
+    return mix(color, rgb(species.pore) * 0.75, np.clip(mask * 0.95 * swirl, 0, 1))
