@@ -23,7 +23,7 @@ from embodied.seeds import stream
 
 __all__ = ["STAGES", "Draft", "HouseConfig", "generate_house"]
 
-TRIES = 900
+TRIES = 1200
 """Candidate plans per attempt."""
 ATTEMPTS = 12
 DEFAULT = HouseConfig()

@@ -143,7 +143,25 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> tuple[list
         least = JOINS.get((cells[i].kind, cells[j].kind)) or JOINS.get((cells[j].kind, cells[i].kind))
         if least and (i, j) not in tree and wall[3] - wall[2] >= least:
             links.append(Link(i, j, wall, False))
+    links += _second_doors(cells, walls, links)
     return links, total
+
+
+def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall], links: list[Link]) -> list[Link]:
+    """A door to hall or corridor for living rooms and kitchens that are entered through each other only."""
+    found = []
+    for i, c in enumerate(cells):
+        if c.kind not in ("living_room", "kitchen", "family_room"):
+            continue
+        ways = [k.parent if k.child == i else k.child for k in links if i in (k.child, k.parent)]
+        if any(cells[k].kind in ("hall", "corridor") for k in ways):
+            continue
+        beside = [(cells[j + k - i].kind != "hall", -(w[3] - w[2]), j + k - i, w) for (j, k), w in walls.items()
+                  if i in (j, k) and cells[j + k - i].kind in ("hall", "corridor") and w[3] - w[2] >= 12]
+        if beside:
+            _, _, other, wall = min(beside)
+            found.append(Link(i, other, wall, False))
+    return found
 
 
 def _needed(cells: list[Cell], child: int, parent: int) -> int:

@@ -95,8 +95,8 @@ def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) ->
         return config.shape
     if area < 75:
         return "rectangle"
-    x = float(np.interp(area, (75, 160, 300), (0, 0.5, 1)))
-    p = np.array([0.62 - 0.5 * x, 0.3 + 0.05 * x, 0.08 + 0.17 * x, 0.28 * x if area > 150 else 0.0])
+    x = float(np.interp(area, (75, 140, 230), (0, 0.35, 1)))
+    p = np.array([0.62 * (1 - x), 0.28 + 0.12 * x, 0.1 + 0.2 * x, 0.3 * x if area > 140 else 0.0])
     return str(rng.choice(["rectangle", "L", "T", "U"], p=p / p.sum()))
 
 
@@ -130,7 +130,7 @@ def _flat(area: float, rng: np.random.Generator) -> Footprint:
 def _bar(area: float, rng: np.random.Generator) -> Footprint:
     """One wing with a corridor between two rows."""
     corridor = int(rng.integers(12, 15)) + (area > 180)
-    scale = float(np.interp(area, (60, 110, 200, 400, 600), (0, 0.35, 0.8, 1.5, 2.0)))
+    scale = float(np.interp(area, (60, 110, 200, 400, 600), (0, 0.4, 1.0, 2.4, 3.2)))
     top, bottom = _depths(rng, int(30 + 9 * scale), int(36 + 12 * scale))
     depth = top + corridor + bottom
     length = round(area * 100 / depth)

@@ -201,58 +201,69 @@ def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random
 
 
 def _assign(footprint: Footprint, modules: list[Module], privacy: dict[int, float],
-            rng: np.random.Generator) -> list[list[Module]] | None:
-    """Modules to rows, from the public end to the private one."""
+            rng: np.random.Generator) -> list[list[tuple[Module, int]]] | None:
+    """Modules with their wanted widths to rows, from the public end to the private one."""
     keys = [ZONE[m.main.kind] + privacy[id(m.main)] for m in modules]
     order = sorted(range(len(modules)), key=lambda k: keys[k])
-    rows: list[list[Module]] = [[] for _ in footprint.strips]
-    used = [0.0] * len(rows)
-    strips = footprint.strips
+    strips, corridor = footprint.strips, footprint.corridor
+    depths = sorted({s.depth for s in strips})
+    rows: list[list[tuple[Module, int]]] = [[] for _ in strips]
+    used = [0] * len(rows)
+    noise = rng.exponential(14.0, (len(modules), len(rows))).tolist()
     for k in order:
         m = modules[k]
+        by_depth = {d: (width(m, d, corridor), _slimness(m, d + (corridor if m.main.kind == "hall" else 0)))
+                    for d in depths}
         best, least = None, 1e9
         for i, s in enumerate(strips):
-            w = width(m, s.depth, footprint.corridor)
+            w, slim = by_depth[s.depth]
             left = s.length - used[i]
-            if left < 0.7 * w:
-                continue
-            deep = s.depth + (footprint.corridor if m.main.kind == "hall" else 0)
-            own = m.main.area * 100 / deep
-            tall = max(deep / own, own / deep) if m.main.kind != "hall" else 1.0
-            cost = s.rank + used[i] + rng.exponential(14.0) + 45 * max(0.0, tall - 1.7) + max(0.0, w - left)
-            if cost < least:
-                best, least = i, cost
+            if left >= 0.7 * w:
+                cost = s.rank + used[i] + noise[k][i] + slim + (w - left if w > left else 0)
+                if cost < least:
+                    best, least = i, cost
         if best is None:
-            best = int(np.argmax([s.length - u for s, u in zip(strips, used)]))
+            best = max(range(len(rows)), key=lambda i: strips[i].length - used[i])
             if strips[best].length - used[best] < 8:
                 return None
-        rows[best].append(m)
-        used[best] += width(m, strips[best].depth, footprint.corridor)
+        w = by_depth[strips[best].depth][0]
+        rows[best].append((m, w))
+        used[best] += w
     for s, row, u in zip(strips, rows, used):
         if (not row and s.length > 0) or (row and not 0.68 < s.length / u < 1.5):
             return None
     return rows
 
 
-def _lay(footprint: Footprint, rows: list[list[Module]], cells: list[Cell], rng: np.random.Generator) -> list[Cell] | None:
+def _slimness(m: Module, depth: int) -> float:
+    """What it costs, in decimetres of spine, that the module's main room would be narrow at this depth."""
+    if m.main.kind == "hall":
+        return 0.0
+    own = m.main.area * 100 / depth
+    return 45 * max(0.0, max(depth / own, own / depth) - 1.7)
+
+
+def _lay(footprint: Footprint, rows: list[list[tuple[Module, int]]], cells: list[Cell],
+         rng: np.random.Generator) -> list[Cell] | None:
     """Cut the rows into rooms, let end rooms take the corridor's ends, and cut the corridor by the hall."""
     corridor = footprint.corridor
     cuts: list[list[tuple[int, int]]] = []
     for s, row in zip(footprint.strips, rows):
-        wanted = np.array([width(m, s.depth, corridor) for m in row], dtype=float)
-        edges = [0, *np.round(np.cumsum(wanted) / wanted.sum() * s.length).astype(int).tolist()]
+        scale = s.length / max(1, sum(w for _, w in row))
+        edges = [0, *(round(x * scale) for x in itertools.accumulate(w for _, w in row))]
         cuts.append(list(itertools.pairwise(edges)))
     reach: dict[tuple[int, int], int] = {}
     limits = []
+    flips = rng.random(2 * len(footprint.bands) + sum(map(len, rows))).tolist()
     for b, band in enumerate(footprint.bands):
         limits.append([0, band.length])
         for end in (0, 1):
-            if band.free[end]:
-                _take_end(footprint, rows, cuts, b, end, reach, limits[b], rng)
+            if band.free[end] and flips.pop() > 0.1:
+                _take_end(footprint, rows, cuts, b, end, reach, limits[b])
     halls: list[tuple[int, int, int]] = []
     for i, (s, row) in enumerate(zip(footprint.strips, rows)):
-        for k, m in enumerate(row):
-            made = arrange(m, s, *cuts[i][k], corridor, mirrored=bool(rng.random() < 0.5),
+        for k, (m, wanted) in enumerate(row):
+            made = arrange(m, s, *cuts[i][k], corridor, wanted, mirrored=flips.pop() < 0.5,
                            inner=reach.get((i, k), 0), first=len(cells))
             if made is None:
                 return None
@@ -277,7 +288,7 @@ def _lay(footprint: Footprint, rows: list[list[Module]], cells: list[Cell], rng:
     return cells
 
 
-def _take_end(footprint, rows, cuts, b: int, end: int, reach, limits: list[int], rng: np.random.Generator) -> None:
+def _take_end(footprint, rows, cuts, b: int, end: int, reach, limits: list[int]) -> None:
     """Let the shorter of the two rooms at a free corridor end reach across it, if the other keeps its door."""
     band = footprint.bands[b]
     ends = []
@@ -287,11 +298,11 @@ def _take_end(footprint, rows, cuts, b: int, end: int, reach, limits: list[int],
             k = 0 if end == 0 else len(rows[i]) - 1
             a, z = cuts[i][k]
             ends.append((z - a, i, k))
-    if len(ends) < 2 or rng.random() < 0.1 or any(rows[i][k].main.kind == "hall" for _, i, k in ends):
+    if len(ends) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in ends):
         return
     ends.sort()
     (short, i, k), (long, _, _) = ends[0], ends[1]
-    m = rows[i][k]
+    m = rows[i][k][0]
     if long - short < 12 or m.owned or m.guest or m.main.kind in ("toilet", "closet"):
         return
     reach[i, k] = footprint.corridor

@@ -11,6 +11,8 @@ from embodied.generate.program import BEDROOMS, SIZES, Space
 
 FILLERS = {"kitchen": "pantry", **{k: "closet" for k in (*BEDROOMS, "hall", "study", "laundry_room")}}
 """What a leftover niche beside such a room becomes."""
+LEAST = {kind: round(sides[2] * 10) for kind, sides in SIZES.items()}
+"""Smallest usual side of each kind, decimetres."""
 NICHE = 12
 """Shortest side of a niche worth a door, decimetres."""
 
@@ -65,14 +67,10 @@ def draw_modules(spaces: tuple[Space, ...], *, rng: np.random.Generator) -> list
     ]
 
 
-def least_width(kind: str) -> int:
-    return round(SIZES[kind][2] * 10)
-
-
 def width(module: Module, depth: int, corridor: int) -> int:
     """The wanted width, decimetres, in a row of `depth`."""
     deep = depth + (corridor if module.main.kind == "hall" else 0)
-    least = least_width(module.main.kind)
+    least = LEAST[module.main.kind]
     items = (*module.owned, *((module.guest,) if module.guest else ()))
     if not items:
         return max(least, round(module.main.area * 100 / deep))
@@ -82,15 +80,16 @@ def width(module: Module, depth: int, corridor: int) -> int:
 
 def _column(items: tuple[Space, ...], depth: int) -> int:
     if depth >= 34:
-        return max(max(least_width(s.kind) for s in items), round(sum(s.area for s in items) * 100 / depth))
-    return sum(max(least_width(s.kind), round(s.area * 100 / depth)) for s in items)
+        return max(max(LEAST[s.kind] for s in items), round(sum(s.area for s in items) * 100 / depth))
+    return sum(max(LEAST[s.kind], round(s.area * 100 / depth)) for s in items)
 
 
-def arrange(module: Module, strip: Strip, u0: int, u1: int, corridor: int, *, mirrored: bool, inner: int = 0,
+def arrange(module: Module, strip: Strip, u0: int, u1: int, corridor: int, wanted: int, *, mirrored: bool, inner: int = 0,
             first: int = 0) -> list[Cell] | None:
     """The module's cells between u0 and u1 of `strip`; None where it does not fit.
 
     Args:
+      wanted: its width(), decimetres, which u1 - u0 may exceed or fall short of.
       inner: how far the main room reaches into the corridor (v = -inner).
       first: index that the first returned cell will have; owners refer to it.
     """
@@ -106,9 +105,9 @@ def arrange(module: Module, strip: Strip, u0: int, u1: int, corridor: int, *, mi
     if not items and module.guest is None:
         return [cell(module.main, u0, u1, v0, h)]
     total = (*items, *((module.guest,) if module.guest else ()))
-    column = round(_column(total, h) * min(1.0, (u1 - u0) / width(module, h, corridor)) ** 0.5)
+    column = round(_column(total, h) * min(1.0, (u1 - u0) / wanted) ** 0.5)
     edge = u1 - column
-    if edge - u0 < 0.9 * least_width(module.main.kind):
+    if edge - u0 < 0.9 * LEAST[module.main.kind]:
         return None
     cells = [cell(module.main, u0, edge, v0, h)]
     if h < 34:
@@ -121,19 +120,19 @@ def arrange(module: Module, strip: Strip, u0: int, u1: int, corridor: int, *, mi
         if len(items) == 2:
             return None
         cut = round(h * module.guest.area / (items[0].area + module.guest.area))
-        cut = min(max(cut, least_width(module.guest.kind)), h - least_width(items[0].kind))
+        cut = min(max(cut, LEAST[module.guest.kind]), h - LEAST[items[0].kind])
         return [*cells, cell(items[0], edge, u1, cut, h, first), cell(module.guest, edge, u1, 0, cut)]
     alone = items[0] if items else module.guest
-    deep = max(round(alone.area * 100 / column), least_width(alone.kind))
+    deep = max(round(alone.area * 100 / column), LEAST[alone.kind])
     rest = h - deep
-    filler = FILLERS.get(module.main.kind)
+    filler = "closet" if alone.kind == "pantry" else FILLERS.get(module.main.kind)
     if rest < NICHE or filler is None:
         deep, rest = h, 0
     niche = Space(filler or "closet", rest * column / 100)
     if items:
         cells.append(cell(alone, edge, u1, rest, h, first))
         if rest:
-            cells.append(cell(niche, edge, u1, 0, rest, first))
+            cells.append(cell(niche, edge, u1, 0, rest, None if alone.kind == "pantry" else first))
     else:
         cells.append(cell(alone, edge, u1, 0, deep))
         if rest:
@@ -146,7 +145,7 @@ def _side_by_side(module: Module, cells: list[Cell], cell, edge: int, u1: int, h
     if len(module.owned) > 1:
         return None
     items = (*module.owned, *((module.guest,) if module.guest else ()))
-    wanted = np.array([max(least_width(s.kind), s.area * 100 / h) for s in items])
+    wanted = np.array([max(LEAST[s.kind], s.area * 100 / h) for s in items])
     cuts = np.round(np.cumsum(wanted) / wanted.sum() * (u1 - edge)).astype(int).tolist()
     a = edge
     for s, b in zip(items, cuts):

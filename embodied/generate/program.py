@@ -86,7 +86,7 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
 
 def _bedrooms(area: float, config: HouseConfig, rng: np.random.Generator) -> int:
     wanted = float(np.interp(area, (35, 60, 85, 115, 160, 240, 350, 600), (1, 1.2, 2, 2.8, 3.5, 4.3, 5.4, 7.5)))
-    count = max(1, round(wanted + rng.normal(0, 0.35)))
+    count = max(1, min(round(wanted + rng.normal(0, 0.35)), int((area - 20) / 20)))
     if config.rooms is not None:
         count = min(count, config.rooms - 1)
     return count

@@ -13,7 +13,7 @@ DAYLIT = (*BEDROOMS, "living_room", "dining_room", "kitchen", "family_room", "st
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
 NEAR = {
     ("dining_room", "kitchen"): 1.6, ("dining_room", "living_room"): 1.3, ("kitchen", "living_room"): 0.7,
-    ("hall", "living_room"): 1.0, ("garage", "hall"): 0.6, ("garage", "laundry_room"): 0.8, ("garage", "kitchen"): 0.5,
+    ("hall", "living_room"): 1.8, ("garage", "hall"): 0.6, ("garage", "laundry_room"): 0.8, ("garage", "kitchen"): 0.5,
     ("kitchen", "laundry_room"): 0.4, ("family_room", "kitchen"): 0.7, ("garage", "workshop"): 0.8,
     ("living_room", "sun_room"): 0.8, ("hall", "toilet"): 0.6, ("library", "living_room"): 0.3,
     ("hall", "study"): 0.2, ("kitchen", "pantry"): 0.5,
@@ -23,6 +23,9 @@ NEAR = {
     **{tuple(sorted((k, "living_room"))): -0.15 for k in BEDROOMS},
 }
 """What a shared wall between two kinds is worth."""
+
+LIMITS = {"hall": 2.4, "toilet": 2.2, "closet": 2.2, "pantry": 2.2, "bathroom": 1.9, "laundry_room": 1.9}
+"""Longest side over shortest, 1.65 for other kinds, before it costs."""
 
 
 def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
@@ -52,7 +55,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
         outer = 2 * (w + h) - inner[i]
         if c.kind == "corridor":
             moving += area
-            value -= 0.04 * max(0, long - 80) + 0.15 * (long / 10 > 3)
+            value -= 0.07 * max(0, long - 80) + 0.15 * (long / 10 > 3)
             continue
         low, high, least = SIZES[c.kind]
         if c.kind == "hall":
@@ -63,12 +66,14 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
         elif area > high:
             value -= 5.0 * math.log(area / high)
         value -= 0.7 * abs(math.log(area / c.area))
-        limit = 1.7 if c.kind not in ("hall", "toilet", "closet", "pantry", "bathroom") else 2.2
+        limit = LIMITS.get(c.kind, 1.65)
         value -= 2.2 * max(0.0, long / short - limit)
         if c.kind in DAYLIT and outer < max(14, 0.22 * 2 * (w + h) * 0.6):
             value -= 6.0
         if c.kind in ("hall", "garage") and outer < (13 if c.kind == "hall" else 26):
             value -= 12.0
+        if c.kind == "garage" and outer > 0.45 * 2 * (w + h):
+            value += 0.8
         if c.kind == "bathroom" and outer >= 10:
             value += 0.3
         if c.kind in ("living_room", "family_room", "sun_room"):

@@ -12,15 +12,17 @@ from collections import Counter
 from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.lights import lights
-from embodied.generate.furnish.rooms import furnish_room
+from embodied.generate.furnish.rooms import furnish_room, lacks
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
 from embodied.generate.furnish.walls import hang_all
 from embodied.geometry import wrap
-from embodied.house import House, Placement, rounded
+from embodied.house import House, Placement, Room, rounded
 from embodied.seeds import stream
+
+ATTEMPTS = 4
 
 
 def furnish(draft: House, catalogue, *, seed: int) -> House:
@@ -37,14 +39,30 @@ def furnish(draft: House, catalogue, *, seed: int) -> House:
     kinds = tuple(sorted({r.kind for r in draft.rooms}))
     rooms: list[tuple[str, list[Thing]]] = []
     for room in draft.rooms:
-        ctx = Context(room_space(draft, room), stock, stream(seed, "furnish", room.id), kinds)
-        furnish_room(ctx)
+        ctx = _arranged(draft, room, stock, kinds, seed)
         hang_all(ctx)
         clutter(ctx)
         rooms.append((room.id, ctx.things))
     placements = _placements(rooms)
     shining = lights(placements, style, rng=stream(seed, "furnish", "lights"))
     return dataclasses.replace(draft, placements=placements, lights=shining)
+
+
+def _arranged(draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], seed: int) -> Context:
+    """The room with its furniture: the first of a few attempts that lacks nothing, or the best of them."""
+    best: tuple[int, Context, Counter] | None = None
+    before = stock.used.copy()
+    for attempt in range(ATTEMPTS):
+        stock.used = before.copy()
+        ctx = Context(room_space(draft, room), stock, stream(seed, "furnish", room.id, attempt), kinds, attempt)
+        furnish_room(ctx)
+        missing = lacks(ctx)
+        if best is None or missing < best[0]:
+            best = missing, ctx, stock.used
+        if not missing:
+            break
+    stock.used = best[2]
+    return best[1]
 
 
 def _placements(rooms: list[tuple[str, list[Thing]]]) -> tuple[Placement, ...]:

@@ -23,6 +23,8 @@ class Context:
     rng: np.random.Generator
     kinds: tuple[str, ...]
     """Room kinds of the whole house, so that a living room knows whether there is a dining room."""
+    attempt: int = 0
+    """How often this room has been tried before; later attempts ask for less."""
     things: list[Thing] = field(default_factory=list)
     _groups: dict[str, int] = field(default_factory=dict)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import Item, Pose, Thing, facing_point, floor_poses, wall_poses
@@ -39,8 +40,8 @@ def seating(ctx: Context) -> list[Thing] | None:
             chair = ctx.pick("easy chair", most=(1.1, 1.1, 1.2))
             lamp = ctx.pick("floor lamp") if ctx.chance(0.6) else None
             side = ctx.pick("side table")
-            for distance in _distances(ctx, stand, sofa):
-                items = _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, rich)
+            for distance, shift in _distances(ctx, stand, sofa):
+                items = _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich)
                 poses = wall_poses(
                     ctx.space, stand.size[0], score=lambda w, s: _screen_score(ctx, w, s, distance, stand.size[0]),
                 )
@@ -50,16 +51,18 @@ def seating(ctx: Context) -> list[Thing] | None:
     return None
 
 
-def _distances(ctx: Context, stand: Asset, sofa: Asset) -> list[float]:
-    """Sensible distances from the screen's wall to the back of the sofa, best first."""
+def _distances(ctx: Context, stand: Asset, sofa: Asset) -> list[tuple[float, float]]:
+    """Sensible distances from the screen's wall to the back of the sofa, and shifts of the sofa aside."""
+    # from 1.5 m (a small screen) to 3.6 m between the screen and who looks at it
     depths = sorted({
         round(depth_before(ctx.space, w, w.length / 2), 2) for w in ctx.space.walls if w.length > stand.size[0]
     })
-    near = stand.size[1] + 1.9 + sofa.size[1]
+    near = stand.size[1] + 1.55 + sofa.size[1]
     far = stand.size[1] + 3.6 + sofa.size[1]
     at_wall = [d - 0.04 for d in depths if near <= d - 0.04 <= far]
-    floating = [d for d in (near + 0.7, near + 0.2) if d < max(depths, default=0.0) - 0.75]
-    return [*at_wall, *floating] or [d - 0.04 for d in depths if d > near - 0.5][:2]
+    floating = [d for d in (near + 1.0, near + 0.5) if d < max(depths, default=0.0) - 0.75]
+    found = [*at_wall, *floating] or [d - 0.04 for d in depths if d > near - 0.5][:2]
+    return [(d, shift) for shift in (0.0, 0.35, -0.35) for d in found]
 
 
 def _screen_score(ctx: Context, wall: Wall, s: float, distance: float, width: float) -> float:
@@ -69,8 +72,8 @@ def _screen_score(ctx: Context, wall: Wall, s: float, distance: float, width: fl
     return value + 1.5 * back_to_wall - (3.0 if depth < distance - 0.02 else 0.0) + 0.3 * ctx.rng.random()
 
 
-def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, rich) -> list[Item]:
-    """The arrangement in the frame of the screen's wall; the sofa's back is `distance` away."""
+def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich) -> list[Item]:
+    """The arrangement in the frame of the screen's wall; the sofa's back is `distance` away, its middle `shift` aside."""
     rng = ctx.rng
     width, depth = sofa.size[:2]
     front = -(distance - depth)
@@ -111,7 +114,35 @@ def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance,
     if lamp is not None:
         x = -sign * (width / 2 + 0.08 + lamp.size[0] / 2)
         items.append(Item(lamp, x, front - depth + lamp.size[1] / 2 + 0.05, math.pi, optional=True, role="floor lamp"))
-    return items
+    return [i if i.on is not None or i.role in (role, "television") else replace(i, x=i.x + shift) for i in items]
+
+
+def sofa_group(ctx: Context) -> list[Thing] | None:
+    """Where no screen can be seen from a sofa: a sofa at a wall with a table and a chair or two."""
+    for role, longest in (("corner sofa", 3.5), ("sofa", 2.4), ("sofa", 1.8)):
+        sofa, table = ctx.pick(role, most=(longest, 1.9, 1.2)), ctx.pick("coffee table", most=(1.3, 0.8, 0.6))
+        if sofa is None or table is None or (role == "corner sofa" and ctx.space.area < 20):
+            continue
+        chair, rug = ctx.pick("easy chair", most=(1.0, 1.0, 1.2)), ctx.pick("carpet")
+        w, d = sofa.size[:2]
+        y = -d - 0.4 - table.size[1] / 2
+        items = [
+            Item(sofa, 0.0, -d / 2, role="sofa"),
+            Item(table, 0.0, y, wobble(ctx.rng, 2), optional=True, role="coffee table"),
+        ]
+        if rug is not None:
+            items.append(Item(rug, 0.0, y + 0.15, size=(w + 0.3, 1.6, RUG_HEIGHT), optional=True, role="rug"))
+        for sign in (-1, 1):
+            x = sign * (table.size[0] / 2 + 0.45 + chair.size[1] / 2)
+            items.append(Item(chair, x, y - 0.1, facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10), optional=True,
+                              role="armchair"))
+        found = ctx.put(items, wall_poses(
+            ctx.space, w, score=lambda wall, s: 1.2 * centred(wall, s) + 0.4 * ctx.rng.random()
+            - 0.5 * at_window(wall, s, w),
+        ), "seating", tries=40)
+        if found:
+            return found
+    return None
 
 
 def conversation(ctx: Context, chair_role: str = "easy chair") -> list[Thing] | None:

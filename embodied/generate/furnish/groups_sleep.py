@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import Item, Thing, wall_poses
@@ -33,11 +34,11 @@ def double_bed(ctx: Context) -> list[Thing] | None:
 
 
 def single_bed(ctx: Context, role: str = "single bed") -> list[Thing] | None:
-    """A narrow bed along or against a wall, one bedside table."""
-    for _ in range(3):
-        bed = ctx.pick(role, most=(1.5, 2.7, 2.2))
+    """A narrow bed against a wall, in a corner where possible, with one bedside table."""
+    for widest in (1.25, 1.25, 1.5):
+        bed = ctx.pick(role, most=(widest, 2.7, 2.2))
         if bed is None:
-            return None
+            continue
         found = _bed(ctx, bed, 1 if bed.size[2] < 1.3 else 0, corner=1.0)
         if found:
             return found
@@ -46,6 +47,7 @@ def single_bed(ctx: Context, role: str = "single bed") -> list[Thing] | None:
 
 def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thing] | None:
     rng = ctx.rng
+    roomy = ctx.space.area > 13
     w, d = bed.size[:2]
     night = ctx.pick("bedside table", most=(0.65, 0.6, 0.8), avoid=()) if flank else None
     lamp = ctx.pick("table lamp", most=(0.42, 0.42, 0.75))
@@ -61,6 +63,7 @@ def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thi
             if lamp is not None:
                 items.append(Item(lamp, 0.0, 0.06, on=len(items) - 1, role="table lamp"))
         span = w + flank * (night.size[0] + 0.05)
+    shift = 0.0 if flank != 1 or night is None else -signs[0] * (span - w) / 2
     rug = ctx.pick("carpet")
     if rug is not None and ctx.chance(0.6):
         size = (w + (1.1 if w > 1.2 else 0.9), rng.uniform(1.2, 1.6), RUG_HEIGHT)
@@ -73,10 +76,12 @@ def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thi
         free_side = depth_before(ctx.space, wall, s) - d
         doors = sum(abs((s0 + s1) / 2 - s) < w / 2 + 0.4 for s0, s1, o in _facing_doors(ctx, wall))
         return (
-            -1.6 * at_window(wall, s, w) + corner * at_corner(wall, s, span) + 0.8 * centred(wall, s)
+            -1.6 * at_window(wall, s, w) + (corner if roomy else abs(corner)) * at_corner(wall, s, span)
+            + (0.8 if roomy else 0.1) * centred(wall, s)
             + 0.5 * min(free_side, 1.2) - 0.8 * doors + 0.4 * rng.random()
         )
 
+    items = [i if i.on is not None else replace(i, x=i.x + shift) for i in items]
     poses = wall_poses(ctx.space, span, score=score)
     return ctx.put(items, poses, "sleeping", tries=40)
 

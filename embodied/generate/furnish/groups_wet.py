@@ -32,13 +32,17 @@ class KitchenSet:
         return max(1, round(asset.size[0] / self.unit))
 
 
-def kitchen_set(ctx: Context) -> KitchenSet | None:
-    """A matching set of kitchen units from the catalogue."""
-    lines = [t for t in ("line_a", "line_b", "line_c") if ctx.pick("kitchen sink", where=lambda a: t in a.tags)]
-    tag = lines[int(ctx.rng.integers(len(lines)))] if lines else None
+def kitchen_sets(ctx: Context) -> list[KitchenSet]:
+    """The matching sets of kitchen units in the catalogue, in random order."""
+    tags = [t for a in ctx.stock.of_role("kitchen sink") for t in a.tags if t.startswith("line_")]
+    tags = list(dict.fromkeys(tags)) or [""]
+    sets = [_kitchen_set(ctx, tags[int(k)]) for k in ctx.rng.permutation(len(tags))]
+    return [s for s in sets if s is not None]
 
+
+def _kitchen_set(ctx: Context, tag: str) -> KitchenSet | None:
     def of(*classes: str) -> tuple[Asset, ...]:
-        return tuple(a for c in classes for a in ctx.stock.of_role(c) if tag is None or tag in a.tags)
+        return tuple(a for c in classes for a in ctx.stock.of_role(c) if not tag or tag in a.tags)
 
     base, sinks = of("base cabinet", "drawer cabinet"), of("kitchen sink")
     upper = tuple(a for a in of("wall cabinet", "glass-door cabinet") if "over_hood" not in a.tags)
@@ -77,39 +81,52 @@ def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list
 
 def kitchen_line(ctx: Context) -> list[Thing] | None:
     """One run of units with sink, cooker and fridge, wall cabinets above; a second run in large kitchens."""
-    kit = kitchen_set(ctx)
-    if kit is None:
-        return None
+    kits = kitchen_sets(ctx)
+    for clear, spare in ((0.6, 1), (0.5, 0), (0.35, 0)):
+        for with_fridge in (True, False):
+            for kit in kits:
+                for wall, a, b in _best_runs(ctx, kit):
+                    found = _run(ctx, kit, wall, a, b, with_fridge, clear, spare)
+                    if found is None:
+                        continue
+                    if not with_fridge:
+                        lone_fridge(ctx)
+                    _second_run(ctx, kit, wall, found)
+                    return found
+    return None
+
+
+def _best_runs(ctx: Context, kit: KitchenSet) -> list[tuple[Wall, float, float]]:
     runs = []
     for wall in ctx.space.walls:
         for a, b in free_runs(ctx.space, wall, kit.depth, 0.9):
-            if b - a < 1.5:
-                continue
-            windows = sum(min(b, s1) - max(a, s0) > 0.5 for s0, s1, o in wall.openings if o.kind == "window")
-            runs.append((min(b - a, 4.4) + 0.7 * windows + 0.4 * ctx.rng.random(), a, b, wall))
-    runs.sort(key=lambda r: -r[0])
-    for with_fridge in (True, False):
-        for _, a, b, wall in runs:
-            found = _run(ctx, kit, wall, a, b, with_fridge)
-            if found is None:
-                continue
-            if not with_fridge:
-                lone_fridge(ctx)
-            _second_run(ctx, kit, wall, found)
-            return found
-    return None
+            if b - a > 1.15:
+                windows = sum(min(b, s1) - max(a, s0) > 0.5 for s0, s1, o in wall.openings if o.kind == "window")
+                runs.append((min(b - a, 4.4) + 0.7 * windows + 0.4 * ctx.rng.random(), a, b, wall))
+    return [(wall, a, b) for _, a, b, wall in sorted(runs, key=lambda r: -r[0])]
 
 
 def lone_fridge(ctx: Context) -> list[Thing] | None:
     """A fridge that found no place in the line."""
-    fridge = ctx.pick("fridge", most=(0.95, 1.0, 2.1))
-    return ctx.against_wall(fridge, "kitchen", clear=0.6, corner=0.8, window=-3.0, role="fridge")
+    for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.25)):
+        fridge = ctx.pick("fridge", most=(width, 1.0, 2.1), avoid=())
+        found = ctx.against_wall(fridge, "kitchen", clear=clear, corner=0.8, window=-3.0, role="fridge")
+        if found:
+            return found
+    return None
 
 
-def _run(ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool) -> list[Thing] | None:
-    """Sink, cooker and cabinets between `a` and `b` of a wall, the fridge at the end without window."""
-    need = kit.units(kit.sink) + (1 if kit.hob else kit.units(kit.cooker)) + 1
-    fridge = ctx.pick("fridge", most=(0.95, 1.0, 2.1), avoid=()) if with_fridge else None
+def _run(
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool, free: float, spare: int,
+) -> list[Thing] | None:
+    """Sink, cooker and at least `spare` cabinets between `a` and `b` of a wall, the fridge at an end without window.
+
+    Args:
+      free: depth that stays free before the units, metres.
+    """
+    need = kit.units(kit.sink) + (1 if kit.hob else kit.units(kit.cooker)) + spare
+    small = 0.95 if b - a > 3.2 and ctx.space.area > 8 else 0.65
+    fridge = ctx.pick("fridge", most=(small, 1.0, 2.1), avoid=()) if with_fridge else None
     room = b - a - (fridge.size[0] + 0.02 if fridge else 0.0)
     count = min(int(room / kit.unit + 0.15), int(4.0 / kit.unit))
     if count < need:
@@ -130,10 +147,10 @@ def _run(ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fri
         if at_end and fridge is not None:
             start = b - fridge.size[0] - 0.02 - count * width
         slots = _slots(ctx, kit, count, width, start, view)
-        items = _run_items(ctx, kit, slots, width, windows)
+        items = _run_items(ctx, kit, slots, width, windows, free)
         if fridge is not None:
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
-            items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, clear=0.55, role="fridge")))
+            items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, clear=free - 0.05, role="fridge")))
         placed = [_moved(item, -s) for s, item in items]
         x, y = wall.point(0.0, 0.005)
         found = ctx.put(placed, [Pose(0.0, x, y, wall.yaw, wall)], "kitchen")
@@ -179,14 +196,14 @@ def _slots(ctx: Context, kit: KitchenSet, count: int, width: float, start: float
     return [(kind, first, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]
 
 
-def _run_items(ctx: Context, kit: KitchenSet, slots, width: float, windows) -> list[tuple[float, Item]]:
+def _run_items(ctx: Context, kit: KitchenSet, slots, width: float, windows, free: float = 0.6) -> list[tuple[float, Item]]:
     """(s, item) of all modules, the hob, the hood and the wall cabinets of a run."""
     items: list[tuple[float, Item]] = []
     top = max(a.size[2] for a in kit.base)
 
-    def unit(asset: Asset, s: float, w: float, role: str, clear: float = 0.6) -> None:
+    def unit(asset: Asset, s: float, w: float, role: str) -> None:
         size = (w, asset.size[1], asset.size[2])
-        items.append((s, Item(asset, 0.0, -asset.size[1] / 2, size=size, clear=clear, role=role)))
+        items.append((s, Item(asset, 0.0, -asset.size[1] / 2, size=size, clear=free, role=role)))
 
     for kind, _, n, s in slots:
         if kind == "sink":
@@ -322,8 +339,10 @@ def toilet(ctx: Context) -> list[Thing] | None:
 
 def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
     """A basin or vanity, with a mirror above it where it has none of its own."""
-    limits = ((1.95, 0.75), (1.1, 0.75), (0.8, 0.5), (0.62, 0.5)) if ctx.space.area > 5 else ((1.0, 0.6), (0.62, 0.5))
-    for width, depth in limits:
+    limits = [(1.0, 0.6, 0.55), (0.62, 0.5, 0.55), (0.62, 0.5, 0.4), (0.62, 0.45, 0.25)]
+    if ctx.space.area > 5:
+        limits = [(1.95, 0.75, 0.6), (1.1, 0.75, 0.6), *limits]
+    for width, depth, free in limits:
         for name in (role, "wall washbasin"):
             asset = ctx.pick(name, most=(width, depth, 2.3))
             if asset is None:
@@ -332,7 +351,7 @@ def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
             z = asset.elevation if asset.support == "wall" else 0.0
             if asset.support == "wall":
                 z = 0.86 - h if h < 0.6 else 0.3
-            items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, z=z, clear=0.55, role="basin")]
+            items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, z=z, clear=free, role="basin")]
             top = z + h
             mirror = ctx.pick("mirror", most=(1.2, 0.2, 1.4))
             if mirror is not None and top < 1.2:
@@ -368,7 +387,7 @@ def bathing(ctx: Context, role: str) -> list[Thing] | None:
             return 2.0 * at_corner(wall, s, w) - (0.2 if h < 1.2 else 3.0) * at_window(wall, s, w) \
                 + 0.4 * ctx.rng.random()
 
-        found = ctx.put(items, wall_poses(ctx.space, w - 0.036, score=score, gap=WALL_GAP), "bathing", tries=40)
+        found = ctx.put(items, wall_poses(ctx.space, w, score=score), "bathing", tries=40)
         if found:
             return found
     return None

@@ -16,9 +16,14 @@ def furnish_room(ctx: Context) -> None:
     PROGRAMMES[ctx.kind](ctx)
 
 
+def lacks(ctx: Context) -> int:
+    """How many of the pieces that make the room what it is found no place."""
+    return sum(not ctx.roles(*roles) for roles in NEEDS.get(ctx.kind, ()))
+
+
 def living_room(ctx: Context) -> None:
     area = ctx.space.area
-    seated = living.seating(ctx) or living.conversation(ctx)
+    seated = living.seating(ctx) or living.sofa_group(ctx) or living.conversation(ctx)
     if "dining_room" not in ctx.kinds and area > 20 and ctx.kind == "living_room":
         living.dining(ctx)
     for _ in range(1 + (area > 22) + (area > 32)):
@@ -27,7 +32,7 @@ def living_room(ctx: Context) -> None:
     if area > 18 and ctx.chance(0.75):
         living.reading_corner(ctx)
     if area > 26:
-        living.conversation(ctx)
+        living.sofa_group(ctx) if area > 34 else living.conversation(ctx)
     if area > 24 and ctx.chance(0.35):
         work.storage(ctx, "upright piano", clear=0.8)
     if not seated:
@@ -140,7 +145,7 @@ def kids_room(ctx: Context) -> None:
 
 def bathroom(ctx: Context) -> None:
     area = ctx.space.area
-    first = "bathtub" if area > 4.6 and ctx.chance(0.7) else "shower"
+    first = "bathtub" if area > 4.6 and ctx.chance(0.7 - 0.25 * ctx.attempt) else "shower"
     done = wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
     wet.toilet(ctx)
     wet.basin(ctx, "double vanity" if area > 9 and ctx.chance(0.5) else "wash place")
@@ -380,6 +385,22 @@ def stairwell(ctx: Context) -> None:
     if ctx.chance(0.4):
         work.console(ctx)
 
+
+NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "kitchen": (("kitchen sink",), ("cooker",), ("fridge",)),
+    "bathroom": (("toilet",), ("basin",), ("bathtub", "corner bathtub", "shower")),
+    "toilet": (("toilet",), ("basin",)),
+    "main_bedroom": (("bed",), ("wardrobe",)),
+    "bedroom": (("bed",), ("wardrobe",)),
+    "guest_room": (("bed",),),
+    "kids_room": (("bed",),),
+    "living_room": (("sofa",),),
+    "family_room": (("sofa",),),
+    "dining_room": (("dining table",),),
+    "study": (("desk",),),
+    "laundry_room": (("washing machine",),),
+}
+"""Room kind to the roles it should not lack; any one of a tuple will do."""
 
 PROGRAMMES: dict[str, Callable[[Context], None]] = {
     "living_room": living_room, "family_room": living_room, "dining_room": dining_room, "kitchen": kitchen,
