@@ -141,6 +141,9 @@ def _door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> None:
     own = (x0, x1) if axis == "x" else (y0, y1)
     middle = (y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2
     side = 1 if middle > across else -1
+    ends = (draft.names[link.child], draft.names[link.parent])
+    if cell.kind == "toilet" and (x1 - x0) * (y1 - y0) < 3.0:  # too small for a leaf inside
+        side, ends = -side, ends[::-1]
     width = min(DOOR.get(cell.kind, 0.85), high - low - 2 * NIB)
     best = None
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
@@ -158,7 +161,7 @@ def _door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> None:
     hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == near_low else "b"
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
     draft.openings.append(Opening(
-        draft.name("door"), "door", (draft.names[link.child], draft.names[link.parent]), rounded(p), rounded(q), 0.0,
+        draft.name("door"), "door", ends, rounded(p), rounded(q), 0.0,
         2.05, draft.leaf, hinge, rounded(open_by)))
 
 

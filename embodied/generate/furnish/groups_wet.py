@@ -108,7 +108,7 @@ def _best_runs(ctx: Context, kit: KitchenSet) -> list[tuple[Wall, float, float]]
 
 def lone_fridge(ctx: Context) -> list[Thing] | None:
     """A fridge that found no place in the line."""
-    for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.25)):
+    for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.2)):
         fridge = ctx.pick("fridge", most=(width, 1.0, 2.1), avoid=())
         found = ctx.against_wall(fridge, "kitchen", clear=clear, corner=0.8, window=-3.0, role="fridge")
         if found:
@@ -311,7 +311,8 @@ def island(ctx: Context) -> list[Thing] | None:
 
 def toilet(ctx: Context) -> list[Thing] | None:
     """A toilet with paper beside it and a brush."""
-    asset = ctx.pick("toilet")
+    tiny = ctx.space.area < 3.0
+    asset = ctx.pick("toilet", most=(0.42, 0.6, 1.2)) if tiny else ctx.pick("toilet")
     if asset is None:
         return None
     w, d = asset.size[:2]
@@ -329,7 +330,7 @@ def toilet(ctx: Context) -> list[Thing] | None:
 
         def score(wall: Wall, s: float) -> float:
             x, y = wall.point(s, 0.4)
-            return 0.4 * door_distance(ctx.space, x, y) - 0.5 * at_window(wall, s, w) + 0.4 * ctx.rng.random()
+            return (1.2 if tiny else 0.4) * door_distance(ctx.space, x, y) - 0.5 * at_window(wall, s, w) + 0.4 * ctx.rng.random()
 
         found = ctx.put(items, wall_poses(ctx.space, w + 2 * margin, score=score, step=0.15), "toilet", tries=40)
         if found:
@@ -348,10 +349,12 @@ def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
             if asset is None:
                 continue
             w, d, h = asset.size
+            if ctx.space.area < 3.0 and d > 0.35:
+                w, d, h = 0.8 * w, 0.8 * d, 0.8 * h
             z = asset.elevation if asset.support == "wall" else 0.0
             if asset.support == "wall":
                 z = 0.86 - h if h < 0.6 else 0.3
-            items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, z=z, clear=free, role="basin")]
+            items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, z=z, size=(w, d, h), clear=free, role="basin")]
             top = z + h
             mirror = ctx.pick("mirror", most=(1.2, 0.2, 1.4))
             if mirror is not None and top < 1.2:

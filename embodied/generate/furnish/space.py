@@ -251,7 +251,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
     entries: list[tuple[float, float]] = []
     for wall in walls:
         for s0, s1, o in wall.openings:
-            keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation))
+            keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation, floor.area))
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
     flights = [
@@ -308,7 +308,7 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
     return tuple(walls)
 
 
-def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, z: float) -> list[Box]:
+def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, z: float, area: float) -> list[Box]:
     """Boxes that stay free: before a door its approach and swing, before a window its light."""
     width = s1 - s0
     yaw = math.atan2(wall.along[1], wall.along[0])
@@ -320,7 +320,7 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     if o.kind == "window":
         return [before(s0 - 0.05, s1 + 0.05, 0.3, o.sill, o.head)]
     swings_here = o.rooms[0] == room.id and o.kind in ("door", "front_door", "back_door")
-    depth = {"passage": 0.6, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6)
+    depth = {"passage": 0.6, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6 if area > 3.0 else 0.4)
     if o.kind in ("front_door",):
         depth = 1.0
     if swings_here:
