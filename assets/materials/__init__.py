@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib
 import json
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def finish(key: str, cache: Path) -> Finish:
       ValueError: an unknown key.
     """
     material = _material(key)
-    folder = Path(cache) / "materials" / digest(key, _code_digest())[:24]
+    folder = Path(cache) / "materials" / fingerprint(key)[:24]
     mean = _read_mean(folder)
     if mean is None:
         mean = _write(folder, make_maps(key), material.tile)
@@ -72,9 +73,26 @@ def _material(key: str) -> Material:
 
 
 @functools.cache
-def _code_digest() -> str:
-    """Changes whenever the code that makes materials does, so that no stale map is believed."""
-    return digest(*sorted(Path(__file__).parent.glob("*.py")))
+def fingerprint(key: str) -> str:
+    """Hex digest of all that the maps of `key` depend on: its recipe's arguments and the code it runs."""
+    material = _material(key)
+    recipe, modules = _describe(material.recipe)
+    files = [Path(importlib.import_module(m).__file__) for m in sorted({"assets.materials.maps", *modules})]
+    return digest(key, material.pixels, material.tile, recipe, *files)
+
+
+def _describe(value: object) -> tuple[object, tuple[str, ...]]:
+    """A recipe as plain JSON, and the modules whose functions it names."""
+    if isinstance(value, functools.partial):
+        value = [value.func, list(value.args), sorted(value.keywords.items())]
+    elif callable(value):
+        inner = [cell.cell_contents for cell in value.__closure__ or ()]
+        described, modules = _describe(inner)
+        return [value.__module__, value.__qualname__, described], (value.__module__, *modules)
+    if isinstance(value, (list, tuple)):
+        pairs = [_describe(v) for v in value]
+        return [p[0] for p in pairs], tuple(m for p in pairs for m in p[1])
+    return value, ()
 
 
 def _read_mean(folder: Path) -> dict | None:

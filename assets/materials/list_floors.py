@@ -17,7 +17,7 @@ def floor_materials() -> list[Material]:
 
 def _floors_wood() -> list[Material]:
     plank = partial(maps.planks, rows=14, per_row=1.2)
-    wide = partial(maps.planks, rows=10, per_row=1.0)
+    wide = partial(maps.planks, rows=13, per_row=1.0)
     strip = partial(maps.planks, rows=30, per_row=3.5)
     bone, small_bone = partial(maps.herringbone, ratio=6, repeats=3), partial(maps.herringbone, ratio=5, repeats=5)
     chevron = partial(maps.chevron, columns=4, boards=18)
