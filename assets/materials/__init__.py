@@ -6,6 +6,7 @@ import functools
 import hashlib
 import importlib
 import json
+import types
 from pathlib import Path
 
 import cv2
@@ -89,6 +90,8 @@ def _describe(value: object) -> tuple[object, tuple[str, ...]]:
         inner = [cell.cell_contents for cell in value.__closure__ or ()]
         described, modules = _describe(inner)
         return [value.__module__, value.__qualname__, described], (value.__module__, *modules)
+    if isinstance(value, types.ModuleType):
+        return value.__name__, (value.__name__,)
     if isinstance(value, (list, tuple)):
         pairs = [_describe(v) for v in value]
         return [p[0] for p in pairs], tuple(m for p in pairs for m in p[1])
