@@ -88,8 +88,7 @@ def strip_map(network: ResNet, strips: Tensor) -> Tensor:
             f"stride {network.architecture.stride}; use sharing 'views' for other networks"
         )
     wide = torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2)
-    wide = normalise(wide).contiguous(memory_format=torch.channels_last)
-    return network.feature_map(wide)[..., MARGIN // CELL : -(MARGIN // CELL)]
+    return network.feature_map(normalise(wide))[..., MARGIN // CELL : -(MARGIN // CELL)]
 
 
 def pool_views(maps: Tensor) -> Tensor:

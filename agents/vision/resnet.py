@@ -140,7 +140,7 @@ def normalise(images: Tensor) -> Tensor:
     """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as ImageNet weights expect."""
     mean = torch.tensor(MEAN, device=images.device).view(1, 3, 1, 1)
     deviation = torch.tensor(DEVIATION, device=images.device).view(1, 3, 1, 1)
-    return (images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation
+    return ((images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation).contiguous()
 
 
 def read_weights(path: Path) -> dict[str, Tensor]:

@@ -152,7 +152,7 @@ def train_encoder(
         torch.manual_seed(config.seed)
         network = ResNet(ARCHITECTURES[config.network])
         heads = Heads(network.architecture.size, len(classes))
-    network = network.to(memory_format=torch.channels_last).train()
+    network.train()  # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
     parameters = [*network.parameters(), *heads.parameters()]
     optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
     nodes = sum(len(h.rgb) for h in houses)

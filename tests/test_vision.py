@@ -1,0 +1,281 @@
+"""Residual networks with torchvision's names, strips and their views, labels, and the files in between."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from agents.vision import labels, strip
+from agents.vision.bank import FeatureBank
+from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
+from agents.vision.features import load_bank, load_features, save_features, to_matterport_order
+from agents.vision.probe import Labelled, average_precision, place_auc, read
+from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, read_weights
+from agents.vision.training import VisionConfig, train_encoder, turned
+from embodied.interface import Sight
+
+
+def torchvision_layout(name: str) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of torchvision's state dict, written down from its documentation, not from our class."""
+    block, counts, grow = {
+        "resnet18": ("basic", (2, 2, 2, 2), 1), "resnet34": ("basic", (3, 4, 6, 3), 1),
+        "resnet50": ("bottleneck", (3, 4, 6, 3), 4), "resnet101": ("bottleneck", (3, 4, 23, 3), 4),
+        "resnet152": ("bottleneck", (3, 8, 36, 3), 4),
+    }[name]
+    out: dict[str, tuple[int, ...]] = {"conv1.weight": (64, 3, 7, 7)}
+
+    def norm(prefix: str, size: int) -> None:
+        for part in ("weight", "bias", "running_mean", "running_var"):
+            out[f"{prefix}.{part}"] = (size,)
+        out[f"{prefix}.num_batches_tracked"] = ()
+
+    norm("bn1", 64)
+    inputs = 64
+    for stage, (count, width) in enumerate(zip(counts, (64, 128, 256, 512), strict=True), 1):
+        for i in range(count):
+            at, outputs = f"layer{stage}.{i}", width * grow
+            shapes = [(width, inputs, 3, 3), (width, width, 3, 3)] if block == "basic" else [
+                (width, inputs, 1, 1), (width, width, 3, 3), (outputs, width, 1, 1)]
+            for j, shape in enumerate(shapes, 1):
+                out[f"{at}.conv{j}.weight"] = shape
+                norm(f"{at}.bn{j}", shape[0])
+            if i == 0 and (stage > 1 or inputs != outputs):
+                out[f"{at}.downsample.0.weight"] = (outputs, inputs, 1, 1)
+                norm(f"{at}.downsample.1", outputs)
+            inputs = outputs
+    out["fc.weight"], out["fc.bias"] = (1000, inputs), (1000,)
+    return out
+
+
+@pytest.mark.parametrize("name", ["resnet18", "resnet34", "resnet50", "resnet101", "resnet152"])
+def test_parameters_have_torchvisions_names_and_shapes(name):
+    with torch.device("meta"):
+        network = ResNet(ARCHITECTURES[name], classes=1000)
+    assert {k: tuple(v.shape) for k, v in network.state_dict().items()} == torchvision_layout(name)
+
+
+def test_a_torchvision_state_dict_on_disk_loads_and_decides_the_features(tmp_path):
+    rng = np.random.default_rng(0)
+    weights = {}
+    for name, shape in torchvision_layout("resnet18").items():
+        if name.endswith("num_batches_tracked"):
+            weights[name] = torch.tensor(7)
+        elif name.endswith(("running_var", "bn1.weight", "bn2.weight")):
+            weights[name] = torch.ones(shape)
+        else:
+            weights[name] = torch.from_numpy((0.05 * rng.normal(size=shape)).astype(np.float32))
+    torch.save(weights, tmp_path / "resnet18-f37072fd.pth")
+    network = load_torchvision("resnet18", read_weights(tmp_path / "resnet18-f37072fd.pth"))
+    assert torch.equal(network.layer3[1].conv2.weight, weights["layer3.1.conv2.weight"])
+    image = torch.randn(1, 3, 64, 64, generator=torch.Generator().manual_seed(0))
+    assert network.features(image).shape == (1, 512)
+    weights["conv1.weight"] = weights["conv1.weight"] * 2
+    other = load_torchvision("resnet18", weights)
+    assert not torch.allclose(network.features(image), other.features(image))
+
+
+def test_weights_of_another_network_or_a_truncated_file_are_refused(tmp_path):
+    with torch.device("meta"):
+        other = ResNet(ARCHITECTURES["resnet34"], classes=1000).state_dict()
+    with pytest.raises(ValueError, match="not the weights of resnet18"):
+        load_torchvision("resnet18", other)
+    path = tmp_path / "weights.pth"
+    torch.save({"conv1.weight": torch.zeros(64, 3, 7, 7)}, path)
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(ValueError, match="cannot be read as weights"):
+        read_weights(path)
+    path.write_bytes(b"not weights at all")
+    with pytest.raises(ValueError, match="cannot be read as weights"):
+        read_weights(path)
+
+
+def test_every_view_averages_what_lies_around_its_own_direction():
+    rays = strip.directions()
+    for view in (0, 7, 13, 23, 29):
+        weights = strip.seen_by_view(view)
+        mean = (weights[..., None] * rays).sum((0, 1))
+        mean /= np.linalg.norm(mean)
+        yaw, pitch = math.radians(30 * (view % 12)), math.radians(30 * (view // 12 - 1))
+        along = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+        assert mean @ along > 0.995
+        # the pinhole picture is 2 tan(30) high and 4/3 of that wide; a pixel is (2 pi / 576)^2 cos(pitch)
+        area = weights.sum() * (2 * np.pi / 576) ** 2
+        assert area == pytest.approx((2 * math.tan(math.pi / 6)) ** 2 * 4 / 3, rel=0.03)
+    assert np.allclose(strip.windows().sum((1, 2)), 1.0, atol=1e-5)
+
+
+def test_turning_the_strip_by_30_degrees_turns_the_views_exactly():
+    maps = torch.randn(1, 5, 12, 36, generator=torch.Generator().manual_seed(1))
+    views = pool_views(maps)
+    rolled = pool_views(maps.roll(-3, 3))  # the world turns counter-clockwise: yaw falls along the columns
+    for band in range(3):
+        assert torch.allclose(rolled[:, 12 * band : 12 * band + 12], views[:, 12 * band : 12 * band + 12].roll(1, 1), atol=1e-5)
+
+
+def test_turning_a_panorama_turns_its_features():
+    encoder = random_encoder(seed=0)
+    picture = np.random.default_rng(2).integers(0, 256, (1, 12, 36, 3)).repeat(16, 1).repeat(16, 2).astype(np.uint8)
+    a, b = encoder.encode_strips(picture), encoder.encode_strips(np.roll(picture, -48, 2))
+    level = slice(12, 24)
+    closeness = np.corrcoef(np.roll(a[0, level], 1, 0).ravel(), b[0, level].ravel())[0, 1]
+    assert closeness > 0.999
+    assert np.corrcoef(a[0, level].ravel(), b[0, level].ravel())[0, 1] < closeness - 0.002
+
+
+def test_labels_count_what_each_cell_shows():
+    ids = np.zeros((strip.HEIGHT, strip.WIDTH), np.int64)
+    ids[:16, :8] = 1  # half of the first cell
+    ids[16:32, 16:32] = 2
+    depth = np.full(ids.shape, math.e)
+    depth[:16, :16] = 0.0
+    share, rooms, log_depth = labels.cell_labels(ids, depth, np.array([-1, 0, 2]), np.array([-1, 4, 5]), 3)
+    assert share[0, 0, 0] == math.ceil(255 / 2)
+    assert share[1, 1].tolist() == [0, 0, 255]
+    assert share.astype(int).sum() == 128 + 255
+    assert (rooms[0, 0], rooms[1, 1], rooms[5, 5]) == (4, 5, -1)
+    assert log_depth[3, 3] == pytest.approx(1.0)
+    assert log_depth[0, 0] == pytest.approx(math.log(labels.NEAREST), abs=1e-2)
+    seen = labels.visible_in_views(share[None])
+    assert seen[0, :, 0].any()
+    assert not seen[0, :, 1].any()
+
+
+def test_mirroring_and_turning_undo_themselves():
+    a = np.arange(24).reshape(2, 12)
+    assert np.array_equal(turned(turned(a, 5, False), 7, False), a)
+    assert np.array_equal(turned(turned(a, 0, True), 0, True), a)
+
+
+def test_whitened_features_have_no_mean_and_unit_covariance():
+    x = torch.randn(4000, 6, generator=torch.Generator().manual_seed(3)) @ torch.randn(6, 6) + 5
+    mean, mix = whitening(x, floor=0.0)
+    y = (x - mean) @ mix
+    assert torch.allclose(y.mean(0), torch.zeros(6), atol=1e-3)
+    assert torch.allclose(y.T @ y / len(y), torch.eye(6), atol=1e-2)
+
+
+def test_average_precision_by_hand():
+    scores = np.array([0.9, 0.8, 0.7, 0.6])
+    assert average_precision(scores, np.array([True, False, True, False])) == pytest.approx((1 + 2 / 3) / 2)
+    assert average_precision(scores, np.array([True, True, False, False])) == 1.0
+    assert math.isnan(average_precision(scores, np.zeros(4, bool)))
+
+
+def labelled(n: int, *, seed: int, tell: float) -> Labelled:
+    """Nodes whose features show the labels with strength `tell`."""
+    rng = np.random.default_rng(seed)
+    visible, room = rng.random((n, 36, 2)) < 0.3, rng.integers(0, 3, n)
+    features = rng.normal(size=(n, 36, 8)).astype(np.float32)
+    features[..., :2] += tell * visible
+    features[..., 2:5] += tell * np.eye(3)[room][:, None]
+    position = rng.uniform(0, 10, (n, 3))
+    return Labelled(features, visible, room, features[..., 5].copy(), np.arange(n) % 4, position)
+
+
+def test_the_probe_reads_what_is_there_and_nothing_else():
+    telling = read(labelled(80, seed=0, tell=4.0), labelled(60, seed=1, tell=4.0), seed=0)
+    silent = read(labelled(80, seed=0, tell=0.0), labelled(60, seed=1, tell=0.0), seed=0)
+    assert telling.mean_ap > 0.95 and telling.room_accuracy > 0.9 and telling.depth_r2 > 0.95
+    assert silent.mean_ap < 0.4 and silent.room_accuracy < 0.65
+    assert silent.chance_ap == pytest.approx(0.3, abs=0.03)
+
+
+def test_place_auc_is_one_when_only_neighbours_look_alike_and_half_by_chance():
+    rng = np.random.default_rng(4)
+    position = np.array([[0, 0, 0], [1, 0, 0], [50, 0, 0], [51, 0, 0]], float)
+    look = rng.normal(size=(2, 36, 64)).astype(np.float32)
+    blank = np.zeros((4, 36, 1), bool), np.zeros(4, int), np.zeros((4, 36), np.float32), np.zeros(4, int)
+    assert place_auc(Labelled(look[[0, 0, 1, 1]], *blank, position)) == 1.0
+
+
+def strips_of_colours(n: int, *, seed: int) -> labels.HouseStrips:
+    """A world in which a red cell is a 'rose' and a green one a 'fern'."""
+    rng = np.random.default_rng(seed)
+    what = rng.integers(0, 2, (n, 12, 36))
+    rgb = np.zeros((n, 12, 36, 3), np.uint8)
+    rgb[..., 0], rgb[..., 1] = 200 * (what == 0) + 30, 200 * (what == 1) + 30
+    share = (np.eye(2)[what] * 255).astype(np.uint8)
+    return labels.HouseStrips(
+        f"house{seed}", ("fern", "rose")[::-1], rgb.repeat(16, 1).repeat(16, 2), share,
+        np.zeros((n, 12, 36), np.int8), np.zeros((n, 12, 36), np.float16), np.zeros(n, np.int8),
+    )
+
+
+def test_training_the_encoder_lowers_its_loss(tmp_path):
+    lines = []
+    config = VisionConfig(network="compact", epochs=6, batch=2, least_views=1)
+    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(ARCHITECTURES, "compact", tiny)
+        encoder, _, classes = train_encoder([strips_of_colours(8, seed=0)], config, note=lines.append)
+        assert classes == ["rose", "fern"]
+        losses = [float(line.split("cell objects ")[1].split(",")[0]) for line in lines if "cell objects" in line]
+        assert losses[-1] < 6.0, lines
+        save_encoder(encoder, tmp_path / "e.safetensors")
+        again = load_encoder(tmp_path / "e.safetensors")
+        picture = strips_of_colours(1, seed=1).rgb
+        assert np.allclose(encoder.encode_strips(picture), again.encode_strips(picture), atol=0.05)
+        assert again.digest == encoder.digest
+
+
+def test_an_encoder_file_knows_its_digest_and_notices_damage(tmp_path):
+    encoder, path = random_encoder(seed=1), tmp_path / "encoder.safetensors"
+    save_encoder(encoder, path)
+    assert load_encoder(path).digest == encoder.digest != random_encoder(seed=2).digest
+    body = bytearray(path.read_bytes())
+    body[-1] ^= 0x40
+    path.write_bytes(body)
+    with pytest.raises(ValueError, match="do not fit the digest"):
+        load_encoder(path)
+    path.write_bytes(body[:2000])
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_encoder(path)
+
+
+def test_features_name_their_encoder_and_their_house(tmp_path):
+    encoder, path = random_encoder(seed=1), tmp_path / "house.safetensors"
+    features = np.random.default_rng(5).normal(size=(3, 36, encoder.size)).astype(np.float16)
+    save_features(path, features, encoder, "house digest")
+    back, digest = load_features(path, encoder=encoder.digest, source="house digest")
+    assert np.array_equal(back, features) and digest == encoder.digest
+    with pytest.raises(ValueError, match="made from encoder"):
+        load_features(path, encoder=random_encoder(seed=2).digest)
+    with pytest.raises(ValueError, match="made from source"):
+        load_features(path, source="another house")
+    with pytest.raises(FileNotFoundError, match="embodied features"):
+        load_features(tmp_path / "nothing.safetensors")
+    bank = load_bank({"house": path})
+    assert np.array_equal(bank.features(Sight("house", 2)), features[2].astype(np.float32))
+    assert torch.equal(bank.gather([None, Sight("house", 1)])[0], torch.zeros(36, encoder.size))
+    with pytest.raises(KeyError, match="no features of node 3"):
+        bank.features(Sight("house", 3))
+
+
+def test_features_of_two_encoders_do_not_mix(tmp_path):
+    for seed in (1, 2):
+        save_features(tmp_path / f"{seed}.safetensors", np.zeros((1, 36, 4)), random_encoder(seed=seed), "h")
+    with pytest.raises(ValueError, match="with one encoder"):
+        load_bank({"a": tmp_path / "1.safetensors", "b": tmp_path / "2.safetensors"})
+    with pytest.raises(ValueError, match="must all be"):
+        FeatureBank({"a": np.zeros((1, 35, 4))}, "digest")
+
+
+def test_matterport_rows_turn_the_other_way_from_north():
+    rows = np.arange(36.0)[:, None]
+    out = to_matterport_order(rows)[:, 0]
+    assert out[12] == 12 + 3  # heading 0 looks along +y, which is turn 3
+    assert out[15] == 12 + 0  # heading 90 degrees looks along +x
+    assert out[0] == 3 and out[24] == 27
+
+
+def test_encoder_moves_between_settings_without_changing_features():
+    encoder = random_encoder(seed=3)
+    views = np.random.default_rng(6).integers(0, 256, (2, 36, 32, 48, 3), dtype=np.uint8)
+    together, alone = encoder.encode_views(views), encoder.encode_views(views[1:])
+    assert np.allclose(together[1:], alone, atol=1e-4)
+    shifted = Encoder(encoder.network, encoder.name, "views", torch.ones(encoder.size), 2 * torch.eye(encoder.size))
+    assert np.allclose(shifted.encode_views(views), 2 * (together - 1), atol=1e-3)
