@@ -1,0 +1,243 @@
+"""Building a data set: one house is one unit of work, pure, resumable, the same on any number of workers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import joblib
+
+from assets.cache import digest, write_bytes
+from assets.catalogue import load_catalogue
+from embodied.assistants.routes import WORDINGS, RouteConfig, sampled_paths, spanning_paths, worded
+from embodied.datasets.parts import part_tasks
+from embodied.datasets.scale import Scale, Split, quota, scale
+from embodied.generate import HouseConfig, generate_house
+from embodied.house import House, HouseError
+from embodied.interface import Language
+from embodied.language.plain import PlainLanguage
+from embodied.navgraph import NavGraph, build_graph, to_matterport
+from embodied.people import add_people
+from embodied.records import save_lines
+from embodied.seeds import stream
+from embodied.world import open_world
+
+VERSION = 1
+"""Of the layout and meaning of a data set's files; another version is refused."""
+SEEDS = 12
+"""House seeds tried before giving up on a house of the data set."""
+
+
+@dataclass(frozen=True)
+class DatasetConfig:
+    """All that a data set depends on."""
+
+    kind: str
+    """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
+    scale: str = "mini"
+    """'paper', 'mini' or 'tiny'."""
+    seed: int = 0
+    area: tuple[float, float] = (150.0, 420.0)
+    """Smallest and largest house, square metres."""
+    routes: str = "sampled"
+    """'sampled' as in Room-to-Room, or 'spanning' as in Lemma 2."""
+    people: bool = True
+    """Whether assistants stand in the house as figures (HANNA)."""
+
+    def __post_init__(self) -> None:
+        if self.routes not in ("sampled", "spanning"):
+            raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
+        scale(self.scale, self.kind)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One house of a data set."""
+
+    group: str
+    index: int
+
+    @property
+    def name(self) -> str:
+        """Name of the house, the same in every data set of the seed: 'train_0003'."""
+        return f"{self.group}_{self.index:04d}"
+
+
+HouseMaker = Callable[[int, str, DatasetConfig, object], tuple[House, NavGraph]]
+"""(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
+
+
+def units(wanted: Scale) -> tuple[Unit, ...]:
+    return tuple(Unit(group, i) for group, n in wanted.houses.items() for i in range(n))
+
+
+def build_dataset(
+    config: DatasetConfig, folder: Path, cache: Path, *, workers: int = 1, language: Language | None = None,
+    make_house: HouseMaker | None = None, watch: Callable[[Iterable[str], int], Iterable[str]] | None = None,
+    packs: tuple[Path, ...] = (),
+) -> Path:
+    """Build what is missing of the data set in `folder` and write its index; returns the index.
+
+    The same command goes on after an interruption. The files do not depend on `workers`.
+
+    Args:
+      watch: wraps the iterator over finished house names, with their number (a progress bar).
+
+    Raises:
+      ValueError: the folder holds another data set.
+    """
+    folder = Path(folder)
+    wanted = scale(config.scale, config.kind)
+    _claim(folder, config)
+    work = units(wanted)
+    arguments = (config, folder, Path(cache), language or PlainLanguage(), make_house or make_dataset_house, packs)
+    jobs = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+        joblib.delayed(build_unit)(u, *arguments) for u in work
+    )
+    for _ in watch(jobs, len(work)) if watch else jobs:
+        pass
+    return write_index(config, folder)
+
+
+def build_unit(
+    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, language: Language,
+    make_house: HouseMaker, packs: tuple[Path, ...] = (),
+) -> str:
+    """Build one house's folder unless it is there; returns its name.
+
+    It is made under another name and renamed when whole, so a kill leaves nothing half-built
+    that is later believed.
+    """
+    home = folder / "houses" / unit.name
+    if (home / "unit.json").exists():
+        return unit.name
+    home.parent.mkdir(parents=True, exist_ok=True)
+    draft = Path(tempfile.mkdtemp(prefix=f".{unit.name}.", dir=home.parent))
+    try:
+        _write_unit(unit, config, draft, cache, language, make_house, packs)
+        os.chmod(draft, 0o755)
+        if home.exists():
+            shutil.rmtree(home)
+        draft.rename(home)
+    finally:
+        if draft.exists():
+            shutil.rmtree(draft)
+    return unit.name
+
+
+def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: object) -> tuple[House, NavGraph]:
+    """The house `name` of a data set and its graph; a seed that gives no walkable house is passed over.
+
+    Raises:
+      HouseError: none of SEEDS seeds gives one.
+    """
+    problems = []
+    for attempt in range(SEEDS):
+        house_seed = int(stream(seed, "data set house", name, attempt).integers(2**31))
+        try:
+            house = generate_house(house_seed, HouseConfig(area=config.area), catalogue)
+            house = dataclasses.replace(house, name=name)
+            return house, build_graph(house, catalogue)
+        except HouseError as e:
+            problems.append(f"{house_seed}: {e}")
+    raise HouseError(f"no house for {name!r} after {SEEDS} seeds; the last said {problems[-1]}")
+
+
+def _write_unit(
+    unit: Unit, config: DatasetConfig, home: Path, cache: Path, language: Language,
+    make_house: HouseMaker, packs: tuple[Path, ...],
+) -> None:
+    catalogue = load_catalogue(cache, packs)
+    house, graph = make_house(config.seed, unit.name, config, catalogue)
+    wording = WORDINGS["train" if unit.group in ("train", "extra") else unit.group]
+    paths: list[tuple[int, ...]] = []
+    if config.kind in ("hanna", "vln"):
+        rng = stream(config.seed, "routes", unit.name)
+        count = max(1, round(RouteConfig().routes_per_node * len(graph.ids) / len(wording)))
+        spanning = config.routes == "spanning"
+        paths = spanning_paths(graph) if spanning else sampled_paths(graph, count, rng=rng, config=RouteConfig())
+        wording = tuple(dict.fromkeys(wording)) if spanning else wording
+    if config.kind == "hanna" and config.people:
+        house = add_people(house, graph, [p[0] for p in paths], catalogue, seed=config.seed)
+    with open_world(house, catalogue, cache, graph=graph) as world:
+        routes = worded(world, paths, wording, seed=config.seed, language=language)
+        tasks = part_tasks(
+            config.kind, world, routes, [(_part(s, unit, config.kind), n) for s, n in shares(unit, config)],
+            seed=config.seed, language=language,
+        )
+    house.save(home / "house.json")
+    to_matterport(graph, home / "connectivity.json")
+    save_lines(home / "routes.jsonl", routes)
+    counts = {s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
+              for s, _ in shares(unit, config)}
+    facts = {
+        "version": VERSION, "config": dataclasses.asdict(config), "group": unit.group, "index": unit.index,
+        "house_digest": house.digest, "nodes": len(graph.ids), "routes": len(routes), "tasks": counts,
+    }
+    write_bytes(home / "unit.json", (json.dumps(facts, sort_keys=True, indent=1) + "\n").encode())
+
+
+def shares(unit: Unit, config: DatasetConfig) -> list[tuple[Split, int]]:
+    """The splits that a house serves, with its even share of their tasks."""
+    wanted = scale(config.scale, config.kind)
+    served = []
+    for split in wanted.splits:
+        if unit.group not in split.all_groups:
+            continue
+        houses = [u for u in units(wanted) if u.group in split.all_groups]
+        served.append((split, quota(split.tasks, len(houses), houses.index(unit))))
+    return served
+
+
+def _part(split: Split, unit: Unit, kind: str) -> str:
+    """Nothing is held out in unseen houses."""
+    return "main_unseen" if kind == "hari" and unit.group in ("val", "test") else split.part
+
+
+def _claim(folder: Path, config: DatasetConfig) -> None:
+    """Write down whose folder it is, or refuse another data set's."""
+    mine = {"version": VERSION, "config": json.loads(json.dumps(dataclasses.asdict(config)))}
+    path = folder / "config.json"
+    if path.exists():
+        theirs = json.loads(path.read_text())
+        if theirs != mine:
+            raise ValueError(f"{folder} holds another data set ({theirs}); this one is {mine}; choose another folder")
+    else:
+        if folder.exists() and any(folder.iterdir()):
+            raise ValueError(f"{folder} is not empty and holds no data set; choose an empty folder")
+        write_bytes(path, (json.dumps(mine, sort_keys=True, indent=1) + "\n").encode())
+
+
+def write_index(config: DatasetConfig, folder: Path) -> Path:
+    """dataset.json: the table of the splits and a digest of every file; its presence says that all is there."""
+    table: dict[str, dict[str, int]] = {}
+    files: dict[str, str] = {}
+    for unit in units(scale(config.scale, config.kind)):
+        home = folder / "houses" / unit.name
+        facts = json.loads((home / "unit.json").read_text())
+        for name, n in facts["tasks"].items():
+            row = table.setdefault(name, {"houses": 0, "tasks": 0, "routes": 0, "nodes": 0})
+            for key, value in (("houses", 1), ("tasks", n), ("routes", facts["routes"]), ("nodes", facts["nodes"])):
+                row[key] += value
+        for path in sorted(home.iterdir()):
+            if path.suffix in (".json", ".jsonl"):
+                files[f"{unit.name}/{path.name}"] = digest(path.read_bytes())[:16]
+    order = [s.name for s in scale(config.scale, config.kind).splits]
+    body = {
+        "version": VERSION, "config": dataclasses.asdict(config), "splits": {n: table[n] for n in order},
+        "digest": digest(files), "files": files,
+    }
+    path = folder / "dataset.json"
+    write_bytes(path, (json.dumps(body, indent=1) + "\n").encode())
+    return path
+
+
+def missing_units(config: DatasetConfig, folder: Path) -> Iterator[Unit]:
+    """The houses that are not built yet."""
+    return (u for u in units(scale(config.scale, config.kind)) if not (folder / "houses" / u.name / "unit.json").exists())

@@ -1,0 +1,116 @@
+"""How large a data set is: houses and tasks per split, as in Tables 4.2 and E.1 or smaller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+KINDS = ("find", "vln", "vnla", "hanna", "hari")
+
+
+@dataclass(frozen=True)
+class Split:
+    """One split: which houses it draws from and how many tasks it wants."""
+
+    name: str
+    group: str
+    """The group of houses: 'train', 'extra', 'val' or 'test'. A 'seen' split shares 'train'."""
+    tasks: int
+    part: str = "main"
+    """Which part of each house's pool: 'main', 'val' or 'test' (held out), 'pretrain', 'pretrain_val',
+    'start_val', 'start_test', 'object_val', 'object_test' (HARI)."""
+    groups: tuple[str, ...] = ()
+    """More groups it draws from, besides `group`."""
+
+    @property
+    def all_groups(self) -> tuple[str, ...]:
+        return (self.group, *self.groups)
+
+
+@dataclass(frozen=True)
+class Scale:
+    name: str
+    houses: Mapping[str, int]
+    """Group to number of houses."""
+    splits: tuple[Split, ...]
+
+
+def _seen_and_unseen(train: int, val_seen: int, val_unseen: int, test_seen: int, test_unseen: int) -> tuple[Split, ...]:
+    return (
+        Split("train", "train", train), Split("val_seen", "train", val_seen, "val"),
+        Split("val_unseen", "val", val_unseen), Split("test_seen", "train", test_seen, "test"),
+        Split("test_unseen", "test", test_unseen),
+    )
+
+
+def _hari(sizes: tuple[int, int, int, tuple[int, int, int], tuple[int, int, int]]) -> tuple[Split, ...]:
+    pretrain, pretrain_val, train, val, test = sizes
+    splits = [
+        Split("pretrain", "train", pretrain, "pretrain"), Split("pretrain_val", "train", pretrain_val, "pretrain_val"),
+        Split("train", "train", train, groups=("extra",)),
+    ]
+    for when, (start, other, env) in (("val", val), ("test", test)):
+        splits += [
+            Split(f"{when}_unseen_start", "train", start, f"start_{when}", ("extra",)),
+            Split(f"{when}_unseen_object", "train", other, f"object_{when}", ("extra",)),
+            Split(f"{when}_unseen_env", when, env),
+        ]
+    return tuple(splits)
+
+
+TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, _seen_and_unseen(82_484, 5_001, 5_017, 5_004, 5_012)
+"""HANNA, dissertation Table 4.2."""
+TABLE_E_1 = (
+    {"train": 36, "extra": 18, "val": 7, "test": 11},
+    _hari((82_104, 3_000, 65_133, (1_901, 1_912, 1_967), (1_653, 1_913, 1_777))),
+)
+"""HARI, dissertation Table E.1. It names 36 houses for pre-training and 18 more for training; the
+seen conditions draw from all 54."""
+ROOM_TO_ROOM = {"train": 61, "val": 11, "test": 18}, _seen_and_unseen(14_039, 1_021, 2_349, 1_021, 4_173)
+"""VLN. Room-to-Room has no seen test split; ours has one of the size of its seen validation split."""
+
+PAPER: Mapping[str, tuple[Mapping[str, int], tuple[Split, ...]]] = {
+    "hanna": TABLE_4_2, "hari": TABLE_E_1, "vln": ROOM_TO_ROOM,
+    "vnla": TABLE_4_2, "find": TABLE_4_2,
+}
+"""VNLA's own sizes are not printed in the dissertation; it gets HANNA's."""
+
+
+def _small(kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int) -> tuple[Mapping[str, int], tuple[Split, ...]]:
+    train, extra, val, test = houses
+    if kind == "hari":
+        third = max(1, judged // 3)
+        sizes = (tasks, max(1, tasks // 10), tasks, (third, third, third), (third, third, judged))
+        return {"train": train, "extra": extra, "val": val, "test": test}, _hari(sizes)
+    held = max(1, judged // 2)
+    return {"train": train, "val": val, "test": test}, _seen_and_unseen(tasks, held, held, held, judged)
+
+
+SCALES = ("paper", "mini", "tiny")
+
+
+def scale(name: str, kind: str) -> Scale:
+    """The named scale of a kind of play.
+
+    'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
+    20 unseen houses to judge by; 'tiny' is for tests.
+
+    Raises:
+      ValueError: an unknown scale or kind.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
+    if name == "paper":
+        houses, splits = PAPER[kind]
+    elif name == "mini":
+        houses, splits = _small(kind, (24, 8, 4, 20), 2_400, 500)
+    elif name == "tiny":
+        houses, splits = _small(kind, (2, 1, 1, 1), 20, 8)
+    else:
+        raise ValueError(f"unknown scale {name!r}; use one of {SCALES}")
+    return Scale(name, dict(houses), splits)
+
+
+def quota(total: int, houses: int, index: int) -> int:
+    """How many of `total` tasks the house number `index` of `houses` gives: an even share."""
+    return total // houses + (index < total % houses)

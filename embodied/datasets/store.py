@@ -1,0 +1,198 @@
+"""Reading a data set: its tasks, houses and routes, and the environment to play a split in."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from embodied.assistants.advisor import Advisor
+from embodied.assistants.anna import Anna
+from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.assistants.hari import HariAssistant
+from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
+from embodied.datasets.scale import Scale, scale
+from embodied.env import HannaEnv, HelpEnv, VnlaEnv
+from embodied.hari_env import HariEnv
+from embodied.house import House
+from embodied.interface import FindObject, Language, Route, Task
+from embodied.language.plain import PlainLanguage
+from embodied.moves import PanoramicMoves
+from embodied.navgraph import NavGraph, from_matterport
+from embodied.records import load_lines
+from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
+from embodied.teachers.vnla import VnlaTeacher
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.world import World
+
+ANNA_SPLIT = {
+    "train": "train_seen", "val_seen": "train_unseen", "test_seen": "train_unseen", "val_unseen": "val",
+    "test_unseen": "test",
+}
+"""Whose wordings are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
+
+
+class DatasetError(ValueError):
+    """A folder that is not a whole data set of this version, or a split it does not have."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A house and its graph, without pictures: enough to play, judge and word."""
+
+    house: House
+    graph: NavGraph
+
+    @property
+    def name(self) -> str:
+        return self.house.name
+
+    def sightings(self, node: int) -> tuple:
+        raise DatasetError("a Place has no pictures; open the world with Dataset.open_world")
+
+
+class Dataset:
+    """A data set on disk. Houses, graphs and tasks are read when first asked for and kept."""
+
+    def __init__(self, folder: Path) -> None:
+        """
+        Raises:
+          DatasetError: no data set, half built, or of another version.
+        """
+        self.folder = Path(folder)
+        self.config = _config(self.folder)
+        self.scale: Scale = scale(self.config.scale, self.config.kind)
+        index = self.folder / "dataset.json"
+        if not index.exists():
+            missing = len(list(missing_units(self.config, self.folder)))
+            raise DatasetError(
+                f"{folder} is half built: {missing} of {len(units(self.scale))} houses are missing; "
+                "run the command that began it once more, it goes on from there"
+            )
+        self.index = json.loads(index.read_text())
+
+    @property
+    def kind(self) -> str:
+        return self.config.kind
+
+    @property
+    def digest(self) -> str:
+        """Names the content: two data sets with one digest are the same."""
+        return self.index["digest"]
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        return tuple(s.name for s in self.scale.splits)
+
+    def names(self, split: str) -> tuple[str, ...]:
+        """Names of the houses of a split."""
+        wanted = self._split(split)
+        return tuple(u.name for u in units(self.scale) if u.group in wanted.all_groups)
+
+    @functools.cache  # noqa: B019 - a data set lives as long as its program
+    def place(self, name: str) -> Place:
+        """House and graph by name."""
+        home = self.folder / "houses" / name
+        return Place(House.load(home / "house.json"), from_matterport(home / "connectivity.json"))
+
+    def places(self, split: str) -> dict[str, Place]:
+        return {name: self.place(name) for name in self.names(split)}
+
+    def open_world(self, name: str, catalogue: Catalogue, cache: Path, **options: object) -> World:
+        """The world with pictures of one house; `options` as in embodied.world.open_world."""
+        from embodied.world import World  # the one part that needs a renderer
+
+        place = self.place(name)
+        file = self.folder / "houses" / name / "panoramas.pano"
+        return World(place.house, catalogue, place.graph, cache, file=file, **options)
+
+    def routes(self, name: str) -> tuple[Route, ...]:
+        return tuple(load_lines(self.folder / "houses" / name / "routes.jsonl", Route))
+
+    def tasks(self, split: str) -> tuple[Task, ...]:
+        """All tasks of a split, house by house.
+
+        Raises:
+          DatasetError: an unknown split.
+        """
+        tasks = [
+            t for name in self.names(split)
+            for t in load_lines(self.folder / "houses" / name / f"tasks_{split}.jsonl", Task)
+        ]
+        if self.kind == "vnla" and split != "train":
+            limits = self._vnla_limits()
+            tasks = [self._with_limit(t, limits) for t in tasks]
+        return tuple(tasks)
+
+    def environment(
+        self, split: str, *, language: Language | None = None, worlds: Mapping[str, World] | None = None
+    ) -> Callable[[], HelpEnv]:
+        """A maker of environments for the tasks of a split; all it makes share their caches.
+
+        Args:
+          worlds: worlds with pictures by house name; without, the tasks play in Places.
+        """
+        places = worlds or self.places(split)
+        if self.kind == "hanna":
+            graphs = {name: w.graph for name, w in places.items()}
+            anna = Anna(graphs, {name: self.routes(name) for name in places}, split=ANNA_SPLIT[split])
+            moves = PanoramicMoves()
+            return lambda: HannaEnv(places, anna, moves)
+        if self.kind == "vnla":
+            teacher = VnlaTeacher()
+            advisor = Advisor(teacher, language or PlainLanguage())
+            return lambda: VnlaEnv(places, advisor, teacher.moves)
+        if self.kind == "hari":
+            describer, moves = self.describer(), PanoramicMoves()
+            assistant = HariAssistant(describer)
+            return lambda: HariEnv(places, assistant, describer, moves=moves)
+        moves = PanoramicMoves()
+        return lambda: HelpEnv(places, moves=moves)
+
+    def describer(self) -> Describer:
+        """HARI's descriptions; frequent objects are counted over the training houses."""
+        return Describer(frequent_classes([self.place(n) for n in self.names("train")]))
+
+    def table(self) -> str:
+        """The table of the splits, as Markdown."""
+        lines = ["| split | houses | tasks | routes | nodes per house |", "|---|---|---|---|---|"]
+        for name, row in self.index["splits"].items():
+            lines.append(
+                f"| {name} | {row['houses']} | {row['tasks']:,} | {row['routes']:,} | {row['nodes'] / row['houses']:.0f} |"
+            )
+        return "\n".join(lines) + "\n"
+
+    def _split(self, name: str):
+        for split in self.scale.splits:
+            if split.name == name:
+                return split
+        raise DatasetError(f"unknown split {name!r}; {self.folder} has {list(self.splits)}")
+
+    @functools.cache  # noqa: B019 - as above
+    def _vnla_limits(self) -> dict[tuple[str, str], int]:
+        lengths = [(*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon) for t in self.tasks("train")]
+        return time_limits(lengths, VnlaConfig().most_actions)
+
+    def _with_limit(self, task: Task, limits: Mapping[tuple[str, str], int]) -> Task:
+        assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
+        config = VnlaConfig()
+        key = limit_key(self.place(task.world), task.start.node, task.goal)
+        horizon = max(task.horizon, limits.get(key, config.most_actions))
+        return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
+
+
+def _config(folder: Path) -> DatasetConfig:
+    path = folder / "config.json"
+    if not path.exists():
+        raise DatasetError(f"{folder} holds no data set; build one with `embodied dataset hanna --out {folder}`")
+    body = json.loads(path.read_text())
+    if body.get("version") != VERSION:
+        raise DatasetError(f"{folder} was built by version {body.get('version')!r} of the format, this is {VERSION}; build it again")
+    fields = body["config"]
+    return DatasetConfig(**{**fields, "area": tuple(fields["area"])})

@@ -1,0 +1,82 @@
+"""Human assistants as visible figures: people beside the starts of the routes they know."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from embodied.geometry import rectangle, yaw_facing
+from embodied.house import House, Placement, rounded
+from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.navgraph import NavGraph
+
+CLASS = "person"
+NEAREST, FARTHEST = 0.55, 1.3
+"""How far from their node people may stand, metres."""
+BODY = 0.25
+"""Radius that a person keeps free of furniture and walls, metres."""
+PASSAGE = 0.45
+"""Distance that people keep from every edge of the graph, so that nobody blocks the way."""
+
+
+def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: Catalogue, *, seed: int) -> House:
+    """The house with one person beside each start node that has room for one, looking at it.
+
+    The navigation graph stays valid: nobody stands within 0.45 m of an edge. A start without free
+    floor nearby goes without its figure (the assistant is then heard but not seen).
+
+    Args:
+      starts: node indices; repeats count once.
+    """
+    figures = [a for a in catalogue.of_class(CLASS) if a.support == "floor"]
+    if not figures:
+        return house
+    ways = shapely.MultiLineString([graph.positions[list(e), :2].tolist() for e in graph.edges])
+    taken = _footprints(house)
+    people: list[Placement] = []
+    for node in sorted({int(s) for s in starts}):
+        room = house.room_by_id[graph.room_of_node[node]]
+        rng = stream(seed, "person", house.name, node)
+        spot = _spot(graph.positions[node], house.floor(room), ways, [*taken, *(_disc(p.position) for p in people)], rng=rng)
+        if spot is None:
+            continue
+        asset = figures[int(rng.integers(len(figures)))]
+        direction = math.atan2(graph.positions[node, 1] - spot[1], graph.positions[node, 0] - spot[0])
+        people.append(Placement(
+            f"{CLASS}_{len(people) + 1}", asset.key, CLASS, room.id,
+            rounded((spot[0], spot[1], house.storey_of(room).elevation)), rounded(yaw_facing(direction)), asset.size,
+        ))
+    return dataclasses.replace(house, placements=(*house.placements, *people))
+
+
+def _spot(eye: np.ndarray, floor: shapely.Polygon, ways, taken: list, *, rng: np.random.Generator) -> tuple[float, float] | None:
+    """The first of 96 seeded spots around `eye` that is free, the nearer ones first."""
+    angles = rng.permutation(16) * (2 * math.pi / 16)
+    for radius in np.linspace(NEAREST, FARTHEST, 6):
+        for angle in angles:
+            x, y = eye[0] + radius * math.cos(angle), eye[1] + radius * math.sin(angle)
+            point = shapely.Point(x, y)
+            body = point.buffer(BODY)
+            if floor.covers(body) and ways.distance(point) >= PASSAGE and not any(t.intersects(body) for t in taken):
+                return float(x), float(y)
+    return None
+
+
+def _footprints(house: House) -> list[shapely.Polygon]:
+    """What a standing body would run into: everything below head height that is higher than a rug."""
+    return [
+        shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
+        for p in house.placements if p.position[2] < 1.8 and p.size[2] > 0.05
+    ]
+
+
+def _disc(position: tuple[float, float, float]) -> shapely.Polygon:
+    return shapely.Point(position[0], position[1]).buffer(BODY)
