@@ -1,0 +1,169 @@
+"""Data sets: splits, hold-outs, resuming, and the same bytes whatever the number of workers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import pytest
+from hand_worlds import grid_world, thing
+
+from embodied import metrics
+from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
+from embodied.datasets.parts import object_part, room_part
+from embodied.datasets.scale import PAPER, quota, scale
+from embodied.datasets.store import Dataset, DatasetError
+from embodied.house import HouseError
+from embodied.interface import Ask
+from embodied.policies import Asking, Shortest, ask_every_5
+from embodied.rollout import play
+from embodied.teachers.vnla import VnlaTeacher
+
+
+def hand_house(seed, name, config, catalogue):
+    """The grid world with forty more things, one of each class, ten to a room."""
+    world = grid_world(8, name=name)
+    rooms = {r.id: r.polygon[0] for r in world.house.rooms}
+    more = tuple(
+        thing(f"thing{k}", 1, room, x + 1 + (k * 1.7) % 6.5, y + 1 + (k * 2.3) % 6.5)
+        for k, (room, (x, y)) in ((k, sorted(rooms.items())[k % 4]) for k in range(40))
+    )
+    return dataclasses.replace(world.house, placements=world.house.placements + more), world.graph
+
+
+def build(folder, cache, kind="hanna", workers=1, **options):
+    config = DatasetConfig(kind, "tiny", seed=4, **options)
+    build_dataset(config, folder, cache, workers=workers, make_house=hand_house)
+    return Dataset(folder)
+
+
+def content(folder):
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_paper_sizes_are_those_of_tables_4_2_and_e_1():
+    assert [s.tasks for s in PAPER["hanna"][1]] == [82_484, 5_001, 5_017, 5_004, 5_012]
+    assert sum(PAPER["hanna"][0].values()) == 68
+    assert sum(PAPER["hari"][0].values()) == 72
+    assert {s.name: s.tasks for s in PAPER["hari"][1]}["test_unseen_object"] == 1_913
+
+
+def test_shares_add_up_to_the_split():
+    for kind in PAPER:
+        config = DatasetConfig(kind, "paper")
+        wanted = scale("paper", kind)
+        sums = dict.fromkeys((s.name for s in wanted.splits), 0)
+        for unit in units(wanted):
+            for split, n in shares(unit, config):
+                sums[split.name] += n
+        assert sums == {s.name: s.tasks for s in wanted.splits}
+    assert [quota(10, 4, i) for i in range(4)] == [3, 3, 2, 2]
+
+
+@pytest.mark.parametrize("kind", ["find", "vln", "vnla", "hanna", "hari"])
+def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache", kind)
+    expert = Shortest(VnlaTeacher() if kind == "vnla" else None)
+    for split in data.splits:
+        tasks = data.tasks(split)
+        assert tasks, f"{split} is empty"
+        episodes = play(data.environment(split), expert, tasks, seed=0)
+        assert all(metrics.success(e, data.place(e.task.world).graph) for e in episodes), split
+    assert data.table().count("\n") == 2 + len(data.splits)
+
+
+def test_seen_splits_share_houses_but_no_tasks(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache")
+    keys = {s: {(t.world, t.request, t.start.node) for t in data.tasks(s)} for s in data.splits}
+    assert data.names("train") == data.names("val_seen") == data.names("test_seen")
+    assert not set(data.names("train")) & set(data.names("test_unseen"))
+    for a in data.splits:
+        for b in data.splits:
+            assert a == b or not keys[a] & keys[b], (a, b)
+
+
+def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache")
+    heard = {}
+    for split in ("train", "test_seen"):
+        episodes = play(data.environment(split), Asking(Shortest(), ask_every_5), data.tasks(split), seed=0)
+        heard[split] = {s.reply.subtask.id for e in episodes for s in e.steps if isinstance(s.action, Ask)}
+    assert heard["train"] and heard["test_seen"] and not heard["train"] & heard["test_seen"]
+
+
+def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache", "hari")
+    for split, room, thing in (("train", None, None), ("pretrain", None, None), ("val_unseen_start", "val", None),
+                               ("test_unseen_object", None, "test")):
+        for t in data.tasks(split):
+            place = data.place(t.world)
+            assert room_part(place, place.graph.room_of_node[t.start.node], seed=4) == room, split
+            assert object_part(t.goal.object_class, seed=4) == thing, split
+
+
+def test_workers_do_not_change_a_byte(tmp_path):
+    for n in (1, 2):
+        build(tmp_path / str(n), tmp_path / "cache", workers=n)
+    assert content(tmp_path / "1") == content(tmp_path / "2")
+
+
+def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
+    whole = build(tmp_path / "whole", tmp_path / "cache")
+    config = DatasetConfig("hanna", "tiny", seed=4)
+    calls = []
+
+    def interrupted(seed, name, *rest):
+        calls.append(name)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return hand_house(seed, name, *rest)
+
+    with pytest.raises(KeyboardInterrupt):
+        build_dataset(config, tmp_path / "half", tmp_path / "cache", make_house=interrupted)
+    with pytest.raises(DatasetError, match="half built: 2 of 4"):
+        Dataset(tmp_path / "half")
+    assert not [p for p in (tmp_path / "half" / "houses").iterdir() if p.name.startswith(".")], "no debris"
+    again = build(tmp_path / "half", tmp_path / "cache")
+    assert again.digest == whole.digest and content(tmp_path / "half") == content(tmp_path / "whole")
+
+
+def test_a_house_does_not_depend_on_the_others(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache")
+    config = DatasetConfig("hanna", "tiny", seed=4)
+    build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", *_extra())
+    assert content(tmp_path / "alone" / "houses" / "test_0000") == content(data.folder / "houses" / "test_0000")
+
+
+def _extra():
+    from embodied.language.plain import PlainLanguage
+
+    return PlainLanguage(), hand_house
+
+
+def test_wrong_folders_and_splits_are_refused(tmp_path):
+    with pytest.raises(DatasetError, match="no data set"):
+        Dataset(tmp_path)
+    data = build(tmp_path / "data", tmp_path / "cache")
+    with pytest.raises(DatasetError, match="unknown split 'tset'"):
+        data.tasks("tset")
+    with pytest.raises(ValueError, match="another data set"):
+        build_dataset(dataclasses.replace(data.config, seed=5), data.folder, tmp_path / "cache", make_house=hand_house)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "letters.txt").write_text("dear")
+    with pytest.raises(ValueError, match="not empty"):
+        build_dataset(data.config, tmp_path / "full", tmp_path / "cache", make_house=hand_house)
+    index = json.loads((data.folder / "config.json").read_text())
+    (data.folder / "config.json").write_text(json.dumps({**index, "version": 0}))
+    with pytest.raises(DatasetError, match="version 0"):
+        Dataset(data.folder)
+
+
+def test_a_house_that_cannot_be_made_is_an_error_after_a_bounded_number_of_seeds(tmp_path, monkeypatch):
+    from embodied.datasets import build as module
+
+    def never(*_):
+        raise HouseError("no plan")
+
+    monkeypatch.setattr(module, "generate_house", never)
+    with pytest.raises(HouseError, match="after 12 seeds"):
+        module.make_dataset_house(0, "train_0000", DatasetConfig("hanna"), None)
