@@ -177,6 +177,14 @@ def test_relabelling_repeats_what_the_teacher_would_have_said():
 # Time
 
 
+def test_counting_agrees_with_walking():
+    world, teacher = grid_world(4), VnlaTeacher()
+    plan = teacher.plan(world)
+    for goals in ((0,), (3, 12)):
+        for pose in (Pose(5, 7, 1), Pose(15), Pose(0, 3)):
+            assert plan.count(pose, goals) == len(plan.words(pose, goals, 1000)[0])
+
+
 def test_evaluation_limits_come_from_training():
     limits = time_limits([("hall", "kitchen", 10), ("hall", "kitchen", 14), ("hall", "bath", 9), ("a", "b", 25), ("a", "b", 25)], 25)
     assert limits == {("hall", "kitchen"): round(12 + 1.95 * 2), ("hall", "bath"): 25, ("a", "b"): 25}

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import TURNS, FindObject, Language, Pose, Task
+from embodied.interface import TURNS, VIEWS, FindObject, Language, Task
 from embodied.tasks.find import Pool, build_pool, draw
-from embodied.tasks.goals import find_instances, goal_classes
+from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
 
 if TYPE_CHECKING:
@@ -41,12 +41,10 @@ def vnla_pool(world: World, plan: MonocularPlan, *, seed: int, config: VnlaConfi
     return Pool(pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan, config)]).reshape(-1, 2))
 
 
-def _in_time(pair: np.ndarray, classes, plan: MonocularPlan, config: VnlaConfig) -> bool:
-    goals = classes[int(pair[0])].goal_nodes
-    poses = [Pose(int(pair[1]), turn) for turn in range(TURNS)]
-    if not np.isfinite(plan.cost(goals)[int(pair[1]) * 36 + 12]):
-        return False
-    return max(plan.count(p, goals) for p in poses) <= config.most_actions
+def _in_time(pair: np.ndarray, classes: tuple[GoalClass, ...], plan: MonocularPlan, config: VnlaConfig) -> bool:
+    level = int(pair[1]) * VIEWS + TURNS
+    counts = plan.counts(classes[int(pair[0])].goal_nodes)[level : level + TURNS]
+    return counts.min() > 0 and counts.max() <= config.most_actions
 
 
 def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple[str, str], int]:

@@ -47,6 +47,7 @@ class MonocularPlan:
         there, weight = self.next[here, action], self.weight[here, action]
         self._backwards = csr_matrix((weight, (there, here)), shape=(states, states))
         self._cost: dict[tuple[int, ...], np.ndarray] = {}
+        self._counts: dict[tuple[int, ...], np.ndarray] = {}
 
     def cost(self, goals: tuple[int, ...]) -> np.ndarray:
         """(states,) metres plus ACTION per action to the nearest of `goals`; inf where none can be reached."""
@@ -75,15 +76,34 @@ class MonocularPlan:
             pose = pose_of(int(self.next[state_of(pose), action]))
         return tuple(words), pose
 
+    def counts(self, goals: tuple[int, ...]) -> np.ndarray:
+        """(states,) int64: actions of the teacher, the final stop included; -1 where no goal can be reached."""
+        if goals not in self._counts:
+            cost = self.cost(goals)
+            total = np.round(self.weight + cost[self.next], 9)
+            follow = self.next[np.arange(len(cost)), np.argmin(total, axis=1)]
+            arrived = np.isin(np.arange(len(cost)) // VIEWS, goals)
+            lost, here = ~np.isfinite(cost), np.arange(len(cost))
+            counts = np.ones(len(cost), dtype=np.int64)
+            for _ in range(len(cost)):
+                going = ~arrived[here] & ~lost
+                if not going.any():
+                    break
+                counts += going
+                here = np.where(going, follow[here], here)
+            self._counts[goals] = np.where(lost, -1, counts)
+        return self._counts[goals]
+
     def count(self, pose: Pose, goals: tuple[int, ...]) -> int:
         """Actions of the teacher from `pose`, the final stop included.
 
         Raises:
           ValueError: no goal can be reached.
         """
-        if not np.isfinite(self.cost(goals)[state_of(pose)]):
+        n = int(self.counts(goals)[state_of(pose)])
+        if n < 0:
             raise ValueError(f"none of the goals {goals} can be reached from {pose} in the monocular action space")
-        return len(self.words(pose, goals, most=100_000)[0])
+        return n
 
 
 def state_of(pose: Pose) -> int:
