@@ -13,10 +13,9 @@ from scipy import ndimage
 
 from assets.records import Asset, MeshPart
 from embodied.house import House, Room
-from embodied.seeds import stream
 
-CELLS = (12, 8, 6, 4, 2)
-"""Cells per axis of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
+CELLS = (14, 10, 7, 5, 3, 2)
+"""Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
 MOST_BOXES = 24
 SLAB = 0.02
 """Thickness in metres of the board under a support surface."""
@@ -69,30 +68,35 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         bounds = grid_boxes(points, n, cut)
         if len(bounds) <= MOST_BOXES:
             break
-    return tuple(_box(low, high) for low, high in (*slabs, *bounds))
+    return tuple(_box(low, high, points.min(axis=0)) for low, high in (*slabs, *bounds))
 
 
 def surface_points(parts: Sequence[MeshPart], n: int = 4000) -> np.ndarray:
-    """(k, 3) points spread over the surface of `parts`, always the same ones; vertices included."""
+    """(k, 3) points spread evenly over the surface of `parts`, vertices included.
+
+    Source: the R2 sequence, M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+    """
     corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if areas.sum() <= 0:
         return corners.reshape(-1, 3)
-    rng = stream(0, "collision", "surface_points")
-    chosen = corners[np.searchsorted(np.cumsum(areas) / areas.sum(), rng.random(n)).clip(max=len(corners) - 1)]
-    a, b = np.sqrt(rng.random(n))[:, None], rng.random(n)[:, None]
+    k = np.arange(n)
+    chosen = corners[np.searchsorted(np.cumsum(areas) / areas.sum(), (k + 0.5) / n).clip(max=len(corners) - 1)]
+    a, b = np.sqrt(k * 0.7548776662466927 % 1)[:, None], (k * 0.5698402909980532 % 1)[:, None]
     spread = (1 - a) * chosen[:, 0] + a * (1 - b) * chosen[:, 1] + a * b * chosen[:, 2]
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
 
 
 def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(low, high) corners of boxes that cover `points` (k, 3), from an n x n x n occupancy grid.
+    """(low, high) corners of boxes that cover `points` (k, 3), from a grid of cubes, n along the longest side.
 
     The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
-    shrunk to the points in it, so a table top stays thin and its height exact.
+    shrunk to the points in it, so a table top stays thin and its height exact; what nearly reaches
+    the bounds of the whole reaches them, so that a thing stands on all its feet.
     """
     low, high = points.min(axis=0), points.max(axis=0)
-    edges = [np.linspace(low[i], high[i] + 1e-9, n + 1) for i in range(3)]
+    counts = np.maximum(1, np.rint((high - low) / ((high - low).max() / n + 1e-12))).astype(int)
+    edges = [np.linspace(low[i], high[i] + 1e-9, counts[i] + 1) for i in range(3)]
     edges[2] = np.unique(np.concatenate([edges[2], [z + 1e-6 for z in cut if low[2] < z < high[2]]]))
     cells = [np.clip(np.searchsorted(e, points[:, i], side="right") - 1, 0, len(e) - 2) for i, e in enumerate(edges)]
     shape = tuple(len(e) - 1 for e in edges)
@@ -105,13 +109,14 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tu
     lows, highs = lows.reshape(*shape, 3), highs.reshape(*shape, 3)
     occupied = np.isfinite(lows[..., 0])
     filled = ndimage.binary_fill_holes(occupied)
-    boxes = []
+    snap, boxes = 0.25 * (high - low) / counts, []
     while (left := np.argwhere(filled)).size:
         x, y, z = left[0]
         block = _grow(filled, x, y, z)
         filled[block] = False
         if occupied[block].any():
-            boxes.append((lows[block].min(axis=(0, 1, 2)), highs[block].max(axis=(0, 1, 2))))
+            inner, outer = lows[block].min(axis=(0, 1, 2)), highs[block].max(axis=(0, 1, 2))
+            boxes.append((np.where(inner - low < snap, low, inner), np.where(high - outer < snap, high, outer)))
     return boxes
 
 
@@ -127,10 +132,13 @@ def _grow(filled: np.ndarray, x: int, y: int, z: int) -> tuple[slice, slice, sli
     return slice(x, x1), slice(y, y1), slice(z, z1)
 
 
-def _box(low: np.ndarray, high: np.ndarray) -> Box:
+def _box(low: np.ndarray, high: np.ndarray, least: np.ndarray | None = None) -> Box:
+    """The box between two corners, thickened downwards where too thin, but not below `least`."""
     half = np.maximum((high - low) / 2, THINNEST)
     centre = (low + high) / 2
     centre[2] = high[2] - half[2]
+    if least is not None:
+        centre[2] = max(centre[2], least[2] + half[2])
     return Box(tuple(centre.tolist()), tuple(half.tolist()))
 
 
@@ -161,7 +169,7 @@ def wall_boxes(house: House, room: Room, edge: int) -> tuple[Box, ...]:
     for o in house.openings:
         if room.id in o.rooms:
             ends = np.array([o.a, o.b]) - a
-            if np.abs(np.cross(np.broadcast_to(along, (2, 2)), ends)).max() < 1e-3:
+            if np.abs(ends @ [along[1], -along[0]]).max() < 1e-3:
                 s = np.sort(ends @ along)
                 if s[0] > -1e-3 and s[1] < length + 1e-3:
                     holes.append((s[0], s[1], o.sill, o.head))

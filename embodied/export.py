@@ -44,7 +44,7 @@ def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] =
             write_bytes(folder / TEXTURES / f"{texture.name}.png", _png(image))
             texture.data = b""
             texture.file = f"{texture.name}.png"
-    spec.meshdir, spec.texturedir = MESHES, TEXTURES
+    spec.modelfiledir, spec.meshdir, spec.texturedir = str(folder), MESHES, TEXTURES
     write_bytes(folder / "house.xml", spec.to_xml().encode())
     return folder / "house.xml"
 

@@ -169,6 +169,7 @@ class Renderer:
         if self._mjr is None:
             raise RuntimeError("the renderer is closed; make a new one")
         gl.make_current()
+        mujoco.mjr_restoreBuffer(self._mjr)
         if size[0] * self._super > self._buffer[0] or size[1] * self._super > self._buffer[1]:
             self._buffer = tuple(max(n * self._super, b) for n, b in zip(size, self._buffer, strict=True))
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)

@@ -204,6 +204,9 @@ def _is_drawable(mesh: MeshPart) -> bool:
 def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: np.ndarray, normals: np.ndarray | None,
               uv: np.ndarray, faces: np.ndarray) -> None:
     """A mesh by way of MuJoCo's binary format, which is much faster than handing over lists."""
+    if len(vertices) < 4:  # the format's least
+        vertices, uv = (np.concatenate([a, a[-1:]]) for a in (vertices, uv))
+        normals = None
     n = len(vertices)
     head = np.array([n, 0 if normals is None else n, n, len(faces)], np.int32)
     arrays = [vertices, *([] if normals is None else [normals]), uv]

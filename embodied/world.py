@@ -14,6 +14,7 @@ from tqdm import tqdm
 from assets.cache import digest
 from embodied import gl, navgraph
 from embodied.house import House
+from embodied.lit import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.parts import Part, house_parts, owners
@@ -38,10 +39,10 @@ class World:
     """Owns, while open, a renderer (made on first need) and the panorama file (where there is one)."""
 
     def __init__(self, house: House, catalogue: Catalogue, graph: navgraph.NavGraph, cache: Path, *, size: int = 256,
-                 quality: str = "unlit", backend: str = "classic", file: Path | None = None) -> None:
+                 quality: str = "unlit", backend: str = "classic", light: str = "normal", file: Path | None = None) -> None:
         """See `open_world`."""
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
-        self.size, self.quality, self.backend = size, quality, backend
+        self.size, self.quality, self.backend, self.light = size, quality, backend, light
         self._path = file
         self._renderer: Renderer | None = None
         self._file: PanoramaFile | None = None
@@ -66,7 +67,8 @@ class World:
         """All that the panoramas depend on, and what draws them."""
         return {
             "house": self.house.digest, "nodes": digest(self.graph.positions.tolist()), "size": self.size,
-            "quality": self.quality, "backend": self.backend, "renderer": str(gl.info()), "mujoco": importlib.metadata.version("mujoco"),
+            "quality": self.quality, "backend": self.backend,
+            "light": None if self.quality == "unlit" else self.light, "renderer": str(gl.info()), "mujoco": importlib.metadata.version("mujoco"),
             "code": code_digest(),
         }
 
@@ -79,7 +81,9 @@ class World:
     def renderer(self) -> Renderer:
         """The renderer of this world, for pictures from anywhere; opened on first use."""
         if self._renderer is None:
-            self._renderer = _make_renderer(self.house, self.catalogue, self.cache, self.size, self.quality, self.backend)
+            lit = None if self.quality == "unlit" else _lit(self.house, self.catalogue, self.cache, self.light)
+            self._renderer = Renderer(self.house, self.catalogue, quality=self.quality, backend=self.backend, size=self.size,
+                                      lit=lit)
         return self._renderer
 
     def panorama(self, node: int) -> Panorama:
@@ -161,7 +165,7 @@ class World:
 
 
 def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: navgraph.NavGraph | None = None, size: int = 256,
-               quality: str = "unlit", backend: str = "classic") -> World:
+               quality: str = "unlit", backend: str = "classic", light: str = "normal") -> World:
     """A world over `house`; nothing is drawn until asked for.
 
     Args:
@@ -171,20 +175,21 @@ def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: navgra
       size: side of a cube face, pixels.
       quality: 'unlit', 'baked', 'glossy' or 'reference'.
       backend: 'classic' or 'filament'.
+      light: name of the light settings that the baked qualities use, one of embodied.light.QUALITIES.
     """
     graph = graph or navgraph.build_graph(house, catalogue)
-    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend)
+    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light)
 
 
 def open_folder(folder: Path, catalogue: Catalogue, cache: Path, *, size: int = 256, quality: str = "unlit",
-                backend: str = "classic") -> World:
+                backend: str = "classic", light: str = "normal") -> World:
     """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there."""
     folder = Path(folder)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = House.load(folder / "house.json")
     graph = navgraph.build_graph(house, catalogue)
-    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend,
+    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light,
                  file=folder / "panoramas.pano")
 
 
@@ -195,5 +200,7 @@ def code_digest() -> str:
     return digest(*(f.read_bytes() for f in files))[:16]
 
 
-def _make_renderer(house: House, catalogue: Catalogue, cache: Path, size: int, quality: str, backend: str) -> Renderer:
-    return Renderer(house, catalogue, quality=quality, backend=backend, size=size)
+def _lit(house: House, catalogue: Catalogue, cache: Path, light: str) -> LitPages:
+    from embodied.light import bake  # late: loads the path tracer
+
+    return bake(house, catalogue, cache, light).lit

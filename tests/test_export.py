@@ -1,0 +1,72 @@
+"""Exports: the MJCF folder opens alone and is the same house; the GLB holds every owner."""
+
+from __future__ import annotations
+
+import shutil
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from embodied.export import export_glb, export_mjcf
+from embodied.lit import LitMesh, LitPages
+from embodied.parts import house_parts
+from embodied.scene import compile_scene, loose
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+def test_the_mjcf_folder_is_the_same_house_and_needs_nothing_else(house, tmp_path):
+    written = export_mjcf(house, HandCatalogue(), tmp_path / "made")
+    moved = shutil.move(written.parent, tmp_path / "elsewhere")
+    again = mujoco.MjModel.from_xml_path(str(moved / "house.xml"))
+    original = compile_scene(house, HandCatalogue()).model
+    assert again.ngeom == original.ngeom and again.nmesh == original.nmesh and again.nmat == original.nmat
+    for g in range(again.ngeom):
+        assert again.geom(g).name == original.geom(g).name
+    assert np.allclose(again.geom_pos, original.geom_pos, atol=1e-5)
+    assert np.allclose(again.geom_rgba, original.geom_rgba, atol=1e-5)
+    assert np.array_equal(again.mesh_vert, original.mesh_vert)
+
+
+def test_a_free_export_has_joints_and_settles(house, tmp_path):
+    free = loose(house, HandCatalogue())
+    path = export_mjcf(house, HandCatalogue(), tmp_path, free=free)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert {model.joint(j).name for j in range(model.njnt)} == free
+
+
+def test_textures_travel_with_the_folder(house, tmp_path):
+    page = np.random.default_rng(0).integers(0, 255, (16, 32, 3), dtype=np.uint8)
+    corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1]], np.float32)
+    lit = LitPages((LitMesh("rug_1", "object", "living_room_1", 0, corners, np.array([[0, 1, 2]], np.int32),
+                            np.zeros((3, 2), np.float32)),), (page,), "x")
+    model = mujoco.MjModel.from_xml_path(str(export_mjcf(house, HandCatalogue(), tmp_path, lit=lit)))
+    texture = model.texture("page_0")
+    start = int(texture.adr[0])
+    assert np.array_equal(model.tex_data[start:start + page.size].reshape(page.shape), page)
+
+
+def test_the_glb_holds_every_owner_upright(house, tmp_path):
+    catalogue = HandCatalogue()
+    loaded = trimesh.load_scene(export_glb(house, catalogue, tmp_path / "house.glb"))
+    nodes = set(loaded.graph.nodes_geometry)
+    assert {p.owner for p in house_parts(house, catalogue)} <= nodes
+    low, high = loaded.bounds
+    assert high[1] == pytest.approx(2.85, abs=0.2), "glTF is y up: the house is about 2.85 m high along y"
+    transform, name = loaded.graph["red_box_1"]
+    box = loaded.geometry[name].copy().apply_transform(transform)
+    assert np.allclose(box.bounds, [[4.15, 0, -2.85], [4.65, 0.8, -2.35]], atol=1e-4)
+    assert low[0] < 0 < high[0]
+
+
+def test_without_ceilings_one_looks_in_from_above(house, tmp_path):
+    loaded = trimesh.load_scene(export_glb(house, HandCatalogue(), tmp_path / "h.glb", ceilings=False))
+    nodes = set(loaded.graph.nodes_geometry)
+    assert not any(n.endswith("/ceiling") for n in nodes) and "outdoor/roof" not in nodes

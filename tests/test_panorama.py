@@ -1,0 +1,170 @@
+"""Panoramas: geometry of the faces, of what is resampled from them, and the file they are kept in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from embodied.panorama import FACES, Panorama, face_rays, ray_stretch
+from embodied.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
+
+S = 64
+
+
+def analytic(s: int = S, room=(3.0, 2.0, 1.2)) -> Panorama:
+    """A room seen from its centre: half sizes `room`; colours are a smooth function of the direction."""
+    rays = face_rays(s).astype(float)
+    lengths = np.min(np.asarray(room) / np.maximum(np.abs(rays), 1e-9), axis=-1)
+    hit = np.argmin(np.asarray(room) / np.maximum(np.abs(rays), 1e-9), axis=-1)
+    ids = 1 + 2 * hit + (np.take_along_axis(rays, hit[..., None], -1)[..., 0] > 0)
+    return Panorama(smooth(rays), (lengths / ray_stretch(s)).astype(np.float32), ids.astype(np.int32))
+
+
+def smooth(rays: np.ndarray) -> np.ndarray:
+    return np.clip(np.rint(127 + 100 * rays), 0, 255).astype(np.uint8)
+
+
+def pinhole(yaw: float, pitch: float, vfov: float, h: int, w: int) -> np.ndarray:
+    """(h, w, 3) rays by explicit rotation matrices, independent of embodied.panorama."""
+    tall = math.tan(vfov / 2)
+    y, x = np.meshgrid(1 - 2 * (np.arange(h) + 0.5) / h, 2 * (np.arange(w) + 0.5) / w - 1, indexing="ij")
+    local = np.stack([np.ones((h, w)), -x * tall * w / h, y * tall], axis=-1)
+    tilt = np.array([[math.cos(pitch), 0, -math.sin(pitch)], [0, 1, 0], [math.sin(pitch), 0, math.cos(pitch)]])
+    turn = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    return local @ (turn @ tilt).T
+
+
+def test_faces_are_right_handed_cameras_one_per_axis():
+    for forward, up in FACES:
+        assert np.dot(forward, up) == 0
+    rights = [tuple(np.cross(f, u)) for f, u in FACES]
+    assert rights[0] == (0, -1, 0), "looking along +x with z up, -y is on the right"
+    assert {f for f, _ in FACES} == {tuple(s * e) for e in np.eye(3) for s in (1, -1)}
+
+
+@pytest.mark.parametrize(("yaw", "pitch", "vfov"), [(0.0, 0.0, 1.2), (0.7, 0.4, 1.0), (-2.5, -1.1, 1.5), (3.0, 1.5, 0.8)])
+def test_a_resampled_view_equals_the_closed_form(yaw, pitch, vfov):
+    rgb, depth, ids = analytic().view(yaw, pitch, vfov, (48, 60))
+    rays = pinhole(yaw, pitch, vfov, 48, 60)
+    unit = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    assert np.abs(rgb.astype(int) - smooth(unit)).max() <= 3
+    room = np.array([3.0, 2.0, 1.2])
+    lengths = np.min(room / np.maximum(np.abs(unit), 1e-9), axis=-1)
+    expected = lengths / np.linalg.norm(rays, axis=-1)
+    wrong = np.abs(depth / expected - 1)
+    assert np.quantile(wrong, 0.85) < 1e-3, "flat surfaces are exact"
+    assert wrong.max() < 0.04, "only where two walls meet inside a pixel, and little"
+    hit = np.argmin(room / np.maximum(np.abs(unit), 1e-9), axis=-1)
+    agree = ids == 1 + 2 * hit + (np.take_along_axis(unit, hit[..., None], -1)[..., 0] > 0)
+    assert agree.mean() > 0.97
+
+
+def test_no_seam_where_faces_meet():
+    """Along a circle through all faces neighbouring pixels differ as little as the smooth scene does."""
+    picture = analytic().equirect(256).astype(int)
+    assert np.abs(np.diff(picture, axis=1)).max() <= 5
+    assert np.abs(np.diff(picture, axis=0)).max() <= 5
+    assert np.abs(picture[:, 0] - picture[:, -1]).max() <= 5
+
+
+def test_depth_joins_across_faces():
+    lengths = analytic().equirect_depth(256)
+    rays_yaw = np.pi - (np.arange(512) + 0.5) * np.pi / 256
+    row = lengths[128]
+    pitch = np.pi / 2 - 128.5 * np.pi / 256
+    c = np.cos(pitch) * np.abs(np.stack([np.cos(rays_yaw), np.sin(rays_yaw)]))
+    assert np.allclose(row, np.minimum(3.0 / c[0], 2.0 / c[1]), rtol=5e-3)
+
+
+def test_views36_follow_the_matterport_order():
+    views = analytic().views36(32)
+    assert views.shape == (36, 32, 32, 3)
+    for i in range(36):
+        heading, elevation = math.radians(30 * (i % 12)), math.radians(30 * (i // 12 - 1))
+        centre = views[i, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
+        direction = [math.sin(heading) * math.cos(elevation), math.cos(heading) * math.cos(elevation), math.sin(elevation)]
+        assert np.abs(centre - (127 + 100 * np.array(direction))).max() < 3, f"view {i}"
+
+
+def test_a_view_of_view36_equals_the_perspective_view():
+    p = analytic()
+    one = p.view_rgb(math.pi / 2 - math.radians(60), 0.0, math.radians(60), (40, 40))
+    assert np.array_equal(p.views36(40)[14], one)
+
+
+@pytest.mark.parametrize("size", [(0, 10), (10, -1)])
+def test_impossible_sizes_are_refused(size):
+    with pytest.raises(ValueError, match="size"):
+        analytic(8).view(0, 0, 1.0, size)
+    with pytest.raises(ValueError, match="vfov"):
+        analytic(8).view(0, 0, math.pi, (10, 10))
+
+
+@pytest.fixture
+def stored(tmp_path):
+    rng = np.random.default_rng(0)
+    panoramas = []
+    for k in range(3):
+        p = analytic(32, (3.0 + k, 2.0, 1.2))
+        depth = p.depth.copy()
+        depth[4, :4, :4], depth[4, 5, 5] = np.inf, 100.0
+        panoramas.append(Panorama(p.rgb, depth, rng.integers(0, 900, p.ids.shape, dtype=np.int32)))
+    path = tmp_path / "house.pano"
+    write_panoramas(path, panoramas, {"house": "abc"})
+    return path, panoramas
+
+
+def test_the_file_gives_back_what_was_written(stored):
+    path, panoramas = stored
+    with PanoramaFile(path) as file:
+        assert len(file) == 3 and file.meta == {"house": "abc"} and file.size == 32
+        for node in (2, 0, 1):
+            back, sent = file.read(node), panoramas[node]
+            assert np.array_equal(back.ids, sent.ids)
+            near = sent.depth < FARTHEST
+            assert np.abs(back.depth[near] - sent.depth[near]).max() <= 0.0005 + 1e-6
+            assert np.isinf(back.depth[4, 0, 0]) and back.depth[4, 5, 5] == pytest.approx(FARTHEST)
+            assert np.mean((back.rgb.astype(float) - sent.rgb) ** 2) < 6.5, "JPEG below 40 dB"
+
+
+def test_lossless_colours_are_exact(tmp_path):
+    p = analytic(16)
+    write_panoramas(tmp_path / "x.pano", [p], {}, lossless=True)
+    with PanoramaFile(tmp_path / "x.pano") as file:
+        assert np.array_equal(file.rgb(0), p.rgb)
+
+
+def test_a_truncated_or_foreign_file_is_refused(stored):
+    path, _ = stored
+    data = path.read_bytes()
+    for broken in (data[:-1], data[: len(data) // 2], b"", b"PNG" + data[3:], data + b"x"):
+        path.write_bytes(broken)
+        with pytest.raises(PanoramaFileError, match="delete"):
+            PanoramaFile(path)
+
+
+def test_a_flipped_byte_is_noticed_where_it_matters(stored):
+    path, _ = stored
+    with PanoramaFile(path) as file:
+        offset, length, _ = file.index["nodes"][1]["depth"]
+    data = bytearray(path.read_bytes())
+    data[offset + length // 2] ^= 0xFF
+    path.write_bytes(data)
+    with PanoramaFile(path) as file:
+        file.read(0)
+        with pytest.raises(PanoramaFileError, match="depth of node 1"):
+            file.depth(1)
+        with pytest.raises(IndexError, match="nodes 0 to 2"):
+            file.rgb(3)
+
+
+def test_an_interrupted_write_leaves_nothing(tmp_path):
+    def broken():
+        yield analytic(16)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_panoramas(tmp_path / "x.pano", broken(), {})
+    assert list(tmp_path.iterdir()) == []

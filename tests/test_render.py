@@ -1,0 +1,227 @@
+"""What the renderer shows is what is there: directions, depth, ids, and nothing lost by leaving things out."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import multiprocessing
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from embodied import gl, visibility
+from embodied.panorama import face_rays, ray_stretch
+from embodied.parts import owners
+from embodied.render import NEAR, Renderer, camera_at, depth_of_reversed_z
+from embodied.scene import VISUAL, compile_scene
+
+EYE = (2.5, 2.6, 1.2)
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+@pytest.fixture(scope="module")
+def renderer(house):
+    with Renderer(house, HandCatalogue(), size=128) as r:
+        yield r
+
+
+def is_red(rgb) -> np.ndarray:
+    r, g, b = (np.asarray(rgb, int)[..., i] for i in range(3))
+    return (r > 90) & (g < 60) & (b < 60)
+
+
+def test_the_red_box_to_the_east_is_in_the_view_to_the_east(renderer):
+    ahead = renderer.view(EYE, 0.0, -0.3, 1.0, (60, 80))
+    assert is_red(ahead.rgb).mean() > 0.05
+    assert is_red(ahead.rgb)[:, 30:50].sum() > 0.6 * is_red(ahead.rgb).sum(), "and in its middle"
+    assert not is_red(renderer.view(EYE, math.pi, -0.3, 1.0, (60, 80)).rgb).any()
+    faces = renderer.panorama(EYE)
+    assert is_red(faces.rgb[0]).any() and not is_red(faces.rgb[2]).any()
+
+
+def test_pictures_are_not_mirrored(renderer):
+    """The flag to the north is green on its west half: on the left for who looks north."""
+    rgb = renderer.view((2.0, 2.0, 0.8), math.pi / 2, 0.0, 1.0, (60, 80)).rgb.astype(int)
+    green = np.argwhere((rgb[..., 1] > 90) & (rgb[..., 0] < 60) & (rgb[..., 2] < 80))
+    blue = np.argwhere((rgb[..., 2] > 90) & (rgb[..., 0] < 60) & (rgb[..., 1] < 80))
+    assert len(green) > 20 and len(blue) > 20
+    assert green[:, 1].max() < blue[:, 1].min()
+
+
+def test_up_is_up(renderer, house):
+    names = owners(house)
+    ids = renderer.panorama(EYE).ids
+    assert names[ids[4, 64, 64] - 1] == "living_room_1/ceiling"
+    assert names[ids[5, 64, 64] - 1] in ("living_room_1/floor", "rug_1")
+
+
+def test_depth_and_ids_agree_with_ray_casting(renderer, house):
+    """MuJoCo's own ray caster, which knows nothing of OpenGL, meets the same things at the same distance."""
+    scene = compile_scene(house, HandCatalogue(), collisions=False)
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    groups = np.zeros(6, np.uint8)
+    groups[VISUAL] = 1
+    depth, ids = renderer.seen(EYE, 128)
+    rays, stretch = face_rays(128), ray_stretch(128)
+    rng = np.random.default_rng(0)
+    wrong = same = compared = 0
+    for k, i, j in zip(rng.integers(0, 6, 400), rng.integers(0, 128, 400), rng.integers(0, 128, 400), strict=True):
+        geom = np.zeros(1, np.int32)
+        t = mujoco.mj_ray(scene.model, data, np.array(EYE), rays[k, i, j].astype(float), groups, 1, -1, geom)
+        if t < 0:
+            continue
+        compared += 1
+        wrong += abs(depth[k, i, j] * stretch[i, j] - t) > 2e-3 * t
+        same += ids[k, i, j] == scene.owner_of_geom[geom[0]]
+    assert compared > 350
+    assert wrong <= 0.02 * compared, "all but pixels on an edge"
+    assert same >= 0.98 * compared
+
+
+def test_depth_is_along_the_optical_axis(renderer):
+    """A wall square to the camera has one depth all over the picture."""
+    view = renderer.view((2.5, 2.0, 1.8), math.pi / 2, 0.0, 0.6, (40, 40))
+    assert np.ptp(view.depth) < 2e-3
+    assert view.depth.mean() == pytest.approx(4.0 - 0.06 - 2.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 4, 2.3, -1.9])
+def test_a_resampled_view_equals_a_direct_one(renderer, yaw):
+    p = renderer.panorama(EYE, 256)
+    rgb, depth, ids = p.view(yaw, -0.35, 1.0, (120, 160))
+    direct = renderer.view(EYE, yaw, -0.35, 1.0, (120, 160))
+    assert np.abs(rgb.astype(int) - direct.rgb).mean() < 1.5
+    assert np.median(np.abs(depth - direct.depth)) < 1e-3
+    assert np.quantile(np.abs(depth / direct.depth - 1), 0.95) < 0.01
+    assert (ids == direct.ids).mean() > 0.97
+
+
+def test_leaving_out_what_is_hidden_changes_no_pixel(renderer):
+    rng = np.random.default_rng(1)
+    for x, y in [(0.4, 0.4), (4.9, 1.0), (5.0, 1.1), (5.1, 0.9), (6.0, 3.0), (8.6, 0.4), *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2))]:
+        yaw, pitch = rng.uniform(-math.pi, math.pi), rng.uniform(-0.6, 0.6)
+        some = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64))
+        everything = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64), cull=False)
+        differ = (some.rgb != everything.rgb).any(axis=-1).sum()
+        assert differ <= 2, f"{differ} pixels at {x, y, yaw, pitch}; one or two may peep through a crack between two meshes"
+        assert (some.ids != everything.ids).sum() <= 2
+
+
+def test_hidden_rooms_are_left_out(renderer, house):
+    """In the living room's corner beside the door one cannot look into the bedroom."""
+    seen = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5))
+    width = sum(high - low for low, high in seen["bedroom_1"])
+    assert width < 0.3, "only a sliver through the door"
+    everything, some = renderer._is_visual.sum(), renderer._seen_around((4.8, 3.7, 1.5)).sum()
+    assert some < everything - 5
+
+
+def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():
+    """Out of one wing's window and in through the other's: both face the same court."""
+    base = two_rooms()
+    finishes = {k: getattr(base.rooms[0], k) for k in ("floor_finish", "wall_finish", "ceiling_finish", "skirting_finish")}
+    wing = type(base.rooms[0])("study_1", "study", ((0.0, 4.0), (3.0, 4.0), (3.0, 9.0), (0.0, 9.0)), **finishes)
+    door = dataclasses.replace(base.openings[0], id="door_2", rooms=("study_1", "living_room_1"), a=(1.0, 4.0), b=(2.0, 4.0))
+    window = dataclasses.replace(base.openings[2], id="window_3", rooms=("study_1", None), a=(3.0, 5.0), b=(3.0, 8.0))
+    house = dataclasses.replace(base, rooms=(*base.rooms, wing), openings=(*base.openings, door, window))
+    portals = visibility.portals_of(house)
+    eye = (7.0, 3.0, 1.5)
+    assert "study_1" in visibility.visible_rooms(house, portals, eye), "bedroom window to the north, study window to the east"
+    lone = dataclasses.replace(house, openings=tuple(o for o in house.openings if o.id != "window_2"))
+    assert "study_1" not in visibility.visible_rooms(lone, visibility.portals_of(lone), eye)
+
+
+def test_depth_buffer_is_inverted_exactly():
+    z = np.array([0.03, 0.5, 3.0, 50.0, 199.0])
+    near, far = NEAR, 200.0
+    buffer = near * (far - z) / (z * (far - near))
+    assert np.allclose(depth_of_reversed_z(buffer.astype(np.float32)), z, rtol=1e-3)
+    assert np.isinf(depth_of_reversed_z(np.zeros(1, np.float32)))
+
+
+def test_camera_axes_are_a_right_handed_frame():
+    camera = camera_at((0, 0, 0), 0.7, 0.4)
+    right = np.cross(camera.forward, camera.up)
+    assert np.allclose(np.linalg.norm([camera.forward, camera.up, right], axis=1), 1)
+    assert right[2] == pytest.approx(0), "the horizon is level"
+
+
+def test_the_context_says_who_draws():
+    facts = gl.info()
+    assert facts.device and facts.vendor and facts.backend in gl.BACKENDS
+    assert ("software" in str(facts)) == facts.software
+
+
+def test_two_houses_can_be_open_at_once_and_a_closed_one_says_so(house):
+    with Renderer(house, HandCatalogue(), size=32) as one, Renderer(two_rooms(), HandCatalogue(), size=32) as two:
+        first = one.panorama(EYE).rgb
+        assert not np.array_equal(first, two.panorama(EYE).rgb)
+        assert np.array_equal(first, one.panorama(EYE).rgb), "drawing one house does not disturb another"
+    with pytest.raises(RuntimeError, match="closed"):
+        one.panorama(EYE)
+
+
+@pytest.mark.parametrize(("wrong", "match"), [
+    ({"quality": "photo"}, "photo"), ({"backend": "metal"}, "metal"), ({"size": 0}, "size"), ({"size": -5}, "size"),
+    ({"quality": "baked"}, "lit"),
+])
+def test_bad_settings_are_refused(house, wrong, match):
+    with pytest.raises(ValueError, match=match):
+        Renderer(house, HandCatalogue(), **wrong)
+
+
+def _draw(queue) -> None:
+    with Renderer(furnished(two_rooms()), HandCatalogue(), size=32) as r:
+        queue.put(int(r.panorama(EYE).rgb.astype(np.int64).sum()))
+
+
+def test_a_spawned_worker_draws_the_same(house):
+    context = multiprocessing.get_context("spawn")
+    queue = context.Queue()
+    worker = context.Process(target=_draw, args=(queue,))
+    worker.start()
+    with Renderer(house, HandCatalogue(), size=32) as r:
+        expected = int(r.panorama(EYE).rgb.astype(np.int64).sum())
+    assert queue.get(timeout=60) == expected
+    worker.join(timeout=60)
+
+
+def _try(queue) -> None:
+    try:
+        gl.make_current()
+        queue.put("drew")
+    except gl.GLError as e:
+        queue.put(str(e))
+
+
+def test_a_forked_worker_is_told_to_spawn(renderer):
+    """Rather than to hang in Mesa, whose threads do not survive the fork."""
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    worker = context.Process(target=_try, args=(queue,))
+    worker.start()
+    assert "spawn" in queue.get(timeout=30)
+    worker.join(timeout=30)
+
+
+def test_a_screen_backend_is_refused(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    with pytest.raises(gl.GLError, match="glfw"):
+        gl.choose()
+
+
+def test_no_opengl_gives_the_remedy(monkeypatch):
+    monkeypatch.delenv("MUJOCO_GL")
+    monkeypatch.setattr(gl.ctypes.util, "find_library", lambda name: None)
+    gl._first_available.cache_clear()
+    with pytest.raises(gl.GLError, match="apt-get install"):
+        gl.choose()
+    gl._first_available.cache_clear()

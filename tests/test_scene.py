@@ -1,0 +1,185 @@
+"""House to MuJoCo: every geom has an owner, collision boxes fit, and what is freed stays where it stands."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, box_mesh, furnished
+
+from assets.records import Asset, SupportSurface
+from embodied import collision, scene
+from embodied.house import Placement
+from embodied.lit import LitMesh, LitPages
+from embodied.parts import house_parts, owners
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+@pytest.fixture(scope="module")
+def compiled(house):
+    return scene.compile_scene(house, HandCatalogue())
+
+
+def test_every_geom_is_traceable_to_its_owner(house, compiled):
+    names = owners(house)
+    assert compiled.owner_of_geom.min() > 0, "no geom without owner"
+    for g in range(compiled.model.ngeom):
+        assert compiled.model.geom(g).name.startswith(names[compiled.owner_of_geom[g] - 1] + "#")
+    drawn = {names[i - 1] for i, k in zip(compiled.owner_of_geom, compiled.kind_of_geom, strict=True) if k != "collision"}
+    assert drawn == {p.owner for p in house_parts(house, HandCatalogue())}
+
+
+def test_only_boxes_collide_and_only_meshes_are_drawn(compiled):
+    m = compiled.model
+    for g, kind in enumerate(compiled.kind_of_geom):
+        if kind == "collision":
+            assert m.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX and m.geom_contype[g] and m.geom_group[g] == scene.COLLISION
+        else:
+            assert m.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH and not m.geom_contype[g] and not m.geom_conaffinity[g]
+
+
+def test_geoms_stand_where_the_parts_say(house, compiled):
+    """The vertices of the drawn meshes in the model are those of the parts, in the world."""
+    data = mujoco.MjData(compiled.model)
+    mujoco.mj_forward(compiled.model, data)
+    m = compiled.model
+    for owner in ("table_1", "mug_1", "living_room_1/wall_0"):
+        parts = [p for p in house_parts(house, HandCatalogue()) if p.owner == owner]
+        expected = np.concatenate([_world(p) for p in parts])
+        found = []
+        for g in range(m.ngeom):
+            if m.geom(g).name.startswith(f"{owner}#") and compiled.kind_of_geom[g] != "collision":
+                mesh = m.geom_dataid[g]
+                v = m.mesh_vert[m.mesh_vertadr[mesh]:][:m.mesh_vertnum[mesh]]
+                found.append(v @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g])
+        found = np.concatenate(found)
+        for end in (np.min, np.max):
+            assert np.allclose(end(found, axis=0), end(expected, axis=0), atol=1e-4), owner
+
+
+def _world(part) -> np.ndarray:
+    c, s = np.cos(part.yaw), np.sin(part.yaw)
+    return part.mesh.vertices @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + part.position
+
+
+def test_equal_meshes_are_shared(house, compiled):
+    twins = [g for g in range(compiled.model.ngeom) if compiled.model.geom(g).name in ("red_box_1#0", "red_box_2#0")]
+    assert len({int(compiled.model.geom_dataid[g]) for g in twins}) == 1
+
+
+def test_free_furniture_stays_where_it_stands(house):
+    catalogue = HandCatalogue()
+    free = scene.loose(house, catalogue)
+    assert free == {"red_box_1", "red_box_2", "flag_1", "table_1", "mug_1"}, "all but the rug"
+    moved = scene.displacements(scene.compile_scene(house, catalogue, free=free))
+    assert max(moved.values()) < 0.002, moved
+
+
+def test_a_floating_mug_falls(house):
+    """The check above can fail."""
+    lifted = dataclasses.replace(house, placements=tuple(
+        dataclasses.replace(p, position=(1.3, 1.0, 1.2)) if p.id == "mug_1" else p for p in house.placements))
+    moved = scene.displacements(scene.compile_scene(lifted, HandCatalogue(), free=["mug_1"]))
+    assert moved["mug_1"] > 0.3
+
+
+def test_a_free_body_weighs_what_its_boxes_weigh(house):
+    s = scene.compile_scene(house, HandCatalogue(), free=["red_box_1"])
+    assert s.model.body("red_box_1").mass[0] == pytest.approx(0.5 * 0.5 * 0.8 * 500, rel=0.2)
+
+
+def test_unknown_free_things_are_refused(house):
+    with pytest.raises(ValueError, match="piano_1"):
+        scene.build_spec(house, HandCatalogue(), free=frozenset({"piano_1"}))
+
+
+def test_walls_stop_and_openings_let_through(compiled):
+    """A ball the size of the agent passes the door and not the wall (walls as boxes around openings)."""
+    m = compiled.model
+    data = mujoco.MjData(m)
+    mujoco.mj_forward(m, data)
+    boxes = [g for g in range(m.ngeom) if "/wall_" in m.geom(g).name and compiled.kind_of_geom[g] == "collision"]
+
+    def free_at(x: float, y: float, z: float) -> bool:
+        for g in boxes:
+            local = data.geom_xmat[g].reshape(3, 3).T @ (np.array([x, y, z]) - data.geom_xpos[g])
+            outside = np.maximum(np.abs(local) - m.geom_size[g], 0)
+            if np.linalg.norm(outside) < 0.2:
+                return False
+        return True
+
+    assert all(free_at(x, 1.05, 1.0) for x in np.linspace(4.0, 6.0, 41)), "through the door"
+    assert not free_at(5.0, 2.5, 1.0), "not through the wall"
+    assert not free_at(5.0, 1.05, 2.2), "not through the lintel"
+    assert not free_at(2.5, 0.0, 0.5) and not free_at(2.5, 0.0, 2.3), "not below or above the window"
+
+
+def test_a_table_keeps_its_underside_free_and_its_top_exact():
+    catalogue = HandCatalogue()
+    asset = catalogue.assets["hand/table"]
+    boxes = collision.object_boxes(asset, catalogue.mesh(asset.key, asset.size), asset.size)
+
+    def solid(x, y, z):
+        return any(all(abs(p - c) <= h for p, c, h in zip((x, y, z), b.centre, b.half, strict=True)) for b in boxes)
+
+    assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.75, abs=1e-3)
+    assert solid(0, 0, 0.74) and solid(0.5, 0.3, 0.74) and solid(0.55, 0.35, 0.3)
+    assert not solid(0, 0, 0.4) and not solid(0.3, 0.0, 0.2), "a chair can be pushed under it"
+
+
+def test_collision_boxes_leave_support_surfaces_free():
+    """Ornament above a declared surface is no obstacle for what stands on it."""
+    asset = Asset("t/shelf", "shelf", "shelf", (1.0, 0.4, 1.0), "floor",
+                  surfaces=(SupportSurface("shelf_1", 0.5, -0.5, -0.2, 0.5, 0.2, 0.4),))
+    parts = (box_mesh((-0.5, -0.2, 0), (0.5, 0.2, 0.5), (1, 1, 1, 1)), box_mesh((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6), (1, 1, 1, 1)))
+    boxes = collision.object_boxes(asset, parts, asset.size)
+    assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.5, abs=5e-3)
+
+
+def test_few_boxes_cover_a_complicated_thing():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0, 1, (3000, 3))
+    points = points[(np.linalg.norm(points - 0.5, axis=1) < 0.5) & (points[:, 0] + points[:, 1] > 0.6)]
+    for n in (4, 6):
+        boxes = collision.grid_boxes(points, n)
+        covered = np.zeros(len(points), bool)
+        for low, high in boxes:
+            covered |= np.all((points >= low - 1e-9) & (points <= high + 1e-9), axis=1)
+        assert covered.all()
+
+
+def test_lit_pages_replace_the_materials(house):
+    corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], np.float32)
+    mesh = LitMesh("rug_1", "object", "living_room_1", 0, corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+                   np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
+    pages = LitPages((mesh,), (np.full((8, 8, 3), 77, np.uint8),), "x")
+    s = scene.compile_scene(house, HandCatalogue(), collisions=False, lit=pages)
+    assert s.model.ngeom == 1 and s.owners[s.owner_of_geom[0] - 1] == "rug_1" and s.room_of_geom == ("living_room_1",)
+    with pytest.raises(ValueError, match="static"):
+        scene.build_spec(house, HandCatalogue(), free=frozenset({"mug_1"}), lit=pages)
+
+
+def test_a_missing_texture_says_how_to_get_it():
+    with pytest.raises(FileNotFoundError, match="embodied assets build"):
+        scene.load_texture("/nowhere/oak.png")
+
+
+def test_rooms_that_are_no_rectangles_have_floors_to_their_edges():
+    house = two_rooms()
+    room = dataclasses.replace(house.rooms[0], polygon=((0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)))
+    boxes = collision.floor_boxes(house, room)
+    area = sum(4 * b.half[0] * b.half[1] for b in boxes)
+    assert area == pytest.approx(12.0), "the L is covered once, the notch is not"
+
+
+def test_placements_outside_the_catalogue_are_named(house):
+    ghost = Placement("ghost_1", "hand/ghost", "ghost", "bedroom_1", (7.0, 2.0, 0.0), 0.0, (1.0, 1.0, 1.0))
+    with pytest.raises(KeyError, match="hand/ghost"):
+        scene.compile_scene(dataclasses.replace(house, placements=(ghost,)), HandCatalogue())
