@@ -30,7 +30,7 @@ CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
 MODEL_FIELDS = (
     "class", "name", "size", "support", "rooms", "synonyms", "on", "clearance", "tags", "elevation",
     "colours", "materials", "surfaces", "emits", "yaw", "creator", "licence", "lamp",
-    "glow", "two_sided", "flipped", "dropped", "faces",
+    "glow", "two_sided", "flipped", "dropped", "looks", "faces",
 )
 """What a line of catalogue.json may hold; the last row and `yaw` go into the importer's Recipe."""
 
@@ -166,7 +166,8 @@ def read_models(
 def _recipe(asset: Asset, row: Mapping) -> Recipe:
     lists = {name: tuple(row.get(name, ())) for name in ("two_sided", "flipped", "glow", "dropped")}
     return Recipe(
-        asset.key, asset.size, yaw=float(row.get("yaw", 0.0)), emits=asset.emits, faces=int(row.get("faces", 0)), **lists
+        asset.key, asset.size, yaw=float(row.get("yaw", 0.0)), emits=asset.emits, faces=int(row.get("faces", 0)),
+        looks=tuple(sorted(row.get("looks", {}).items())), **lists,
     )
 
 
@@ -190,6 +191,7 @@ def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -
         surfaces=tuple(SupportSurface(str(s[0]), *(float(v) for v in s[1:])) for s in row.get("surfaces", ())),
         tags=tuple(dict.fromkeys((*shared.get("tags", ()), *row.get("tags", ())))),
         emits=tuple(row["emits"]) if row.get("emits") else None,
+        lamp=tuple(row["lamp"]) if row.get("lamp") else None,
         pack=key.split("/")[0],
         creator=row.get("creator", ""),
         licence=row.get("licence", pack.get("licence", "")),

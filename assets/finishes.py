@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -55,3 +56,45 @@ def finish_of(material: Material, has_texture: bool) -> Finish:
         roughness = min(roughness, 0.4)
     return Finish((*(round(float(c), 4) for c in color), round(max(alpha, 0.1), 3)), roughness=round(roughness, 3),
                   metallic=metallic, specular=specular)
+
+
+LOOKS = {
+    "mirror": {"color": (0.9, 0.9, 0.9, 1.0), "roughness": 0.03, "metallic": 1.0, "mirror": True},
+    "glass": {"roughness": 0.05, "metallic": 0.0, "specular": 0.5},
+    "metal": {"roughness": 0.3, "metallic": 1.0},
+    "chrome": {"color": (0.8, 0.8, 0.8, 1.0), "roughness": 0.15, "metallic": 1.0},
+    "cloth": {"roughness": 0.95, "metallic": 0.0, "specular": 0.1},
+    "leather": {"roughness": 0.5, "metallic": 0.0},
+    "wood": {"roughness": 0.55, "metallic": 0.0},
+    "plastic": {"roughness": 0.4, "metallic": 0.0},
+    "ceramic": {"roughness": 0.15, "metallic": 0.0},
+    "paint": {"roughness": 0.45, "metallic": 0.0},
+    "matt": {"roughness": 0.9, "metallic": 0.0, "specular": 0.3},
+}
+"""Words by which a reviewer corrects a material in catalogue.json."""
+
+
+def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
+    """`finish` after a reviewer's words, and whether its texture stays.
+
+    Args:
+      look: words of LOOKS, '#rrggbb' (sRGB; drops the texture), 'alpha=0.3', in any order.
+
+    Raises:
+      ValueError: an unknown word.
+    """
+    keep = True
+    for word in look.split():
+        if word in LOOKS:
+            change = dict(LOOKS[word])
+            keep = keep and "color" not in change
+        elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
+            rgb = [int(word[i:i + 2], 16) / 255 for i in (1, 3, 5)]
+            change = {"color": (*(round(min(c, WHITEST), 4) for c in rgb), finish.color[3])}
+            keep = False
+        elif re.fullmatch(r"alpha=[0-9.]+", word):
+            change = {"color": (*finish.color[:3], float(word[6:]))}
+        else:
+            raise ValueError(f"unknown look {word!r}; use {sorted(LOOKS)}, '#rrggbb' or 'alpha=0.3'")
+        finish = dataclasses.replace(finish, **change)
+    return finish, keep

@@ -19,17 +19,17 @@ import numpy as np
 from PIL import Image
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
-from assets.finishes import finish_of
+from assets.finishes import corrected, finish_of
 from assets.meshing import crease_normals, decimate, indexed, sound_faces, weld
 from assets.obj import Material, MeshError, parse_mtl, parse_obj
 from assets.records import Finish, MeshPart
 from assets.sh3f import IDENTITY, Pack, PackError
 
-VERSION = 1
+VERSION = 3
 """Part of every cache key; raise it when the import changes."""
 MAX_TEXTURE = 512
 MAX_PIXELS = 64_000_000
-FACE_BUDGETS = ((0.3, 2_500), (0.8, 5_000), (30.0, 10_000))
+FACE_BUDGETS = ((0.3, 3_000), (0.8, 6_000), (30.0, 10_000))
 """Faces a model keeps, by its longest side in metres."""
 
 
@@ -52,6 +52,8 @@ class Recipe:
     emits: tuple[float, float, float] | None = None
     dropped: tuple[str, ...] = ()
     """Materials that are left out: shadows painted on the floor, helper planes."""
+    looks: tuple[tuple[str, str], ...] = ()
+    """Material and the reviewer's words for it (assets.finishes.corrected)."""
     faces: int = 0
     """Face budget; 0 takes FACE_BUDGETS."""
 
@@ -130,7 +132,7 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPar
     Raises:
       MeshError: nothing is left, or numbers are not finite.
     """
-    raw = tuple(p for p in raw if p.name not in recipe.dropped)
+    raw = tuple(_looking(p, dict(recipe.looks)) for p in raw if p.name not in recipe.dropped)
     if not raw:
         raise MeshError(f"{recipe.key} has no faces; the model is empty or damaged")
     placed = _placed(raw, recipe)
@@ -156,6 +158,13 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPar
             out.append(_part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe))
         out.append(_part(part, points, faces, uv, recipe))
     return _to_size(out, recipe.size)
+
+
+def _looking(part: RawPart, looks: dict[str, str]) -> RawPart:
+    if part.name not in looks:
+        return part
+    finish, keep = corrected(part.finish, looks[part.name])
+    return replace(part, finish=finish, image=part.image if keep else None, uv=part.uv if keep else None)
 
 
 def _placed(raw: tuple[RawPart, ...], recipe: Recipe) -> list[np.ndarray]:

@@ -9,6 +9,10 @@ from scipy.spatial import cKDTree
 CREASE = np.radians(42.0)
 """Faces that meet at less than this angle share a smooth normal."""
 
+WORKING_SIZE, AGGRESSIVENESS = 50.0, 5.0
+"""The simplifier's error thresholds are absolute, so parts are brought to this extent for it: at
+their size in metres it would take every collapse of a small thing for free."""
+
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(m, 3) normals, twice the area long."""
@@ -37,11 +41,14 @@ def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> np.ndarray:
-    """(m, 3, 3) unit normal of every corner: the angle-weighted mean over the faces around the
-    vertex that turn from the corner's own face by less than `crease`."""
+    """(m, 3, 3) unit normal of every corner: the mean, weighted by angle and area, over the faces
+    around the vertex that turn from the corner's own face by less than `crease`. The areas keep
+    large flat panels flat beside their small bevels."""
     unit = face_normals(vertices, faces)
-    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
-    weight = corner_angles(vertices, faces).reshape(-1)
+    area = np.linalg.norm(unit, axis=1, keepdims=True)
+    unit /= np.maximum(area, 1e-30)
+    weight = (corner_angles(vertices, faces) * area).reshape(-1)
+    weight /= max(float(weight.max(initial=0.0)), 1e-30)
     corner_vertex = faces.reshape(-1)
     corner_face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(corner_vertex, kind="stable")
@@ -57,7 +64,7 @@ def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREA
         contribution = unit[corner_face[other[smooth]], axis] * weight[other[smooth]]
         normal[:, axis] = np.bincount(mine[smooth], contribution, minlength=len(corner_vertex))
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.where(length > 1e-12, normal / np.maximum(length, 1e-12), unit[corner_face])
+    normal = np.where(length > 1e-15, normal / np.maximum(length, 1e-15), unit[corner_face])
     return normal.reshape(-1, 3, 3)
 
 
@@ -83,16 +90,59 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, tar
       vertices, faces and the corners' uv of the smaller mesh. Texture coordinates are read back
       from the nearest original triangle, so seams may lie anywhere.
     """
-    points, small = fast_simplification.simplify(
-        np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int32),
-        target_count=int(target), agg=5.0,
-    )
-    points, small = np.asarray(points, dtype=np.float64), np.asarray(small, dtype=np.int64)
+    points, small = _collapse(vertices, faces, np.empty((0, 3)), np.empty((0, 3), int), target, keep_rims=True)
+    if len(small) > 1.5 * target:
+        points, small = _collapse(vertices, faces, *border_fins(vertices, faces), target, keep_rims=False)
     keep = sound_faces(points, small) if len(small) else np.zeros(0, dtype=bool)
     small = small[keep]
     if not len(small) or not np.isfinite(points).all():
         return vertices, faces, uv
     return points, small, None if uv is None else project_uv(vertices, faces, uv, points, small)
+
+
+def _collapse(vertices, faces, fins, fin_faces, target: int, keep_rims: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Edge collapses down to about `target` faces, the fins left out of the result."""
+    extent = max(float(np.ptp(vertices[np.unique(faces)], axis=0).max()), 1e-9)
+    fenced = np.concatenate([vertices, fins]) * (WORKING_SIZE / extent)
+    fenced_faces = np.concatenate([faces, fin_faces]).astype(np.int32)
+    _, _, collapses = fast_simplification.simplify(
+        fenced, fenced_faces, target_count=round(target * len(fenced_faces) / len(faces)), agg=AGGRESSIVENESS,
+        return_collapses=True, preserve_border=keep_rims,
+    )
+    points, _, image = fast_simplification.replay_simplification(fenced, fenced_faces, collapses)
+    image = np.asarray(image, dtype=np.int64)[: len(vertices)]
+    points = np.asarray(points, dtype=np.float64) * (extent / WORKING_SIZE)
+    low, high = np.full(points.shape, np.inf), np.full(points.shape, -np.inf)
+    np.minimum.at(low, image, vertices)
+    np.maximum.at(high, image, vertices)
+    slack = 0.1 * (high - low)
+    met = np.isfinite(low).all(axis=1)
+    # Where the quadrics leave a direction free (cones, cylinders), the best point may lie far off.
+    points[met] = np.clip(points[met], (low - slack)[met], (high + slack)[met])
+    small = image[faces]
+    return points, small[(small != np.roll(small, 1, axis=1)).all(axis=1)]
+
+
+def border_fins(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a small wall along every open edge, to be appended to the mesh.
+
+    The simplifier feels no force against moving the rim of a flat sheet within its plane, and so
+    cuts its corners off; the wall's plane holds the rim in place.
+    """
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ordered = np.sort(edges, axis=1)
+    _, inverse, counts = np.unique(ordered, axis=0, return_inverse=True, return_counts=True)
+    rim = counts[inverse.reshape(-1)] == 1
+    a, b = edges[rim].T
+    normal = face_normals(vertices, faces)[np.repeat(np.arange(len(faces)), 3)[rim]]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    rise = normal * np.linalg.norm(vertices[a] - vertices[b], axis=1, keepdims=True)
+    n, k = len(vertices), len(a)
+    top_a, top_b = n + np.arange(k), n + k + np.arange(k)
+    return (
+        np.concatenate([vertices[a] + rise, vertices[b] + rise]),
+        np.concatenate([np.stack([b, a, top_a], axis=1), np.stack([b, top_a, top_b], axis=1)]),
+    )
 
 
 def project_uv(vertices, faces, uv, points, small) -> np.ndarray:
