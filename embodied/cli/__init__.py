@@ -11,7 +11,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "bench")
+COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "eval", "bench")
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
 

@@ -22,11 +22,11 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.house import House, HouseError
 from embodied.interface import Language
 from embodied.language.plain import PlainLanguage
-from embodied.navgraph import NavGraph, build_graph, to_matterport
+from embodied.navgraph import NavGraph, build_graph, from_matterport, to_matterport
 from embodied.people import add_people
 from embodied.records import save_lines
 from embodied.seeds import stream
-from embodied.world import open_world
+from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
@@ -69,6 +69,7 @@ class Unit:
         return f"{self.group}_{self.index:04d}"
 
 
+Watch = Callable[[Iterable[str], int], Iterable[str]]
 HouseMaker = Callable[[int, str, DatasetConfig, object], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
 
@@ -79,8 +80,8 @@ def units(wanted: Scale) -> tuple[Unit, ...]:
 
 def build_dataset(
     config: DatasetConfig, folder: Path, cache: Path, *, workers: int = 1, language: Language | None = None,
-    make_house: HouseMaker | None = None, watch: Callable[[Iterable[str], int], Iterable[str]] | None = None,
-    packs: tuple[Path, ...] = (),
+    make_house: HouseMaker | None = None, watch: Watch | None = None,
+    packs: tuple[Path, ...] = (), ray_address: str | None = None,
 ) -> Path:
     """Build what is missing of the data set in `folder` and write its index; returns the index.
 
@@ -88,6 +89,7 @@ def build_dataset(
 
     Args:
       watch: wraps the iterator over finished house names, with their number (a progress bar).
+      ray_address: run on a Ray cluster, which must see `folder` under the same path.
 
     Raises:
       ValueError: the folder holds another data set.
@@ -97,12 +99,45 @@ def build_dataset(
     _claim(folder, config)
     work = units(wanted)
     arguments = (config, folder, Path(cache), language or PlainLanguage(), make_house or make_dataset_house, packs)
-    jobs = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
-        joblib.delayed(build_unit)(u, *arguments) for u in work
-    )
-    for _ in watch(jobs, len(work)) if watch else jobs:
-        pass
+    for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
     return write_index(config, folder)
+
+
+def draw_panoramas(
+    config: DatasetConfig, folder: Path, cache: Path, *, quality: str, size: int, workers: int = 1,
+    watch: Watch | None = None, packs: tuple[Path, ...] = (), ray_address: str | None = None,
+) -> None:
+    """Draw the panoramas of all houses into their folders, unless they are there."""
+    arguments = (Path(folder), Path(cache), quality, size, packs)
+    work = units(scale(config.scale, config.kind))
+    for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+
+
+def draw_unit(unit: Unit, folder: Path, cache: Path, quality: str, size: int, packs: tuple[Path, ...]) -> str:
+    """The panoramas of one house, from its saved files; returns its name."""
+    home = folder / "houses" / unit.name
+    house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
+    catalogue = load_catalogue(cache, packs)
+    with World(house, catalogue, graph, cache, size=size, quality=quality, file=home / "panoramas.pano") as world:
+        world.render_all()
+    return unit.name
+
+
+def for_each_unit(
+    job: Callable[..., str], work: tuple[Unit, ...], arguments: tuple, *,
+    workers: int, watch: Watch | None, ray_address: str | None,
+) -> None:
+    """Run job(unit, *arguments) for every unit, on this machine's processes or on a Ray cluster."""
+    if ray_address is not None:
+        from embodied.datasets.cluster import run_on_ray  # an optional extra
+
+        done = run_on_ray(job, work, arguments, ray_address)
+    else:
+        done = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+            joblib.delayed(job)(u, *arguments) for u in work
+        )
+    for _ in watch(done, len(work)) if watch else done:
+        pass
 
 
 def build_unit(

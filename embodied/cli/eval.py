@@ -1,0 +1,58 @@
+"""Judge agents that do not learn on a split of a data set, as in Table 4.3 of the dissertation.
+
+Prints the table with 95 % confidence intervals and writes it as Markdown, CSV and JSON, beside
+the episodes, to --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from embodied.cli.common import add_json, show
+from embodied.datasets.scale import KINDS
+
+COLUMNS = {
+    "hanna": ("success", "spl", "navigation error", "requests"),
+    "vnla": ("success", "oracle success", "navigation error", "path length", "requests"),
+    "hari": ("success", "navigation error", "requests", "steps"),
+}
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("kind", choices=KINDS, help="kind of task")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset` built")
+    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
+    parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
+    parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
+    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write the table and the episodes")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    import json
+
+    from embodied import tables
+    from embodied.cli import UserError
+    from embodied.datasets.store import Dataset
+    from embodied.evaluate import AGENTS, agent, evaluate
+    from embodied.records import save_lines
+
+    data = Dataset(args.data)
+    if data.kind != args.kind:
+        raise UserError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
+    names = args.agent or list(AGENTS[args.kind])
+    rows = []
+    for split in args.split:
+        def keep(name, episodes, split=split):
+            if args.out:
+                save_lines(args.out / f"episodes_{split}_{name.replace(' ', '_').replace(',', '')}.jsonl", episodes)
+
+        agents = {name: agent(args.kind, name) for name in names}
+        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep)
+    if args.out:
+        tables.save(rows, args.out, "table")
+    columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))
+    show(args, {"data": data.digest, "rows": json.loads(tables.as_json(rows))}, tables.markdown(rows, columns))
+    return 0

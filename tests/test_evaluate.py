@@ -1,0 +1,69 @@
+"""Tables of agents: intervals by hand, the rows of all agents, and the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from test_datasets import build
+
+from embodied import tables
+from embodied.cli import main
+from embodied.evaluate import AGENTS, agent, evaluate, spread
+
+
+def test_the_interval_of_independent_values_is_the_textbook_one():
+    e = tables.estimate([0, 0, 1, 1], ["a"] * 4)
+    assert e.mean == 0.5 and e.half == pytest.approx(1.96 * math.sqrt(1 / 3) / 2)
+
+
+def test_houses_that_agree_within_themselves_widen_the_interval():
+    together = tables.estimate([0, 0, 1, 1], ["a", "a", "b", "b"])
+    mixed = tables.estimate([0, 1, 0, 1], ["a", "a", "b", "b"])
+    assert together.half == pytest.approx(1.96 * math.sqrt(2 * 1 / 16 * 2)) and mixed.half == 0
+
+
+def test_missing_values_do_not_count():
+    e = tables.estimate([1.0, float("nan")], ["a", "b"])
+    assert (e.mean, e.n) == (1.0, 1)
+    assert tables.shown("success", tables.estimate([float("nan")], ["a"])) == "–"
+
+
+def test_ratios_are_sums_over_sums():
+    r = tables.ratio([(1, 2), (0, 8)], ["a", "b"])
+    assert r.mean == pytest.approx(0.1) and r.n == 10 and r.half > 0
+
+
+def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
+    tasks = build(tmp_path / "d", tmp_path / "c").tasks("train")
+    some = spread(tasks, 6)
+    assert sorted(t.world for t in some) == ["train_0000"] * 3 + ["train_0001"] * 3
+
+
+@pytest.mark.parametrize("kind", ["hanna", "vnla", "hari", "vln"])
+def test_the_rows_come_out_as_they_should(kind, tmp_path):
+    data = build(tmp_path / "d", tmp_path / "c", kind)
+    split = "test_unseen_env" if kind == "hari" else "test_unseen"
+    rows = {r.agent: r.values for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
+    assert rows["shortest"]["success"].mean == 1
+    assert rows["random walk"]["success"].mean < 0.5
+    if kind == "hanna":
+        assert rows["shortest"]["spl"].mean == pytest.approx(1)
+        assert rows["ask every 5"]["requests"].mean > rows["no ask"]["requests"].mean == 0
+    with pytest.raises(ValueError, match="unknown agent"):
+        agent(kind, "nobody")
+
+
+def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
+    data = build(tmp_path / "d", tmp_path / "c")
+    out = tmp_path / "out"
+    assert main(["eval", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "| shortest | test_unseen | 100.0 ± 0.0 | 100.0 ± 0.0 | 0.00 ± 0.00 |" in printed
+    assert (out / "table.md").read_text().startswith("| agent | split | success (%)")
+    assert {r["agent"] for r in json.loads((out / "table.json").read_text())} == {"shortest", "random walk"}
+    assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 9
+    assert (out / "episodes_test_unseen_random_walk.jsonl").exists()
+    assert main(["eval", "vnla", "--data", str(data.folder)]) == 2
+    assert "data set of 'hanna'" in capsys.readouterr().err
