@@ -162,6 +162,10 @@ class House:
     inner_wall: float = 0.12
     outer_wall: float = 0.32
     """Wall thicknesses, metres."""
+    style: str = "light"
+    """The palette and taste of its furnishing: one of embodied.generate.finishes.STYLES."""
+    disorder: float = 0.4
+    """0 is tidy, 1 is thoroughly lived in."""
 
     @functools.cached_property
     def digest(self) -> str:

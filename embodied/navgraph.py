@@ -107,36 +107,55 @@ def walkable(house: House, storey: int = 0) -> shapely.Geometry:
 
 def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list[str], list[tuple[int, int]]]:
     space = walkable(house, storey)
-    rooms = [r for r in house.rooms if r.storey == storey]
-    space = _reachable_part(space, rooms)
     shapely.prepare(space)
+    rooms = [r for r in house.rooms if r.storey == storey]
     grid = _Grid(space)
-    room_of_cell = np.full(len(grid.xy), -1)
+    room_of_cell = _rooms_of_cells(grid, rooms)
+    reach = _largest_reach(grid, room_of_cell)
     for k, r in enumerate(rooms):
-        polygon = shapely.Polygon(r.polygon)
-        shapely.prepare(polygon)
-        room_of_cell[shapely.contains_xy(polygon, grid.xy[:, 0], grid.xy[:, 1])] = k
-    nodes = _spread(grid, room_of_cell, len(rooms), spacing)
-    nodes = _join(house, storey, space, grid, nodes, spacing)
-    xy = grid.xy[nodes]
-    pairs = _pruned(xy, _visible_pairs(space, xy, LONGEST * spacing))
-    polygons = [shapely.Polygon(r.polygon) for r in rooms]
-    names = [rooms[int(np.argmin([p.distance(shapely.Point(q)) for p in polygons]))].id for q in xy]
-    return xy.tolist(), names, pairs
-
-
-def _reachable_part(space: shapely.Geometry, rooms) -> shapely.Polygon:
-    """The connected part of the free space that enters every room."""
-    parts = sorted(getattr(space, "geoms", [space]), key=lambda g: -g.area)
-    inner = [shapely.Polygon(r.polygon).buffer(-0.25, join_style="mitre") for r in rooms]
-    best = max(parts, key=lambda g: sum(g.intersects(p) for p in inner), default=None)
-    if best is None:
-        raise HouseError("the house has no free floor at all; remove furniture")
-    for r, p in zip(rooms, inner):
-        if not best.intersects(p):
+        if not (room_of_cell[reach] == k).any():
             raise HouseError(f"room {r.id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
                              "widen its door or move the furniture that blocks it")
-    return best
+    room_of_cell[~reach] = -1
+    nodes = _spread(grid, room_of_cell, len(rooms), spacing)
+    nodes = _join(house, storey, space, grid, reach, nodes, spacing)
+    xy = grid.xy[nodes]
+    pairs = _pruned(xy, _visible_pairs(space, xy, LONGEST * spacing))
+    return xy.tolist(), [rooms[room_of_cell[n]].id for n in nodes], pairs
+
+
+def unreachable_rooms(house: House) -> tuple[str, ...]:
+    """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey."""
+    found = []
+    for storey in range(len(house.storeys)):
+        space = walkable(house, storey)
+        shapely.prepare(space)
+        rooms = [r for r in house.rooms if r.storey == storey]
+        grid = _Grid(space)
+        room_of_cell = _rooms_of_cells(grid, rooms)
+        reach = _largest_reach(grid, room_of_cell)
+        found += [r.id for k, r in enumerate(rooms) if not (room_of_cell[reach] == k).any()]
+    return tuple(found)
+
+
+def _rooms_of_cells(grid: _Grid, rooms) -> np.ndarray:
+    """(n,) index of the room each cell lies in; cells inside a wall's doorway belong to the nearest room."""
+    room_of_cell = np.full(len(grid.xy), -1)
+    for k, r in enumerate(rooms):
+        polygon = shapely.Polygon(r.polygon).buffer(1e-6)
+        shapely.prepare(polygon)
+        room_of_cell[shapely.contains_xy(polygon, grid.xy[:, 0], grid.xy[:, 1])] = k
+    return room_of_cell
+
+
+def _largest_reach(grid: _Grid, room_of_cell: np.ndarray) -> np.ndarray:
+    """(n,) bool: the connected cells that enter the most rooms."""
+    if len(grid.xy) == 0:
+        raise HouseError("the house has no free floor at all; remove furniture")
+    label = connected_components(grid.matrix, directed=False)[1]
+    pairs = np.unique(np.stack([label, room_of_cell], axis=1)[room_of_cell >= 0], axis=0)
+    best = np.argmax(np.bincount(pairs[:, 0], minlength=label.max() + 1) + 1e-9 * np.bincount(label))
+    return label == best
 
 
 class _Grid:
@@ -154,9 +173,10 @@ class _Grid:
         self.xy = np.round(np.stack([gx[self.inside], gy[self.inside]], axis=1), 4)
         padded = np.pad(self.inside, 1)
         self.clearance = (distance_transform_edt(padded)[1:-1, 1:-1] * CELL)[self.inside]
+        self.matrix = self._matrix(space)
 
-    def matrix(self) -> csr_matrix:
-        """Sparse 8-neighbour graph of the cells, dearer near obstacles."""
+    def _matrix(self, space) -> csr_matrix:
+        """Sparse 8-neighbour graph of the cells, dearer near obstacles; steps out of `space` are left out."""
         rows, cols, costs = [], [], []
         for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
             a = self.index[: self.index.shape[0] - dx, max(0, -dy): self.index.shape[1] - max(0, dy)]
@@ -166,6 +186,10 @@ class _Grid:
             rows.append(i)
             cols.append(j)
             near = np.minimum(self.clearance[i], self.clearance[j])
+            tight = np.flatnonzero(near < 1.5 * CELL)
+            fine = np.ones(len(i), bool)
+            fine[tight] = shapely.covers(space, shapely.linestrings(np.stack([self.xy[i[tight]], self.xy[j[tight]]], 1)))
+            rows[-1], cols[-1], near = i[fine], j[fine], near[fine]
             costs.append(CELL * np.hypot(dx, dy) * (1.0 + 0.6 * np.exp(-near / 0.2)))
         n = len(self.xy)
         return csr_matrix((np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
@@ -227,10 +251,11 @@ def _pruned(xy: np.ndarray, pairs: np.ndarray) -> list[tuple[int, int]]:
     return sorted(kept)
 
 
-def _join(house: House, storey: int, space, grid: _Grid, nodes: list[int], spacing: float) -> list[int]:
+def _join(house: House, storey: int, space, grid: _Grid, reach: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
     """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
     ids = {r.id for r in house.rooms if r.storey == storey}
-    tree = cKDTree(grid.xy)
+    cells = np.flatnonzero(reach)
+    tree = cKDTree(grid.xy[cells])
     longest = LONGEST * spacing
     for o in house.openings:
         if o.kind not in DOORS or o.rooms[1] is None or o.rooms[0] not in ids:
@@ -242,20 +267,18 @@ def _join(house: House, storey: int, space, grid: _Grid, nodes: list[int], spaci
         gap, cell = tree.query((np.asarray(o.a) + np.asarray(o.b)) / 2)
         if gap > 0.2:
             continue
-        cell = int(cell)
+        cell = int(cells[cell])
         close = np.flatnonzero(np.hypot(*(xy - grid.xy[cell]).T) < longest)
         seen = close[shapely.covers(space, shapely.linestrings([(grid.xy[cell], xy[k]) for k in close]))] if (
             len(close)) else close
         if len(np.unique(label[seen])) > 1:
             nodes = [*nodes, cell]
-    matrix = None
     for _ in range(len(nodes)):
         xy = grid.xy[nodes]
         label = _components(space, xy, longest)
         if label.max() == 0:
             return nodes
-        matrix = grid.matrix() if matrix is None else matrix
-        nodes = [*nodes, *_bridge(space, grid, matrix, nodes, label, spacing)]
+        nodes = [*nodes, *_bridge(space, grid, nodes, label, spacing)]
     raise HouseError("viewpoints could not be connected although the floor is; this is a defect of build_graph")
 
 
@@ -264,13 +287,13 @@ def _components(space, xy: np.ndarray, longest: float) -> np.ndarray:
     return connected_components(csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(xy), len(xy))), directed=False)[1]
 
 
-def _bridge(space, grid: _Grid, matrix: csr_matrix, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
+def _bridge(space, grid: _Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
     """New cells along the cheapest way from the smallest component to the nearest other node."""
     sizes = np.bincount(label)
     small = int(np.argmin(sizes))
     inside = [n for n, k in zip(nodes, label) if k == small]
     others = np.array([n for n, k in zip(nodes, label) if k != small])
-    cost, before, _ = dijkstra(matrix, directed=False, indices=inside, min_only=True, return_predecessors=True)
+    cost, before, _ = dijkstra(grid.matrix, directed=False, indices=inside, min_only=True, return_predecessors=True)
     way = [int(others[np.argmin(cost[others])])]
     while way[-1] not in inside:
         way.append(int(before[way[-1]]))

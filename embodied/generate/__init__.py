@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from embodied.generate.config import HouseConfig
-from embodied.generate.finishes import Palette, draw_palette
+from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.layout import Plan, draw_plan, turned
 from embodied.generate.openings import draw_openings
@@ -80,6 +80,9 @@ def openings(draft: Draft) -> Draft:
     """The bare house: rooms with ids, doors and windows."""
     rng = stream(draft.seed, "house", "openings")
     palette = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette"))
+    disorder = draft.config.disorder
+    if disorder is None:
+        disorder = round(float(stream(draft.seed, "house", "disorder").beta(1.6, 2.2)), 3)
     counts: dict[str, int] = {}
     names = []
     for c in draft.plan.cells:
@@ -92,21 +95,20 @@ def openings(draft: Draft) -> Draft:
     made = []
     for c, name in zip(draft.plan.cells, names):
         x0, y0, x1, y1 = (v / 10 for v in c.rect)
-        made.append(Room(name, c.kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), PLAIN_FLOOR, PLAIN_WALL, PLAIN_WALL,
-                         PLAIN_WALL))
+        made.append(Room(name, c.kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), palette.floor, palette.walls[0],
+                         palette.ceiling, palette.skirting))
     doors = draw_openings(draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height,
                           open_plan, rng=rng)
-    house = House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), ())
+    house = House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), (),
+                  style=palette.style, disorder=disorder)
     return dataclasses.replace(draft, palette=palette, house=house)
-
-
-PLAIN_FLOOR, PLAIN_WALL = "oak_planks/0", "paint_white/0"
 
 
 def finishes(draft: Draft) -> Draft:
     """What every room wears, and the weather outside."""
     sky = draw_sky(draft.config, stream(draft.seed, "house", "sky"))
-    return dataclasses.replace(draft, house=dataclasses.replace(draft.house, sky=sky))
+    house = dressed(draft.house, draft.palette, rng=stream(draft.seed, "house", "finishes"))
+    return dataclasses.replace(draft, house=dataclasses.replace(house, sky=sky))
 
 
 def draw_sky(config: HouseConfig, rng) -> Sky:

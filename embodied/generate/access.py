@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from embodied.generate.kinds import BEDROOMS
 from embodied.generate.modules import Cell
-from embodied.generate.program import BEDROOMS
 
 Wall = tuple[str, int, int, int]
 """A shared wall: the axis it runs along, its coordinate across, and its interval, decimetres."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from embodied.generate.finishes import STYLES
 from embodied.house import HouseError
 
 SHAPES = ("rectangle", "L", "T", "U")
@@ -49,6 +50,8 @@ class HouseConfig:
             raise HouseError(f"hour should lie in [0, 24), got {self.hour}")
         if self.weather not in (None, "clear", "hazy", "overcast"):
             raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
+        if self.style is not None and self.style not in STYLES:
+            raise HouseError(f"style should be one of {tuple(STYLES)}, got {self.style!r}")
         if self.shape not in (None, *SHAPES):
             raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
         if self.storeys != 1:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.generate.footprint import Rect, Strip
-from embodied.generate.program import BEDROOMS, SIZES, Space
+from embodied.generate.kinds import BEDROOMS, SIZES
+from embodied.generate.program import Space
 
 FILLERS = {"kitchen": "pantry", **{k: "closet" for k in (*BEDROOMS, "hall", "study", "laundry_room")}}
 """What a leftover niche beside such a room becomes."""

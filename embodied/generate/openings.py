@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.generate.access import Wall, outer_stretches, walls_between
+from embodied.generate.kinds import BEDROOMS
 from embodied.generate.layout import Plan
 from embodied.generate.modules import Cell
-from embodied.generate.program import BEDROOMS
 from embodied.house import Opening, rounded
 
 NIB = 0.16

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from embodied.generate.access import Wall
+from embodied.generate.kinds import BEDROOMS, SIZES
 from embodied.generate.modules import Cell
-from embodied.generate.program import BEDROOMS, SIZES
 
 DAYLIT = (*BEDROOMS, "living_room", "dining_room", "kitchen", "family_room", "study", "library", "playroom", "sun_room",
           "gym", "workshop")

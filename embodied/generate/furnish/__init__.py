@@ -34,7 +34,7 @@ def furnish(draft: House, catalogue, *, seed: int) -> House:
       catalogue: assets.catalogue.Catalogue; only its records are used, never a mesh.
       seed: the same seed gives the same furniture.
     """
-    style = house_style(rng=stream(seed, "furnish", "style"))
+    style = house_style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
     stock = Stock(catalogue, style)
     kinds = tuple(sorted({r.kind for r in draft.rooms}))
     rooms: list[tuple[str, list[Thing]]] = []

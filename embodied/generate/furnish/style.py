@@ -40,11 +40,11 @@ STYLES = (
 )
 
 
-def house_style(*, rng: np.random.Generator) -> Style:
-    """A taste for one house."""
-    base = STYLES[int(rng.integers(len(STYLES)))]
+def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Style:
+    """The taste of a house whose palette is called `name`."""
+    base = next((s for s in STYLES if s.name == name), STYLES[0])
     return Style(
-        base.name, base.favours, base.shuns, base.fabric, float(rng.uniform(0.15, 0.95)),
+        base.name, base.favours, base.shuns, base.fabric, float(1.0 - disorder),
         float(rng.uniform(0.2, 1.0)), int(rng.integers(1 << 30)),
     )
 
