@@ -1,1 +1,25 @@
-"""Things built in code: furniture and small objects that the asset packs lack."""
+"""Things built in code: furniture and small objects that the asset packs lack.
+
+MAKERS holds them by key, 'built/<name>'; `MAKERS[key].make(size, params, finish)` gives the meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from assets.built.kitchen import kitchen_makers
+from assets.built.maker import Maker
+
+__all__ = ["MAKERS", "Maker"]
+
+
+def _all() -> Mapping[str, Maker]:
+    made = [*kitchen_makers()]
+    keys = [m.asset.key for m in made]
+    assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)
+    return MappingProxyType({m.asset.key: m for m in sorted(made, key=lambda m: m.asset.key)})
+
+
+MAKERS: Mapping[str, Maker] = _all()
+"""Every maker by key, keys sorted."""

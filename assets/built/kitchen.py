@@ -1,0 +1,441 @@
+"""Kitchen units that belong together: base, drawers, sink, cooker, wall and tall cabinets, island, hood."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from assets.built.maker import (
+    BLACK,
+    CHROME,
+    GLASS,
+    STEEL,
+    WHITE,
+    FinishOf,
+    Look,
+    Maker,
+    carcass,
+    front,
+    handle,
+    maker,
+    material,
+    metal,
+    parts_of,
+    plain,
+    surface,
+)
+from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube
+from assets.records import MeshPart
+
+TOP = 0.038
+"""Thickness of the worktop, metres."""
+PLINTH = (0.10, 0.06)
+"""Height of the plinth and how far it stands back, metres."""
+
+SETS = (
+    ("white", "white", ("white",), "lacquer_white/0", "oak_worktop/0", "flat", "bar", "steel"),
+    ("oak", "oak", ("brown", "white"), "oak/0", "quartz/0", "flat", "bar", "black"),
+    ("sage", "sage green", ("green",), "lacquer_sage_green/0", "marble/0", "shaker", "knob", "brass"),
+    ("navy", "navy blue", ("blue",), "lacquer_navy_blue/0", "oak_worktop/0", "shaker", "cup", "brass"),
+    ("grey", "grey", ("grey",), "lacquer_grey/0", "granite/0", "flat", "bar", "steel"),
+    ("cream", "cream", ("cream", "beige"), "lacquer_cream/0", "beech_worktop/0", "shaker", "knob", "steel"),
+    ("anthracite", "anthracite", ("black", "grey"), "lacquer_anthracite/0", "quartz/1", "flat", "bar", "black"),
+)
+
+
+def _base(
+    size, look: Look, finish: FinishOf, doors: list[Shape], grips: list[Shape], top: list[Shape] | None, extra=()
+) -> list[MeshPart]:
+    w, d, h = size
+    body = carcass(-w / 2, w / 2, -d / 2 + 0.022, d / 2, PLINTH[0], h - TOP)
+    plinth = box([-w / 2, -d / 2 + 0.022 + PLINTH[1], 0], [w / 2, -d / 2 + 0.04 + PLINTH[1], PLINTH[0]])
+    worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)] if top is None else top
+    return parts_of(
+        (WHITE, body),
+        (BLACK, plinth),
+        (material(look, "front", finish, "lacquer_white/0"), doors),
+        (metal(look, finish), grips),
+        (material(look, "worktop", finish, "oak_worktop/0"), worktop),
+        *extra,
+    )
+
+
+def base(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Doors, or drawers where look['drawers'] > 0, under a worktop."""
+    w, d, h = size
+    y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
+    drawers, style, grip = int(look.get("drawers", 0)), str(look.get("style", "flat")), str(look.get("handle", "bar"))
+    columns = max(1, round(w / 0.6))
+    edges = np.linspace(-w / 2, w / 2, columns + 1)
+    doors, grips = [], []
+    for a, b in itertools.pairwise(edges):
+        if drawers:
+            rows = np.cumsum([0.0, *([0.24] if drawers == 3 else []), *([0.38] * 2)])
+            rows = rows / rows[-1]
+            for r0, r1 in itertools.pairwise(rows):
+                zt, zb = z1 - r0 * (z1 - z0), z1 - r1 * (z1 - z0)
+                doors.append(front(a, b, zb, zt, y, style))
+                grips.append(handle((a + b) / 2, zt - 0.05, y, grip, False, min(0.2, (b - a) * 0.4)))
+        else:
+            doors.append(front(a, b, z0, z1, y, style))
+            left = (b + a) / 2 > 0 or columns == 1
+            grips.append(handle(a + 0.04 if left else b - 0.04, z1 - 0.12, y, _on_door(grip), True))
+    return _base(size, look, finish, doors, grips, None)
+
+
+def corner(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A blind corner unit: one door, one fixed filler."""
+    w, d, h = size
+    y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
+    style = str(look.get("style", "flat"))
+    doors = [front(-w / 2, 0, z0, z1, y, style), box([0.0, y, z0], [w / 2, y + 0.02, z1], 0.001)]
+    grips = [handle(-0.05, z1 - 0.12, y, _on_door(str(look.get("handle", "bar"))), True)]
+    return _base(size, look, finish, doors, grips, None)
+
+
+def sink(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A base unit with a steel basin let into the worktop, and a mixer tap behind it."""
+    w, d, h = size
+    tap_rise = 0.30
+    h = h - tap_rise
+    y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
+    bw, bd, deep = min(0.50, w - 0.12), 0.38, 0.17
+    by = -0.03
+    lo, hi = np.array([-bw / 2, by - bd / 2]), np.array([bw / 2, by + bd / 2])
+    worktop = [
+        box([-w / 2, -d / 2, h - TOP], [lo[0], d / 2, h], 0.0),
+        box([hi[0], -d / 2, h - TOP], [w / 2, d / 2, h], 0.0),
+        box([lo[0], -d / 2, h - TOP], [hi[0], lo[1], h], 0.0),
+        box([lo[0], hi[1], h - TOP], [hi[0], d / 2, h], 0.0),
+    ]
+    rim = [
+        box([lo[0] - 0.012, lo[1] - 0.012, h], [lo[0] + 0.006, hi[1] + 0.012, h + 0.004], 0.0015),
+        box([hi[0] - 0.006, lo[1] - 0.012, h], [hi[0] + 0.012, hi[1] + 0.012, h + 0.004], 0.0015),
+        box([lo[0], lo[1] - 0.012, h], [hi[0], lo[1] + 0.006, h + 0.004], 0.0015),
+        box([lo[0], hi[1] - 0.006, h], [hi[0], hi[1] + 0.012, h + 0.004], 0.0015),
+    ]
+    (x0, y0), (x1, y1), t = lo, hi, 0.03
+    f0, f1 = np.array([x0 + t, y0 + t]), np.array([x1 - t, y1 - t])
+    top = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+    low = [(f0[0], f0[1]), (f1[0], f0[1]), (f1[0], f1[1]), (f0[0], f1[1])]
+    zb = h - deep
+    walls = [[(*top[k], h), (*top[(k + 1) % 4], h), (*low[(k + 1) % 4], zb), (*low[k], zb)] for k in range(4)]
+    basin = quads(np.array([*[q[::-1] for q in walls], [(*p, zb) for p in low]])[:, ::1])
+    basin = _facing_up(basin)
+    drain = moved(cylinder(0.035, 0, 0.003, 0.001, 14), 0, by, zb)
+    ty = hi[1] + 0.045
+    t = np.linspace(0, np.pi, 10)
+    neck = np.concatenate(
+        [
+            [(0, ty, h)],
+            [(0, ty, h + 0.17)],
+            np.stack([0 * t, ty - 0.085 + 0.085 * np.cos(t), h + 0.20 + 0.085 * np.sin(t)], 1),
+            [(0, ty - 0.17, h + 0.15)],
+        ]
+    )
+    tap = [
+        tube(neck, 0.012, 10),
+        moved(cylinder(0.025, 0, 0.02, 0.004, 14), 0, ty, h),
+        tube([(0.012, ty, h + 0.06), (0.05, ty, h + 0.075), (0.085, ty - 0.01, h + 0.10)], 0.007, 8),
+    ]
+    style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
+    pair = w > 0.7
+    edges = [-w / 2, 0, w / 2] if pair else [-w / 2, w / 2]
+    doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges)]
+    grips = [handle(x, z1 - 0.12, y, _on_door(grip), True) for x in ((-0.05, 0.05) if pair else (w / 2 - 0.045,))]
+    return _base((w, d, h), look, finish, doors, grips, worktop, ((STEEL, [*rim, basin, drain]), (CHROME, tap)))
+
+
+def _facing_up(shape: Shape) -> Shape:
+    """A basin's inner faces turned towards its open top."""
+    corners = shape.vertices.reshape(-1, 4, 3)
+    middle = corners.reshape(-1, 3).mean(0) + [0, 0, 0.05]
+    done = []
+    for q in corners:
+        n = np.cross(q[2] - q[0], q[3] - q[1])
+        done.append(q if n @ (middle - q.mean(0)) > 0 else q[::-1])
+    return quads(np.array(done))
+
+
+def cooker(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Built-in oven with a glass door under a ceramic hob in the worktop."""
+    w, d, h = size
+    y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
+    panel, drawer = 0.11, 0.12
+    ow = min(w, 0.6)
+    sides = (
+        []
+        if w - ow < 0.01
+        else [box([-w / 2, y, z0], [-ow / 2, y + 0.02, z1], 0.001), box([ow / 2, y, z0], [w / 2, y + 0.02, z1], 0.001)]
+    )
+    kick = front(-ow / 2, ow / 2, z0, z0 + drawer, y, "flat")
+    steel = [box([-ow / 2 + 0.002, y, z1 - panel], [ow / 2 - 0.002, y + 0.02, z1], 0.002)]
+    glass = [box([-ow / 2 + 0.002, y, z0 + drawer + 0.003], [ow / 2 - 0.002, y + 0.02, z1 - panel - 0.003], 0.003)]
+    hob = [box([-ow / 2 + 0.01, -0.26, h], [ow / 2 - 0.01, 0.25, h + 0.006], 0.002)]
+    rings = [
+        moved(lathe([(r - 0.0025, 0), (r, 0), (r, 0.0006), (r - 0.0025, 0.0006)], 28), x, yy, h + 0.0058)
+        for x, yy, r in ((-0.14, -0.11, 0.09), (0.14, -0.11, 0.07), (-0.14, 0.12, 0.07), (0.14, 0.12, 0.105))
+    ]
+    knobs = [moved(_knob(), x, y, z1 - panel / 2) for x in (-0.22, -0.13, 0.13, 0.22)]
+    display = [box([-0.06, y - 0.0015, z1 - 0.075], [0.06, y + 0.002, z1 - 0.035])]
+    grip = handle(0, z1 - panel - 0.045, y - 0.004, "bar", False, ow * 0.72)
+    extra = (
+        (STEEL, [*steel, grip, *knobs]),
+        (plain((0.03, 0.03, 0.035), 0.08), [*glass, *hob, *display]),
+        (plain((0.35, 0.35, 0.36), 0.3), rings),
+    )
+    worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)]
+    return _base(size, look, finish, [*sides, kick], [], worktop, extra)
+
+
+def _knob() -> Shape:
+    t = lathe([(0, 0), (0.021, 0), (0.021, 0.004), (0.017, 0.006), (0.0155, 0.024), (0.012, 0.026), (0, 0.026)], 16)
+    m = t.vertices[:, [0, 2, 1]] * [1, -1, 1]
+    n = t.normals[:, [0, 2, 1]] * [1, -1, 1]
+    return Shape(m, t.faces, n, t.uv)
+
+
+def wall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Doors on a box; glazed where look['glazed'] is 1."""
+    w, d, h = size
+    y = -d / 2 + 0.002
+    style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
+    columns = max(1, round(w / 0.5))
+    edges = np.linspace(-w / 2, w / 2, columns + 1)
+    doors, grips, panes, inside = [], [], [], []
+    for k, (a, b) in enumerate(itertools.pairwise(edges)):
+        if look.get("glazed"):
+            r = 0.05
+            doors += [
+                box([a + 0.0015, y, 0.0015], [a + r, y + 0.02, h - 0.0015], 0.0015),
+                box([b - r, y, 0.0015], [b - 0.0015, y + 0.02, h - 0.0015], 0.0015),
+                box([a + r, y, h - r], [b - r, y + 0.02, h - 0.0015], 0.0015),
+                box([a + r, y, 0.0015], [b - r, y + 0.02, r], 0.0015),
+            ]
+            panes.append(
+                quads(
+                    [[(a + r, y + 0.01, r), (b - r, y + 0.01, r), (b - r, y + 0.01, h - r), (a + r, y + 0.01, h - r)]]
+                )
+            )
+        else:
+            doors.append(front(a, b, 0, h, y, style))
+        left = columns > 1 and k % 2 == 1
+        grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, _on_door(grip), True))
+    if look.get("glazed"):
+        inside = [
+            box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018])
+            for z in np.linspace(0, h, 4)[1:-1]
+        ]
+    return parts_of(
+        (WHITE, [carcass(-w / 2, w / 2, y + 0.02, d / 2, 0, h), *inside]),
+        (material(look, "front", finish, "lacquer_white/0"), doors),
+        (metal(look, finish), grips),
+        (GLASS, panes),
+    )
+
+
+def tall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Larder unit: a tall door over a short one."""
+    w, d, h = size
+    y = -d / 2 + 0.002
+    style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
+    cut = PLINTH[0] + 0.72
+    columns = max(1, round(w / 0.6))
+    edges = np.linspace(-w / 2, w / 2, columns + 1)
+    doors = [
+        front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in ((PLINTH[0], cut), (cut, h))
+    ]
+    grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
+    side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
+    return parts_of((material(look, "front", finish, "lacquer_white/0"), [*doors, side]), (metal(look, finish), grips))
+
+
+def island(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Cabinets on one side, a panelled back, a thick overhanging top for stools."""
+    w, d, h = size
+    bw, back = w - 0.06, d / 2 - min(0.28, d * 0.3)
+    y, z0, z1 = -d / 2 + 0.03, PLINTH[0], h - 0.045
+    style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
+    columns = max(2, round(bw / 0.55))
+    edges = np.linspace(-bw / 2, bw / 2, columns + 1)
+    doors, grips = [], []
+    for k, (a, b) in enumerate(itertools.pairwise(edges)):
+        if k % 2:
+            doors.append(front(a, b, z0, z1, y, style))
+            grips.append(handle(a + 0.04, z1 - 0.12, y, _on_door(grip), True))
+        else:
+            for q0, q1 in ((0, 0.4), (0.4, 0.75), (0.75, 1)):
+                doors.append(front(a, b, z0 + q0 * (z1 - z0), z0 + q1 * (z1 - z0), y, style))
+                grips.append(handle((a + b) / 2, z0 + q1 * (z1 - z0) - 0.04, y, grip, False))
+    body = box([-bw / 2, y + 0.02, z0], [bw / 2, back, z1], 0.002)
+    plinth = box([-bw / 2 + 0.03, y + 0.07, 0], [bw / 2 - 0.03, back - 0.03, z0])
+    top = box([-w / 2, -d / 2, z1], [w / 2, d / 2, h], 0.004)
+    return parts_of(
+        (material(look, "front", finish, "lacquer_white/0"), [*doors, body]),
+        (BLACK, plinth),
+        (metal(look, finish), grips),
+        (material(look, "worktop", finish, "oak_worktop/0"), top),
+    )
+
+
+def hood(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Chimney hood: a flat canopy, a slope, a shaft up the wall."""
+    w, d, h = size
+    rim, slope = 0.05, min(0.16, h * 0.3)
+    sw, sd = min(0.30, w * 0.5), min(0.26, d * 0.55)
+    low = [(-w / 2, -d / 2), (w / 2, -d / 2), (w / 2, d / 2), (-w / 2, d / 2)]
+    high = [(-sw / 2, d / 2 - sd), (sw / 2, d / 2 - sd), (sw / 2, d / 2), (-sw / 2, d / 2)]
+    sides = [
+        [(*low[k], rim), (*low[(k + 1) % 4], rim), (*high[(k + 1) % 4], rim + slope), (*high[k], rim + slope)]
+        for k in range(4)
+    ]
+    shaft = box([-sw / 2, d / 2 - sd, rim + slope], [sw / 2, d / 2, h], 0.002)
+    filters = [
+        box([-w / 2 + 0.05, -d / 2 + 0.06, -0.001], [-0.01, d / 2 - 0.06, 0.004]),
+        box([0.01, -d / 2 + 0.06, -0.001], [w / 2 - 0.05, d / 2 - 0.06, 0.004]),
+    ]
+    lamps = [moved(cylinder(0.025, -0.002, 0.003, 0.0, 12), x, -d / 2 + 0.035, 0) for x in (-w * 0.25, w * 0.25)]
+    return parts_of(
+        (metal(look, finish), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), quads(np.array(sides)), shaft]),
+        (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
+        (plain((0.95, 0.93, 0.88), 0.3, 0.0, (8.0, 7.0, 5.6)), lamps),
+    )
+
+
+def kitchen_makers() -> list[Maker]:
+    made = []
+    kitchen = {"kitchen": 1.0}
+    for name, word, colours, fronts, top, style, grip, metal_name in SETS:
+        look = {"front": fronts, "worktop": top, "style": style, "handle": grip, "metal": metal_name}
+        tags = (f"line_built_{name}",)
+        words = {"colours": colours, "materials": ("wood",), "tags": tags, "look": look}
+        stand = {"support": "against_wall", "rooms": kitchen, "clearance": 0.9, **words}
+        made += [
+            maker(
+                f"base_cabinet_{name}",
+                "base cabinet",
+                f"{word} base cabinet",
+                (0.6, 0.6, 0.9),
+                base,
+                surfaces=(surface("top", 0.9, 0.6, 0.6),),
+                synonyms=("counter", "kitchen cabinet"),
+                **stand,
+            ),
+            maker(
+                f"drawer_cabinet_{name}",
+                "drawer cabinet",
+                f"{word} kitchen drawers",
+                (0.6, 0.6, 0.9),
+                base,
+                surfaces=(surface("top", 0.9, 0.6, 0.6),),
+                synonyms=("counter",),
+                **{**stand, "look": {**look, "drawers": 3}},
+            ),
+            maker(
+                f"kitchen_sink_{name}",
+                "kitchen sink",
+                f"{word} sink unit",
+                (0.6, 0.6, 1.2),
+                sink,
+                synonyms=("sink",),
+                **stand,
+            ),
+            maker(
+                f"cooker_{name}",
+                "cooker",
+                f"{word} cooker with hob",
+                (0.6, 0.6, 0.908),
+                cooker,
+                synonyms=("stove", "oven"),
+                **stand,
+            ),
+            maker(
+                f"corner_base_{name}",
+                "corner base cabinet",
+                f"{word} corner cabinet",
+                (0.9, 0.6, 0.9),
+                corner,
+                surfaces=(surface("top", 0.9, 0.9, 0.6),),
+                **stand,
+            ),
+            maker(
+                f"wall_cabinet_{name}",
+                "wall cabinet",
+                f"{word} wall cabinet",
+                (0.6, 0.35, 0.7),
+                wall_cabinet,
+                support="wall",
+                elevation=1.45,
+                rooms=kitchen,
+                synonyms=("kitchen cabinet",),
+                **words,
+            ),
+            maker(
+                f"tall_cabinet_{name}", "tall cabinet", f"{word} larder cabinet", (0.6, 0.6, 2.1), tall_cabinet, **stand
+            ),
+            maker(
+                f"island_{name}",
+                "kitchen island",
+                f"{word} kitchen island",
+                (1.8, 0.95, 0.92),
+                island,
+                surfaces=(surface("top", 0.92, 1.8, 0.95),),
+                support="floor",
+                rooms=kitchen,
+                clearance=0.9,
+                **words,
+            ),
+        ]
+        if style == "shaker":
+            made.append(
+                maker(
+                    f"glass_cabinet_{name}",
+                    "glass-door cabinet",
+                    f"{word} glass-door cabinet",
+                    (0.6, 0.35, 0.7),
+                    wall_cabinet,
+                    support="wall",
+                    elevation=1.45,
+                    rooms=kitchen,
+                    **{**words, "look": {**look, "glazed": 1.0}},
+                )
+            )
+    made.append(
+        maker(
+            "range_hood",
+            "range hood",
+            "steel chimney hood",
+            (0.6, 0.48, 0.75),
+            hood,
+            support="wall",
+            elevation=1.55,
+            rooms=kitchen,
+            synonyms=("cooker hood", "extractor"),
+            colours=("silver",),
+            materials=("steel",),
+            tags=tuple(f"line_built_{s[0]}" for s in SETS),
+        )
+    )
+    made.append(
+        maker(
+            "range_hood_black",
+            "range hood",
+            "black chimney hood",
+            (0.9, 0.48, 0.75),
+            hood,
+            support="wall",
+            elevation=1.55,
+            rooms=kitchen,
+            synonyms=("cooker hood", "extractor"),
+            colours=("black",),
+            materials=("steel",),
+            look={"metal": "black"},
+        )
+    )
+    return made
+
+
+def _on_door(style: str) -> str:
+    """Cups belong on drawers; the doors beside them have knobs."""
+    return "knob" if style == "cup" else style

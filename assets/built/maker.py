@@ -1,0 +1,223 @@
+"""Maker: an asset that code builds, and the helpers that all makers share."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, tube, turned
+from assets.records import Asset, Finish, MeshPart, SupportSurface
+
+FinishOf = Callable[[str], Finish]
+Look = Mapping[str, str | float]
+Build = Callable[..., list[MeshPart]]
+"""build(size, look, finish, rng=...): parts in the asset's frame, base at z = 0, front along -y."""
+
+WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
+PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)
+BLACK = Finish(color=(0.045, 0.045, 0.05, 1.0), roughness=0.4)
+GLASS = Finish(color=(0.88, 0.93, 0.92, 0.16), roughness=0.03)
+MIRROR = Finish(color=(0.82, 0.84, 0.84, 1.0), roughness=0.02, metallic=1.0, mirror=True)
+CHROME = Finish(color=(0.83, 0.83, 0.84, 1.0), roughness=0.09, metallic=1.0)
+STEEL = Finish(color=(0.70, 0.70, 0.69, 1.0), roughness=0.3, metallic=1.0)
+BRASS = Finish(color=(0.78, 0.62, 0.35, 1.0), roughness=0.25, metallic=1.0)
+PAPER = Finish(color=(0.90, 0.885, 0.84, 1.0), roughness=0.9, specular=0.2)
+SOIL = Finish(color=(0.13, 0.09, 0.065, 1.0), roughness=1.0, specular=0.1)
+BULB = (16.0, 13.4, 10.2)
+"""Linear radiance of a bare warm bulb."""
+SHADE = (5.0, 4.0, 2.9)
+"""Linear radiance of a lit fabric shade."""
+METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "white": WHITE}
+
+
+@dataclass(frozen=True, eq=False)
+class Maker:
+    asset: Asset
+    """What it makes when nobody asks for anything else."""
+    make: Callable[[tuple[float, float, float], tuple[tuple[str, str | float], ...], FinishOf], tuple[MeshPart, ...]]
+    """make(size, params, finish): parts whose bounding box is exactly `size`."""
+
+
+def maker(
+    key: str,
+    object_class: str,
+    name: str,
+    size: tuple[float, float, float],
+    build: Build,
+    *,
+    support: str = "surface",
+    rooms: Mapping[str, float] | None = None,
+    on: tuple[str, ...] = (),
+    synonyms: tuple[str, ...] = (),
+    colours: tuple[str, ...] = (),
+    materials: tuple[str, ...] = (),
+    surfaces: tuple[SupportSurface, ...] = (),
+    tags: tuple[str, ...] = (),
+    elevation: float = 0.0,
+    clearance: float = 0.0,
+    emits: tuple[float, float, float] | None = None,
+    look: Look | None = None,
+) -> Maker:
+    """A maker under 'built/<key>'; `look` are the build's arguments where the params name no others."""
+    asset = Asset(
+        f"built/{key}",
+        object_class,
+        name,
+        size,
+        support,
+        dict(rooms or {}),
+        synonyms,
+        colours,
+        materials,
+        on,
+        elevation,
+        clearance,
+        surfaces,
+        tags,
+        emits,
+        "built",
+        "",
+        "Apache-2.0",
+    )
+    return Maker(asset, functools.partial(_run, asset.key, build, dict(look or {})))
+
+
+def _run(key: str, build: Build, defaults: dict, size, params, finish: FinishOf) -> tuple[MeshPart, ...]:
+    look = {**defaults, **dict(params)}
+    if min(size) <= 0:
+        raise ValueError(f"{key} cannot be made {size} m large; all three lengths must be positive")
+    text = f"{key}|{look.get('seed', 0)}"
+    words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
+    rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
+    return fitted(build(tuple(float(s) for s in size), look, finish, rng=rng), size)
+
+
+def plain(color, roughness: float = 0.5, metallic: float = 0.0, emission=None, specular: float = 0.5) -> Finish:
+    """A finish of one colour (sRGB)."""
+    return Finish(color=(*color, 1.0), roughness=roughness, metallic=metallic, emission=emission, specular=specular)
+
+
+def tinted(finish: Finish, emission) -> Finish:
+    """The same finish, glowing."""
+    return Finish(
+        finish.color,
+        finish.texture,
+        finish.normal_map,
+        finish.roughness_map,
+        finish.roughness,
+        finish.metallic,
+        finish.specular,
+        emission,
+        finish.mirror,
+        finish.tile,
+    )
+
+
+def metal(look: Look, finish: FinishOf, default: str = "steel") -> Finish:
+    """The metal that look['metal'] names: one of METALS or a material key."""
+    name = str(look.get("metal", default))
+    return METALS[name] if name in METALS else finish(name)
+
+
+def material(look: Look, name: str, finish: FinishOf, default: str) -> Finish:
+    """The finish of the material key in look[name]."""
+    return finish(str(look.get(name, default)))
+
+
+def whole_image(
+    shape: Shape, finish: Finish, x0: float, x1: float, z0: float, z1: float, axes: str = "xz", keep_aspect: bool = True
+) -> Shape:
+    """uv such that one copy of the finish's picture lies over x0..x1, z0..z1 (cropped to its shape)."""
+    tile = finish.tile or 1.0
+    w, h = x1 - x0, z1 - z0
+    fill = (1.0, 1.0) if not keep_aspect else (min(1.0, w / h), min(1.0, h / w))
+    i, j = "xyz".index(axes[0]), "xyz".index(axes[1])
+    u = 0.5 + ((shape.vertices[:, i] - x0) / w - 0.5) * fill[0]
+    v = 0.5 + ((shape.vertices[:, j] - z0) / h - 0.5) * fill[1]
+    return Shape(shape.vertices, shape.faces, shape.normals, np.stack([u, v], 1) * tile)
+
+
+def surface(
+    name: str,
+    z: float,
+    width: float,
+    depth: float,
+    headroom: float = 9.0,
+    margin: float = 0.02,
+    x: float = 0.0,
+    y: float = 0.0,
+) -> SupportSurface:
+    """A support surface centred at (x, y), `margin` inside the given width and depth."""
+    w, d = width / 2 - margin, depth / 2 - margin
+    return SupportSurface(name, z, x - w, y - d, x + w, y + d, headroom)
+
+
+# ------------------------------------------------------------------ cabinet work
+
+
+def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "flat", thick: float = 0.02) -> Shape:
+    """A door or drawer front whose face is at y: 'flat' or 'shaker' (frame and sunk panel)."""
+    g = 0.0015
+    x0, x1, z0, z1 = x0 + g, x1 - g, z0 + g, z1 - g
+    rail = min(0.06, (x1 - x0) * 0.28, (z1 - z0) * 0.3)
+    if style != "shaker" or z1 - z0 < 0.13:
+        return box([x0, y, z0], [x1, y + thick, z1], 0.0018)
+    return joined(
+        box([x0, y, z0], [x0 + rail, y + thick, z1], 0.0015),
+        box([x1 - rail, y, z0], [x1, y + thick, z1], 0.0015),
+        box([x0 + rail, y, z1 - rail], [x1 - rail, y + thick, z1], 0.0015),
+        box([x0 + rail, y, z0], [x1 - rail, y + thick, z0 + rail], 0.0015),
+        box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + thick, z1 - rail + 0.002]),
+    )
+
+
+def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:
+    """A handle on a front at y: 'bar', 'knob' or 'cup'."""
+    if style == "knob":
+        knob = lathe(
+            [(0, 0), (0.006, 0), (0.0055, 0.012), (0.014, 0.018), (0.015, 0.024), (0.011, 0.029), (0, 0.03)], 12
+        )
+        return moved(turned(knob, np.pi / 2, "x"), x, y, z)
+    if style == "cup":
+        t = np.linspace(0, np.pi, 9)
+        half = np.stack([np.cos(t) * 0.045, 0 * t, np.sin(t) * 0.02], 1)
+        return moved(tube(half + [0, -0.012, -0.008], 0.007, 6), x, y, z)
+    h = length / 2
+    a = (
+        [(0, 0, -h), (0, -0.028, -h), (0, -0.028, h), (0, 0, h)]
+        if upright
+        else [(-h, 0, 0), (-h, -0.028, 0), (h, -0.028, 0), (h, 0, 0)]
+    )
+    ends = [tube(np.array(p) + [x, y, z], 0.0042, 6) for p in (a[:2], a[2:])]
+    lift = np.array([0, 0, 0.014]) if upright else np.array([0.014, 0, 0])
+    grip = tube(np.array([np.array(a[1]) - lift, np.array(a[2]) + lift]) + [x, y, z], 0.0055, 8)
+    return joined(*ends, grip)
+
+
+def carcass(
+    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, board: float = 0.018, back: bool = True
+) -> Shape:
+    """Open-fronted box: two sides, bottom, top, back."""
+    shapes = [
+        box([x0, y0, z0], [x0 + board, y1, z1], 0.001),
+        box([x1 - board, y0, z0], [x1, y1, z1], 0.001),
+        box([x0 + board, y0, z0], [x1 - board, y1, z0 + board], 0.001),
+        box([x0 + board, y0, z1 - board], [x1 - board, y1, z1], 0.001),
+    ]
+    if back:
+        shapes.append(box([x0 + board, y1 - 0.006, z0 + board], [x1 - board, y1, z1 - board]))
+    return joined(*shapes)
+
+
+def parts_of(*pairs: tuple[Finish, list[Shape] | Shape]) -> list[MeshPart]:
+    """One MeshPart per (finish, shapes), leaving out empty ones."""
+    made = []
+    for f, shapes in pairs:
+        shapes = [shapes] if isinstance(shapes, Shape) else list(shapes)
+        if shapes:
+            made.append(part(f, *shapes))
+    return made
