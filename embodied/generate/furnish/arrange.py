@@ -97,6 +97,11 @@ class Thing:
         return self.x + c * u - s * v, self.y + s * u + c * v
 
 
+def same_box(p: Box, q: Box) -> bool:
+    """Whether two boxes are the box of one thing."""
+    return abs(p.x - q.x) < 1e-9 and abs(p.y - q.y) < 1e-9 and p.bottom == q.bottom and p.top == q.top
+
+
 def is_flat(size: tuple[float, float, float], z: float = 0.0) -> bool:
     """Whether a thing on the floor is a rug or mat that furniture may stand on."""
     return size[2] <= 0.03 and z < 0.01
@@ -170,20 +175,18 @@ def _put(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> lis
         if plan is None:
             return None
     space.add(solids, zones, plan)
-    return _keep_resting(space, items, things, solids)
+    return _keep_resting(space, items, things)
 
 
-def _keep_resting(space: RoomSpace, items, things, own: Sequence[Box]) -> list[Thing]:
-    """The things that found a place, less those on a surface that would touch something of another group."""
+def _keep_resting(space: RoomSpace, items, things) -> list[Thing]:
+    """The things that found a place, less those on a surface that would touch more than what carries them."""
     kept = []
     for item, thing in zip(items, things):
         if thing is None:
             continue
         if item.on is not None:
-            b = thing.box
-            if any(overlap(b, q) and not any(q is o for o in own) for q in space.solids) or b.top > (
-                space.bottom + space.height
-            ):
+            b, carrier = thing.box, thing.parent.box
+            if any(overlap(b, q) and not same_box(q, carrier) for q in space.solids) or not space.inside(b):
                 continue
             space.add([b])
         kept.append(thing)

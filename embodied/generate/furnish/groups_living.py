@@ -31,7 +31,8 @@ def seating(ctx: Context) -> list[Thing] | None:
         return None
     screen = None
     if heart is None and stand.size[2] < 1.0:
-        screen = ctx.pick("television", most=(max(stand.size[0] - 0.05, 0.6), 0.5, 1.2))
+        fits = (max(stand.size[0] - 0.05, 0.6), 0.5, 1.2)
+        screen = ctx.pick("television", least=(0.7, 0, 0), most=fits) or ctx.pick("television", most=fits)
     for rich in (2, 1, 0):
         for sofa in (ctx.pick("sofa", least=(1.5, 0, 0)), ctx.pick("sofa", most=(1.95, 1.0, 1.2))):
             if sofa is None:
@@ -202,7 +203,8 @@ def dining(ctx: Context, table_role: str = "dining table", chair_role: str = "di
     """A table with chairs in pairs around it, tucked in and a little askew."""
     for limit in sorted({most, 1.75, 1.45, 1.15, 0.85} & {m for m in (most, 1.75, 1.45, 1.15, 0.85) if m <= most},
                         reverse=True):
-        table = ctx.pick(table_role, most=(limit, 1.25, 0.95), avoid=())
+        table = ctx.pick(table_role, least=(min(0.7 * limit, 1.4), 0, 0.6), most=(limit, 1.25, 0.95), avoid=()) or ctx.pick(
+            table_role, most=(limit, 1.25, 0.95), avoid=())
         chair = ctx.pick(chair_role, most=(0.62, 0.72, 1.25))
         if table is None or chair is None:
             continue

@@ -145,9 +145,15 @@ def bedroom_chair(ctx: Context) -> list[Thing] | None:
 
 def clothes(ctx: Context) -> list[Thing] | None:
     """A rack, wardrobe or shelves of a walk-in closet."""
-    role = ("wardrobe", "clothes rack", "shelving unit", "dresser")[int(ctx.rng.integers(4))]
-    asset = ctx.pick(role, most=(2.2, 0.7, ctx.space.height - 0.05), avoid=())
-    return ctx.against_wall(asset, "clothes", clear=0.5, corner=0.6, window=-2.0, tries=30)
+    roles = ("wardrobe", "clothes rack", "shelving unit", "dresser")
+    for k in ctx.rng.permutation(len(roles)):
+        for widest in (2.2, 1.05):
+            asset = ctx.pick(roles[int(k)], most=(widest, 0.7, ctx.space.height - 0.05), avoid=())
+            found = ctx.against_wall(
+                asset, "clothes", clear=0.45, corner=0.6, window=-2.0, role="storage", tries=36)
+            if found:
+                return found
+    return None
 
 
 def cot(ctx: Context) -> list[Thing] | None:

@@ -79,17 +79,21 @@ def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list
     return runs
 
 
-def kitchen_line(ctx: Context) -> list[Thing] | None:
-    """One run of units with sink, cooker and fridge, wall cabinets above; a second run in large kitchens."""
+def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
+    """One run of units with sink, cooker and fridge, wall cabinets above; a second run in large kitchens.
+
+    Args:
+      fridge: whether the kitchen still needs one.
+    """
     kits = kitchen_sets(ctx)
     for clear, spare in ((0.6, 1), (0.5, 0), (0.35, 0)):
-        for with_fridge in (True, False):
+        for with_fridge in ((True, False) if fridge else (False,)):
             for kit in kits:
                 for wall, a, b in _best_runs(ctx, kit):
                     found = _run(ctx, kit, wall, a, b, with_fridge, clear, spare)
                     if found is None:
                         continue
-                    if not with_fridge:
+                    if fridge and not with_fridge:
                         lone_fridge(ctx)
                     _second_run(ctx, kit, wall, found)
                     return found
@@ -340,7 +344,7 @@ def toilet(ctx: Context) -> list[Thing] | None:
 
 def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
     """A basin or vanity, with a mirror above it where it has none of its own."""
-    limits = [(1.0, 0.6, 0.55), (0.62, 0.5, 0.55), (0.62, 0.5, 0.4), (0.62, 0.45, 0.25)]
+    limits = [(1.0, 0.6, 0.55), (0.62, 0.5, 0.55), (0.62, 0.5, 0.4), (0.62, 0.48, 0.25)]
     if ctx.space.area > 5:
         limits = [(1.95, 0.75, 0.6), (1.1, 0.75, 0.6), *limits]
     for width, depth, free in limits:
@@ -382,7 +386,8 @@ def bathing(ctx: Context, role: str) -> list[Thing] | None:
             return None
         w, d, h = asset.size
         mat = ctx.pick("bath mat")
-        items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, clear=0.5, role=asset.object_class)]
+        items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, clear=0.5 if ctx.attempt < 2 else 0.3,
+                      role=asset.object_class)]
         if mat is not None:
             items.append(Item(mat, 0.0, -d - 0.08 - mat.size[1] / 2, optional=True, role="bath mat"))
 

@@ -30,12 +30,14 @@ def desk(ctx: Context) -> list[Thing] | None:
         w, d = asset.size[:2]
         items = [
             Item(asset, 0.0, -d / 2, role="desk"),
-            Item(chair, wobble(ctx.rng, 5), -d - chair.size[1] / 2 + 0.12, math.pi + wobble(ctx.rng, 25), under=(0,),
+            Item(chair, wobble(ctx.rng, 5), -d - chair.size[1] / 2 + 0.07, math.pi + wobble(ctx.rng, 25), under=(0,),
                  clear=-0.2, role="desk chair"),
         ]
         computer = ctx.pick("laptop") if ctx.chance(0.75) else ctx.pick("computer", most=(0.6, 0.5, 0.6))
         if computer is not None:
-            items.append(Item(computer, 0.0, -0.02, wobble(ctx.rng, 5), on=0, role="computer"))
+            back = min(d / 2 - computer.size[1] / 2 - 0.04, 0.08)
+            items.append(Item(computer, 0.0, max(back, computer.size[1] / 2 + 0.13 - d / 2), wobble(ctx.rng, 5), on=0,
+                              role="computer"))
         lamp = ctx.pick("desk lamp")
         if lamp is not None:
             sign = 1 if ctx.chance(0.5) else -1

@@ -64,7 +64,9 @@ def dining_room(ctx: Context) -> None:
 
 def kitchen(ctx: Context) -> None:
     area = ctx.space.area
-    wet.kitchen_line(ctx)
+    if ctx.attempt >= 1:
+        wet.lone_fridge(ctx)
+    wet.kitchen_line(ctx, fridge=ctx.attempt < 1)
     if not ctx.roles("fridge"):
         wet.lone_fridge(ctx)
     if area > 13 and ctx.chance(0.6):
@@ -84,13 +86,15 @@ def kitchen(ctx: Context) -> None:
 
 def bedroom(ctx: Context) -> None:
     area = ctx.space.area
+    if ctx.attempt >= 2:
+        sleep.wardrobe(ctx)
     if ctx.kind == "main_bedroom" or (area > 10.5 and ctx.chance(0.6)) or ctx.kind == "guest_room":
         sleep.double_bed(ctx) or sleep.single_bed(ctx)
     else:
         sleep.single_bed(ctx) or sleep.double_bed(ctx)
     if not ctx.roles("bed"):
         sleep.single_bed(ctx, "child bed")
-    if not ("closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)):
+    if not ctx.roles("wardrobe") and not (not ctx.attempt and "closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)):
         sleep.wardrobe(ctx)
     if area > 17 and ctx.chance(0.5):
         sleep.wardrobe(ctx)
@@ -146,9 +150,13 @@ def kids_room(ctx: Context) -> None:
 def bathroom(ctx: Context) -> None:
     area = ctx.space.area
     first = "bathtub" if area > 4.6 and ctx.chance(0.7 - 0.25 * ctx.attempt) else "shower"
-    done = wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
+    vanity = "double vanity" if area > 9 and ctx.chance(0.5) else "wash place" if ctx.attempt < 2 else "small basin"
+    done = None
+    if ctx.attempt < 2:
+        done = wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
     wet.toilet(ctx)
-    wet.basin(ctx, "double vanity" if area > 9 and ctx.chance(0.5) else "wash place")
+    wet.basin(ctx, vanity)
+    done = done or wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
     if done and area > 6.5 and first == "bathtub":
         wet.bathing(ctx, "shower")
     if area > 7.5 and ctx.chance(0.3):
@@ -261,13 +269,13 @@ def pantry(ctx: Context) -> None:
 
 
 def closet(ctx: Context) -> None:
-    for _ in range(2 + int(ctx.space.area > 4) + int(ctx.space.area > 6)):
+    for _ in range(3 + int(ctx.space.area > 4) + int(ctx.space.area > 6)):
         sleep.clothes(ctx)
     if ctx.space.area > 4 and ctx.chance(0.6):
         work.in_the_open(ctx, "bench", clear=0.3)
-    for _ in range(int(ctx.rng.integers(1, 4))):
+    for _ in range(int(ctx.rng.integers(2, 5))):
         work.corner_thing(ctx, "shoes")
-    if ctx.chance(0.5):
+    if ctx.chance(0.6):
         work.corner_thing(ctx, "suitcase")
     if ctx.chance(0.4):
         work.corner_thing(ctx, "laundry basket")

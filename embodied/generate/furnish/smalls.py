@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from assets.records import Asset, SupportSurface
-from embodied.generate.furnish.arrange import Thing
+from embodied.generate.furnish.arrange import Thing, same_box
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.looks import looks
 from embodied.generate.furnish.recipes import CLUTTER, MOST_ALIKE, RECIPES
@@ -77,7 +77,7 @@ class Tops:
             own = box(x, y, w, d, parent.yaw + yaw, z, z + h)
             support = parent.box
             if not ctx.space.inside(own) or any(
-                overlap(own, q) and not _same(q, support) for q in ctx.space.solids
+                overlap(own, q) and not same_box(q, support) for q in ctx.space.solids
             ):
                 continue
             thing = Thing(asset, x, y, z, parent.yaw + yaw, (w, d, h), looks(ctx, asset), parent, surface.name,
@@ -92,10 +92,6 @@ class Tops:
 
     def allows(self, asset: Asset) -> bool:
         return self.alike[asset.object_class] < MOST_ALIKE.get(asset.object_class, 2)
-
-
-def _same(p, q) -> bool:
-    return abs(p.x - q.x) < 1e-9 and abs(p.y - q.y) < 1e-9 and p.bottom == q.bottom and p.top == q.top
 
 
 def _reach(size: tuple[float, float, float], yaw: float) -> tuple[float, float]:
@@ -196,7 +192,7 @@ def _put_exactly(tops: Tops, asset: Asset, parent: Thing, top: SupportSurface, a
     z = parent.z + top.z * parent.size[2] / parent.asset.size[2]
     thing = Thing(asset, x, y, z, parent.yaw + turn, asset.size, looks(tops.ctx, asset), parent, top.name,
                   parent.group, "small", None)
-    if any(overlap(thing.box, q) and not _same(q, parent.box) for q in tops.ctx.space.solids):
+    if any(overlap(thing.box, q) and not same_box(q, parent.box) for q in tops.ctx.space.solids):
         return
     taken.append((u - a, v - b, u + a, v + b))
     tops.ctx.space.add([thing.box])

@@ -225,8 +225,8 @@ class RoomSpace:
         return np.rint((points - self.origin) / CELL).astype(np.int32)
 
     def _cell(self, point: tuple[float, float]) -> tuple[int, int]:
-        row = int(round((point[1] - self.origin[1]) / CELL))
-        column = int(round((point[0] - self.origin[0]) / CELL))
+        row = round((point[1] - self.origin[1]) / CELL)
+        column = round((point[0] - self.origin[0]) / CELL)
         rows, columns = self.walk.shape
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
 
@@ -246,7 +246,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
     floor = shapely.orient_polygons(floor)
     openings = tuple(o for o in house.openings if room.id in o.rooms)
     walls = _walls(floor, openings, house.inner_wall)
-    radius = 0.3 if floor.area > 4.0 else 0.2
+    radius = 0.3 if floor.area > 6.5 else 0.25 if floor.area > 4.0 else 0.2
     keepouts: list[Box] = []
     entries: list[tuple[float, float]] = []
     for wall in walls:

@@ -12,6 +12,11 @@ from assets.records import Asset
 from embodied.generate.furnish.roles import ROLES
 from embodied.generate.furnish.style import Style, liking
 
+CHILDREN = ("kids_room", "playroom", None)
+"""Room kinds where anything made for children may stand."""
+CHILDISH = ("high chair", "stroller", "kick scooter", "tricycle", "bicycle")
+"""Things for children that are kept elsewhere too."""
+
 
 @dataclass
 class Stock:
@@ -51,6 +56,8 @@ class Stock:
             a for a in self.of_role(role)
             if all(lo <= s <= hi for lo, s, hi in zip(least, a.size, most)) and (where is None or where(a))
         ]
+        if kind not in CHILDREN:
+            fit = [a for a in fit if "child" not in a.tags or role in CHILDISH] or (fit if role in CHILDISH else [])
         fit = [a for a in fit if a.key not in avoid] or fit
         if not fit:
             return None

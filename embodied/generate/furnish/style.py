@@ -41,11 +41,11 @@ STYLES = (
 
 
 def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Style:
-    """The taste of a house whose palette is called `name`."""
+    """The taste called `name` (House.style), drawn up for one house of that disorder."""
     base = next((s for s in STYLES if s.name == name), STYLES[0])
     return Style(
-        base.name, base.favours, base.shuns, base.fabric, float(1.0 - disorder),
-        float(rng.uniform(0.2, 1.0)), int(rng.integers(1 << 30)),
+        base.name, base.favours, base.shuns, base.fabric, 1.0 - disorder, float(rng.uniform(0.2, 1.0)),
+        int(rng.integers(1 << 30)),
     )
 
 
