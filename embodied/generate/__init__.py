@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from embodied.generate.config import HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
-from embodied.generate.layout import Plan, draw_plan, turned
+from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
 from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
 from embodied.house import House, HouseError, Room, Sky, Storey, check
@@ -71,7 +71,7 @@ def rooms(draft: Draft) -> Draft:
             spaces = draw_program(draft.area, draft.config, rng=rng)
         plan = draw_plan(footprints, spaces, TRIES, rng=rng)
         if plan is not None:
-            return dataclasses.replace(draft, plan=turned(plan, rng=rng), spaces=spaces)
+            return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
     raise HouseError(f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
                      f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms")
 

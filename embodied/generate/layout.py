@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,8 @@ ZONE = {
 """How private a room kind is: 0 at the public end of the spine."""
 
 
+LONG = 95
+"""Corridors longer than this, decimetres, are divided."""
 KEPT = 6
 """Candidates kept as parents."""
 
@@ -100,6 +103,33 @@ def _realised(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome, f
         return None
     linked = connect(cells, walls)
     return None if linked is None else Plan(tuple(cells), tuple(linked[0]), value - linked[1])
+
+
+def with_short_corridors(plan: Plan) -> Plan:
+    """The plan with corridors beyond LONG cut in two or three by a cased opening, where every door keeps its place."""
+    cells = list(plan.cells)
+    for i, c in enumerate(plan.cells):
+        x0, y0, x1, y1 = c.rect
+        along = max(x1 - x0, y1 - y0)
+        if c.kind != "corridor" or along <= LONG:
+            continue
+        pieces = math.ceil(along / LONG)
+        flat = x1 - x0 > y1 - y0
+        walls = [w for pair, w in walls_between(cells).items() if i in pair and w[0] == ("x" if flat else "y")]
+        low = x0 if flat else y0
+        cuts = [low]
+        for k in range(1, pieces):
+            ideal = low + along * k / pieces
+            options = [at for at in range(int(ideal) - 12, int(ideal) + 13)
+                       if all(at - a >= 13 or b - at >= 13 for _, _, a, b in walls if a < at < b)]
+            if options:
+                cuts.append(min(options, key=lambda at: abs(at - ideal)))
+        edges = [*cuts, low + along]
+        parts = [(a, y0, b, y1) if flat else (x0, a, x1, b) for a, b in itertools.pairwise(edges)]
+        cells[i] = replace(c, rect=parts[0], area=0.0)
+        cells += [replace(c, rect=r, area=0.0) for r in parts[1:]]
+    linked = connect(cells, walls_between(cells))
+    return plan if linked is None else Plan(tuple(cells), tuple(linked[0]), plan.score)
 
 
 def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:

@@ -15,7 +15,7 @@ from embodied.house import Opening, rounded
 
 NIB = 0.16
 """From a wall's centre-line corner to the jamb: half an inner wall and 0.1 m, metres."""
-DOOR = {"bathroom": 0.8, "toilet": 0.7, "closet": 0.7, "pantry": 0.7, "laundry_room": 0.8}
+DOOR = {"bathroom": 0.8, "toilet": 0.75, "closet": 0.75, "pantry": 0.75, "laundry_room": 0.8}
 """Clear width of a room's door, metres; 0.85 for the others."""
 OPEN_KINDS = ("living_room", "dining_room", "kitchen", "family_room", "sun_room", "library")
 GLASS = {"living_room": 0.2, "family_room": 0.18, "dining_room": 0.17, "sun_room": 0.4, "kitchen": 0.13, "study": 0.15,

@@ -118,10 +118,18 @@ def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.rando
         if config.rooms is None and free < 7.0:
             return spaces
         if not fits:
-            if config.rooms is not None or free > 12.0:
+            if config.rooms is None and free < 14.0:
+                return spaces
+            beds = sum(s.kind in BEDROOMS for s in spaces)
+            most = 0.5 * config.rooms if config.rooms is not None else area / 62
+            seconds = [k for k in ("study", "family_room", "workshop", "playroom", "sun_room", "library")
+                       if sum(s.kind == k for s in spaces) < 2]
+            if (beds < most and config.bedrooms is None) or not seconds:
                 spaces.append(Space("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow))
-                continue
-            return spaces
+            else:
+                kind = str(rng.choice(seconds))
+                spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))
+            continue
         p = np.array([likely[k] for k in fits])
         kind = str(rng.choice(fits, p=p / p.sum()))
         spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))
