@@ -33,6 +33,9 @@ ROLES = (
     "wicker",
     "plaster",
     "rug",
+    "art",
+    "rug_pattern",
+    "label",
 )
 """What a material may be used for."""
 

@@ -1,0 +1,458 @@
+"""Pictures and patterns that are used once, not tiled: wall art, rugs, dials, covers."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from assets.materials.maps import Maps, fbm, mix, noise, rgb, smooth_step
+
+
+def _flat(color: np.ndarray, rough: float = 0.6) -> Maps:
+    n = len(color)
+    return Maps(
+        np.clip(color, 0.01, 0.98).astype(np.float32), np.zeros((n, n), np.float32), np.full((n, n), rough, np.float32)
+    )
+
+
+def _canvas(n: int, color, *, rng: np.random.Generator, grain: float = 0.015) -> np.ndarray:
+    return rgb(color, (n, n)) * (1 + grain * noise(n, 1.2, 1.2, rng=rng))[..., None]
+
+
+def _fill(image: np.ndarray, points: np.ndarray, color, alpha: float = 1.0) -> np.ndarray:
+    """A filled polygon (k, 2) in [0, 1] with y down, antialiased, painted into `image`."""
+    return _ink(image, points, 0.0, color, alpha, lambda mask, p: cv2.fillPoly(mask, [p], 255, cv2.LINE_AA, 4))
+
+
+def _stroke(image: np.ndarray, points: np.ndarray, width: float, color, alpha: float = 1.0) -> np.ndarray:
+    """A line through points (k, 2) of `width` in [0, 1], painted into `image`."""
+    thick = max(1, round(width * len(image)))
+    return _ink(
+        image, points, width, color, alpha, lambda mask, p: cv2.polylines(mask, [p], False, 255, thick, cv2.LINE_AA, 4)
+    )
+
+
+def _ink(image: np.ndarray, points: np.ndarray, margin: float, color, alpha: float, draw) -> np.ndarray:
+    """Paint what `draw(mask, points)` marks, touching only the box around the points."""
+    n = len(image)
+    low = np.clip(np.floor((points.min(0) - margin) * n).astype(int) - 2, 0, n)
+    high = np.clip(np.ceil((points.max(0) + margin) * n).astype(int) + 3, 0, n)
+    (x0, y0), (x1, y1) = low, high
+    if x0 >= x1 or y0 >= y1:
+        return image
+    mask = np.zeros((y1 - y0, x1 - x0), np.uint8)
+    draw(mask, np.round((points * n - low) * 16).astype(np.int32))
+    image[y0:y1, x0:x1] = mix(image[y0:y1, x0:x1], rgb(color), mask.astype(np.float32) / 255 * alpha)
+    return image
+
+
+def _blob(at, radius: float, wobble: float, *, rng: np.random.Generator) -> np.ndarray:
+    a = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+    r = np.ones_like(a)
+    for k in range(1, 5):
+        r += wobble / k * np.sin(k * a + rng.uniform(0, 6.28)) * rng.uniform(0.4, 1)
+    return np.asarray(at) + radius * np.stack([r * np.cos(a), r * np.sin(a) * rng.uniform(0.7, 1.2)], 1)
+
+
+# ------------------------------------------------------------------ wall art
+
+
+def shapes(n: int, tile: float, ground, colors, *, rng: np.random.Generator) -> Maps:
+    """Cut-paper shapes and a few lines, as in prints of the 1950s."""
+    image = _canvas(n, ground, rng=rng)
+    spots = rng.permutation([(0.35, 0.35), (0.65, 0.3), (0.5, 0.62), (0.3, 0.72), (0.72, 0.7)])
+    for k, at in enumerate(spots):
+        shade = rgb(colors[k % len(colors)])
+        image = _fill(image, _blob(at, rng.uniform(0.10, 0.2), 0.25, rng=rng), shade, 0.94)
+    for _ in range(3):
+        t = np.linspace(0, 1, 40)
+        start, swing = rng.uniform(0.2, 0.8, 2), rng.uniform(-0.3, 0.3, (3, 2))
+        line = (
+            start
+            + swing[0] * t[:, None]
+            + swing[1] * np.sin(np.pi * t)[:, None]
+            + swing[2] * np.sin(2 * np.pi * t)[:, None]
+        )
+        image = _stroke(image, line, 0.006, (0.12, 0.12, 0.13))
+    return _flat(image * (1 + 0.02 * fbm(n, 8, 120, 1.0, rng=rng))[..., None], 0.85)
+
+
+def fields(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+    """Soft-edged fields of colour, one above the other."""
+    y, x = np.mgrid[0:n, 0:n] / n
+    warp = 0.012 * fbm(n, 3, 60, 1.4, rng=rng)
+    image = rgb(colors[0], (n, n))
+    edges = np.cumsum([0.08, *rng.uniform(0.2, 0.34, len(colors) - 1)])
+    edges = edges / edges[-1] * 0.93
+    for k, c in enumerate(colors[1:]):
+        top, bottom = edges[k] + 0.015, edges[k + 1] - 0.015
+        inside = smooth_step(np.minimum(y + warp - top, bottom - y - warp), -0.012, 0.02)
+        inside *= smooth_step(np.minimum(x + warp - 0.08, 0.92 - x - warp), -0.012, 0.02)
+        image = mix(image, rgb(c) * (1 + 0.05 * fbm(n, 2, 90, 1.2, rng=rng))[..., None], inside * 0.93)
+    return _flat(image, 0.8)
+
+
+def hills(n: int, tile: float, sky, far, near, layers: int = 6, sun: bool = True, *, rng: np.random.Generator) -> Maps:
+    """Ridges behind ridges in haze under a graded sky."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    image = mix(rgb(sky[0], (n, n)), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
+    image *= (1 + 0.03 * fbm(n, 1.5, 30, 1.5, 4.0, rng=rng) * (1 - y))[..., None]
+    if sun:
+        d = np.hypot(x - rng.uniform(0.25, 0.75), (y - rng.uniform(0.28, 0.42)))
+        image = mix(image, rgb((1.0, 0.96, 0.85)), 0.9 * (1 - smooth_step(d, 0.035, 0.042)) + 0.35 * np.exp(-d * 7))
+    for k in range(layers):
+        base = 0.48 + 0.5 * (k / layers) ** 1.2
+        ridge = np.zeros(n)
+        t = np.arange(n) / n
+        for f in range(1, 40):
+            ridge += rng.normal() * f**-1.45 * np.sin(2 * np.pi * (f * t * (1 + 0.3 * k) / 2 + rng.random()))
+        ridge = base - 0.085 * ridge / (1 + 0.3 * k)
+        inside = smooth_step(y - ridge[None].astype(np.float32), -0.001, 0.002)
+        c = rgb(far) + (rgb(near) - rgb(far)) * (k / max(layers - 1, 1)) ** 1.1
+        haze = np.clip((y - ridge[None]) * 2.2, 0, 1)
+        shade = mix(rgb(c, (n, n)), np.minimum(rgb(c) * 0.75 + rgb(sky[1]) * 0.25, 1.0), haze.astype(np.float32))
+        image = mix(image, shade * (1 + 0.03 * noise(n, 1.5, 1.5, rng=rng))[..., None], inside)
+    return _flat(image, 0.5)
+
+
+def sea(n: int, tile: float, sky, water, *, rng: np.random.Generator) -> Maps:
+    """A level horizon, clouds and glittering water."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    clouds = smooth_step(fbm(n, 1.5, 60, 1.6, 2.5, rng=rng), 0.2, 2.0)
+    up = mix(mix(rgb(sky[0], (n, n)), rgb(sky[1]), smooth_step(y, 0, 0.55)), rgb((0.97, 0.95, 0.92)), 0.6 * clouds)
+    depth = np.clip((y - 0.55) / 0.45, 1e-3, 1)
+    waves = noise(n, 14, 1.2, rng=rng) * np.clip(depth * 2, 0.2, 1)
+    path = np.exp(-(((x - 0.55) / (0.05 + 0.25 * depth)) ** 2))
+    down = mix(rgb(water[0], (n, n)), rgb(water[1]), depth) * (1 + 0.08 * waves)[..., None]
+    down = mix(down, rgb((0.98, 0.93, 0.83)), 0.5 * path * smooth_step(waves, 0.4, 1.6))
+    return _flat(np.where((y < 0.55)[..., None], up, down), 0.45)
+
+
+def botanical(n: int, tile: float, ground, ink, fern: bool = True, *, rng: np.random.Generator) -> Maps:
+    """One pressed or drawn plant on paper, with a line of writing below."""
+    image = _canvas(n, ground, rng=rng)
+    t = np.linspace(0, 1, 50)
+    bend = rng.uniform(-0.10, 0.10)
+    stem = np.stack([0.5 + bend * np.sin(np.pi * t * 0.8), 0.86 - 0.70 * t], 1)
+    image = _stroke(image, stem, 0.005, ink)
+    pairs = 15 if fern else 7
+    for k in range(pairs):
+        f = (k + 0.6) / pairs
+        at = stem[min(49, int(f * 49))]
+        for side in (-1, 1):
+            length = (0.24 if fern else 0.22) * np.sin(np.pi * (0.22 + 0.72 * (1 - f)) ** 0.9) * rng.uniform(0.92, 1.05)
+            angle = -np.pi / 2 + side * (0.95 - 0.35 * f) + rng.normal(0, 0.04)
+            shade = rgb(ink) * rng.uniform(0.85, 1.25)
+            if fern:
+                s = np.linspace(0, 1, 9)[1:]
+                d = np.array([np.cos(angle), np.sin(angle)])
+                image = _stroke(image, at + np.linspace(0, 1, 6)[:, None] * d * length, 0.002, shade)
+                for q in s:
+                    for w in (-1, 1):
+                        image = _fill(
+                            image,
+                            _leaf_shape(at + d * length * q, angle + w * 1.0, 0.055 * (1.05 - q), 0.010),
+                            shade,
+                            0.9,
+                        )
+            else:
+                image = _fill(image, _leaf_shape(at, angle, length, 0.24 * length), shade, 0.9)
+                d = np.array([np.cos(angle), np.sin(angle)])
+                image = _stroke(image, at + np.linspace(0, 0.92, 6)[:, None] * d * length, 0.002, rgb(ground) * 0.92)
+    x = 0.40
+    while x < 0.60:
+        w = rng.uniform(0.008, 0.03)
+        line = np.stack([np.linspace(x, x + w, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
+        image = _stroke(image, line, 0.0025, (0.25, 0.23, 0.2), 0.8)
+        x += w + 0.008
+    return _flat(image, 0.85)
+
+
+def _leaf_shape(at, angle: float, length: float, half: float) -> np.ndarray:
+    t = np.linspace(0, 1, 14)
+    w = half * np.sin(np.pi * t) ** 0.85
+    p = np.concatenate([np.stack([t * length, w], 1), np.stack([t * length, -w], 1)[::-1]])
+    c, s = np.cos(angle), np.sin(angle)
+    return p @ np.array([[c, s], [-s, c]]) + at
+
+
+def brushwork(n: int, tile: float, ground, colors, *, rng: np.random.Generator) -> Maps:
+    """Abstract painting: loaded brush strokes over one another, with relief."""
+    image = _canvas(n, ground, rng=rng, grain=0.03)
+    height = np.zeros((n, n), np.float32)
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    for _ in range(26):
+        at, angle = rng.uniform(0.05, 0.95, 2), rng.normal(0.5, 0.6)
+        long, wide = rng.uniform(0.15, 0.42), rng.uniform(0.03, 0.10)
+        u = (x - at[0]) * np.cos(angle) + (y - at[1]) * np.sin(angle)
+        v = -(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle) + 0.25 * u * u
+        bristles = (
+            np.interp(v.reshape(-1), np.linspace(-wide, wide, 60), rng.normal(0, 1, 60))
+            .reshape(n, n)
+            .astype(np.float32)
+        )
+        ragged = 0.25 * long * bristles * 0.35
+        inside = smooth_step(wide - np.abs(v), 0.0, 0.008) * smooth_step(long - np.abs(u) + ragged, 0.0, 0.05)
+        c = rgb(colors[rng.integers(len(colors))]) * (1 + 0.09 * bristles)[..., None]
+        image = mix(image, c, inside * 0.92)
+        height = height * (1 - inside) + inside * (4e-4 + 2e-4 * bristles)
+    done = _flat(image, 0.55)
+    return Maps(done.color, height, done.roughness)
+
+
+def still_life(n: int, tile: float, ground, table, fruit, *, rng: np.random.Generator) -> Maps:
+    """A bowl of fruit against a dark wall, in soft paint."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    image = mix(
+        rgb(ground, (n, n)), rgb(ground) * 1.6 + 0.03, np.exp(-(((x - 0.35) / 0.4) ** 2) - ((y - 0.35) / 0.4) ** 2)
+    )
+    image = mix(
+        image,
+        rgb(table) * (1.1 - 0.4 * x)[..., None],
+        smooth_step(y + 0.004 * fbm(n, 3, 40, 1.4, rng=rng), 0.66, 0.668),
+    )
+    for k in range(7):
+        cx, cy, r = (
+            0.28 + 0.075 * k + rng.normal(0, 0.015),
+            0.56 - 0.06 * (k % 2) + rng.normal(0, 0.012),
+            rng.uniform(0.06, 0.085),
+        )
+        d = np.hypot(x - cx, y - cy) / r
+        light = np.clip(0.35 + 0.75 * (1 - np.hypot(x - cx + 0.4 * r, y - cy + 0.45 * r) / (1.5 * r)), 0.15, 1.2)
+        c = rgb(fruit[k % len(fruit)])
+        image = mix(image, c * light[..., None], 1 - smooth_step(d, 0.95, 1.02))
+    bowl = ((x - 0.5) / 0.30) ** 2 + ((y - 0.60) / 0.17) ** 2
+    inside = (1 - smooth_step(bowl, 0.97, 1.03)) * smooth_step(y, 0.60, 0.606)
+    image = mix(image, rgb((0.62, 0.66, 0.70)) * (1.05 - 0.9 * np.abs(x - 0.42))[..., None], inside)
+    image = image * (1 + 0.03 * fbm(n, 10, 200, 0.9, rng=rng))[..., None]
+    return _flat(image, 0.5)
+
+
+def poster(n: int, tile: float, ground, ink, accent, *, rng: np.random.Generator) -> Maps:
+    """A typographic poster: a large shape, a heading and lines of small print."""
+    image = _canvas(n, ground, rng=rng, grain=0.008)
+    kind = int(rng.integers(3))
+    a = np.linspace(0, 2 * np.pi, 100)
+    if kind == 0:
+        for r in np.linspace(0.30, 0.06, 5):
+            image = _fill(
+                image,
+                np.stack([0.5 + r * np.cos(a), 0.40 + r * np.sin(a)], 1),
+                accent if round(r * 100) % 12 < 6 else ink,
+            )
+    elif kind == 1:
+        for k in range(6):
+            image = _fill(
+                image,
+                np.array(
+                    [
+                        (0.2 + 0.1 * k, 0.14),
+                        (0.26 + 0.1 * k, 0.14),
+                        (0.26 + 0.1 * k, 0.2 + 0.08 * k),
+                        (0.2 + 0.1 * k, 0.2 + 0.08 * k),
+                    ]
+                ),
+                accent if k % 2 else ink,
+            )
+    else:
+        half = np.linspace(0, np.pi, 50)
+        for k in range(4):
+            image = _fill(
+                image,
+                np.stack([0.5 + 0.28 * np.cos(half), 0.22 + 0.13 * k + 0.12 - 0.12 * np.sin(half)], 1),
+                accent if k % 2 else ink,
+            )
+    for row, (h, w) in enumerate(((0.05, 0.62), (0.012, 0.4), (0.012, 0.46), (0.012, 0.33))):
+        top = 0.78 + (0.075 if row else 0) + 0.026 * row
+        x = 0.19
+        while x < 0.19 + w:
+            step = h * rng.uniform(0.5, 0.8)
+            image = _fill(image, np.array([(x, top), (x + step, top), (x + step, top + h), (x, top + h)]), ink)
+            x += step + h * (0.28 if rng.random() < 0.8 else 0.8)
+    return _flat(image, 0.75)
+
+
+# ------------------------------------------------------------------ rugs, seen from above, u along the length
+
+
+def oriental(n: int, tile: float, field, border, accent, line=(0.12, 0.10, 0.10), *, rng: np.random.Generator) -> Maps:
+    """A knotted rug: medallion, mirrored field ornaments, main and guard borders."""
+    s = n // 4
+    y, x = np.mgrid[0:s, 0:s].astype(np.float32) / s
+    x, y = (x - 0.5) * 2, (y - 0.5) * 2
+    ax, ay = np.abs(x), np.abs(y)
+    image = rgb(field, (s, s))
+    tints = [rgb(c) for c in (border, accent, line, (0.82, 0.74, 0.60))]
+    for k in range(26):
+        cx, cy, r = rng.uniform(0.05, 0.72), rng.uniform(0.05, 0.66), rng.uniform(0.02, 0.055)
+        d = np.hypot(ax - cx, ay - cy) / r
+        a = np.arctan2(ay - cy, ax - cx)
+        image = mix(image, tints[k % 4], 1 - smooth_step(d * (1 + 0.35 * np.cos(rng.integers(4, 7) * a)), 0.9, 1.05))
+    for r, c in ((0.42, tints[2]), (0.40, tints[0]), (0.31, tints[3]), (0.28, rgb(field) * 0.8), (0.15, tints[1])):
+        star = np.hypot(ax, ay * 1.1) * (1 + 0.10 * np.cos(8 * np.arctan2(ay, ax)))
+        image = mix(image, c, 1 - smooth_step(star, r - 0.008, r + 0.008))
+    corner = np.hypot(ax - 0.8, ay - 0.76) * (1 + 0.10 * np.cos(8 * np.arctan2(ay - 0.76, ax - 0.8)))
+    image = mix(image, tints[0], 1 - smooth_step(corner, 0.25, 0.265))
+    edge = np.minimum(1 - ax, 1 - ay)
+    for outer, inner, c in (
+        (0.0, 0.24, tints[2]),
+        (0.012, 0.05, tints[1]),
+        (0.055, 0.185, tints[0]),
+        (0.19, 0.23, tints[3]),
+    ):
+        image = np.where(((edge > outer) & (edge < inner))[..., None], c, image)
+    along = np.where(1 - ax < 1 - ay, y, x)
+    motif = np.cos(along * np.pi * 13) * 0.04 - np.abs(edge - 0.12)
+    image = mix(image, tints[3], (motif > -0.012).astype(np.float32) * (np.abs(edge - 0.12) < 0.05))
+    image = mix(image, tints[1], (np.cos(along * np.pi * 26) > 0.3).astype(np.float32) * (np.abs(edge - 0.21) < 0.012))
+    return _pile(cv2.resize(image, (n, n), interpolation=cv2.INTER_CUBIC), 0.09, rng=rng)
+
+
+def kilim(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+    """Flat-woven bands of stepped diamonds."""
+    s = 160
+    image = np.zeros((s, s, 3), np.float32)
+    edge, k = 0, 0
+    tints = [rgb(c) for c in colors]
+    while edge < s:
+        width = int(rng.integers(6, 30))
+        a, b = tints[k % len(tints)], tints[(k + 1 + int(rng.integers(len(tints) - 1))) % len(tints)]
+        rows = slice(edge, min(s, edge + width))
+        v = (np.arange(s)[rows] - edge - width / 2)[None]
+        period = max(8, 2 * (width // 2))
+        u = np.abs((np.arange(s) % period) - period / 2)[:, None]
+        on = (
+            (np.floor(u / 2) + np.floor(np.abs(v) / 2)) * 2 < period / 2
+            if width > 11
+            else (np.arange(s)[:, None] // 4 % 2 == 0) & (v > -99)
+        )
+        image[:, rows] = np.where(on[..., None], b, a)
+        edge, k = edge + width, k + 1
+    image = cv2.resize(image, (n, n), interpolation=cv2.INTER_NEAREST)
+    return _pile(image, 0.05, rng=rng)
+
+
+def berber(n: int, tile: float, ground, line, diamonds: int = 3, *, rng: np.random.Generator) -> Maps:
+    """A shaggy light rug with a hand-drawn lattice of dark lines."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    wob = 0.006 * fbm(n, 3, 40, 1.4, rng=rng)
+    f = np.minimum(*(np.abs(((x * diamonds * 1.5 + s * y * diamonds + wob * 4) % 1) - 0.5) for s in (1, -1)))
+    image = mix(rgb(ground, (n, n)), rgb(line), 1 - smooth_step(f, 0.018, 0.032))
+    return _pile(image, 0.13, rng=rng)
+
+
+def bordered(n: int, tile: float, field, border, bands=((0.0, 0.09),), *, rng: np.random.Generator) -> Maps:
+    """Plain with one or more bands along the edge."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
+    image = rgb(field, (n, n))
+    for a, b in bands:
+        image = mix(image, rgb(border), ((edge >= a) & (edge < b)).astype(np.float32))
+    return _pile(image, 0.09, rng=rng)
+
+
+def modern(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+    """Large overlapping arcs and fields in a few muted colours."""
+    image = rgb(colors[0], (n, n))
+    for k in range(6):
+        image = _fill(
+            image, _blob(rng.uniform(0, 1, 2), rng.uniform(0.18, 0.4), 0.2, rng=rng), colors[1 + k % (len(colors) - 1)]
+        )
+    return _pile(image, 0.09, rng=rng)
+
+
+def striped(n: int, tile: float, colors, count: int = 14, *, rng: np.random.Generator) -> Maps:
+    """Cross stripes of several widths."""
+    widths = rng.uniform(0.4, 1.6, count)
+    edges = np.cumsum(widths) / widths.sum()
+    band = np.searchsorted(edges, (np.arange(n) + 0.5) / n)
+    image = np.broadcast_to(rgb(colors)[band % len(colors)][None], (n, n, 3)).copy()
+    return _pile(image, 0.06, rng=rng)
+
+
+def rings(n: int, tile: float, colors, count: int = 9, *, rng: np.random.Generator) -> Maps:
+    """Concentric rings for a round braided rug."""
+    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n - 0.5
+    r = np.hypot(x, y) * 2 * count
+    image = rgb(colors)[np.clip(r.astype(int), 0, 99) % len(colors)]
+    braid = 0.5 + 0.5 * np.cos(2 * np.pi * (r % 1 - 0.5)) * np.cos(np.arctan2(y, x) * 90 + (r.astype(int) % 2) * np.pi)
+    return _pile(image * (0.9 + 0.15 * braid)[..., None], 0.05, rng=rng)
+
+
+def _pile(image: np.ndarray, depth: float, *, rng: np.random.Generator) -> Maps:
+    n = len(image)
+    tuft, fine, wear = noise(n, 2.2, 1.4, rng=rng), noise(n, 0.8, 0.8, rng=rng), fbm(n, 2, 30, 1.2, rng=rng)
+    out = image * (1 + depth * (0.5 * tuft + 0.5 * fine) + 0.02 * wear)[..., None]
+    return Maps(
+        np.clip(out, 0.01, 0.97).astype(np.float32),
+        (1.2e-3 * tuft).astype(np.float32),
+        np.full((n, n), 0.96, np.float32),
+    )
+
+
+# ------------------------------------------------------------------ dials and covers
+
+
+def dial(
+    n: int, tile: float, face, ink, numerals: bool = True, hour: float = 10.15, *, rng: np.random.Generator
+) -> Maps:
+    """A clock face with hands."""
+    image = rgb(face, (n, n))
+    for k in range(60):
+        a = k * np.pi / 30
+        d = np.array([np.sin(a), -np.cos(a)])
+        big = k % 5 == 0
+        image = _stroke(
+            image, 0.5 + np.array([0.44, 0.385 if big else 0.42])[:, None] * d, 0.010 if big else 0.004, ink
+        )
+        if big and numerals:
+            text = str(k // 5 or 12)
+            (w, h), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170))
+            p = 0.5 + 0.32 * d
+            mask = np.zeros((n, n), np.uint8)
+            cv2.putText(
+                mask,
+                text,
+                (round(p[0] * n - w / 2), round(p[1] * n + h / 2)),
+                cv2.FONT_HERSHEY_SIMPLEX,
+                n / 500,
+                255,
+                max(1, n // 170),
+                cv2.LINE_AA,
+            )
+            image = mix(image, rgb(ink), mask.astype(np.float32) / 255)
+    for turn, long, wide in ((hour / 12, 0.22, 0.022), (hour % 1, 0.34, 0.014)):
+        a = 2 * np.pi * turn
+        d = np.array([np.sin(a), -np.cos(a)])
+        image = _stroke(image, 0.5 + np.array([-0.05, long])[:, None] * d, wide, ink)
+    return _flat(image, 0.4)
+
+
+def cover(n: int, tile: float, ground, ink, picture, *, rng: np.random.Generator) -> Maps:
+    """A magazine cover: a title, a photograph of sorts, teasers."""
+    sky = mix(
+        rgb(picture, (n, n)),
+        rgb(picture) * 0.45,
+        np.linspace(0, 1, n, dtype=np.float32)[:, None] * np.ones((n, n), np.float32),
+    )
+    image = sky * (1 + 0.10 * fbm(n, 1.5, 60, 1.5, rng=rng))[..., None]
+    image = _fill(image, _blob((0.5, 0.62), 0.26, 0.15, rng=rng), ground, 0.85)
+    for x, w in ((0.08, 0.13), (0.23, 0.11), (0.36, 0.14), (0.52, 0.10), (0.64, 0.12), (0.78, 0.13)):
+        image = _fill(image, np.array([(x, 0.06), (x + w, 0.06), (x + w, 0.19), (x, 0.19)]), ink)
+        image = _fill(
+            image, np.array([(x + 0.03, 0.10), (x + w - 0.03, 0.10), (x + w - 0.03, 0.15), (x + 0.03, 0.15)]), picture
+        )
+    for k in range(5):
+        image = _fill(
+            image,
+            np.array(
+                [
+                    (0.08, 0.72 + 0.04 * k),
+                    (0.08 + rng.uniform(0.15, 0.3), 0.72 + 0.04 * k),
+                    (0.08 + 0.2, 0.735 + 0.04 * k),
+                    (0.08, 0.735 + 0.04 * k),
+                ]
+            ),
+            ink,
+        )
+    return _flat(image, 0.3)
