@@ -14,11 +14,13 @@ from scipy import ndimage
 from assets.records import Asset, MeshPart
 from embodied.house import House, Room
 
-CELLS = (14, 10, 7, 5, 3, 2)
+CELLS = (20, 14, 10, 7, 5, 3, 2)
 """Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
-MOST_BOXES = 24
+MOST_BOXES = 30
 SLAB = 0.02
 """Thickness in metres of the board under a support surface."""
+EVEN = 0.006
+"""Unevenness of a support surface that is smoothed away, metres."""
 THINNEST = 0.002
 """Half thickness below which a box is thickened, metres."""
 SMALL = 0.35
@@ -56,7 +58,8 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         low = np.array([s.x0, s.y0, s.z]) * scale
         high = np.array([s.x1, s.y1, s.z + s.headroom]) * scale
         inside = np.all((points[:, :2] > low[:2]) & (points[:, :2] < high[:2]), axis=1)
-        points = points[~(inside & (points[:, 2] > low[2] + 0.002) & (points[:, 2] < high[2]))]
+        points[inside & (np.abs(points[:, 2] - low[2]) < EVEN), 2] = low[2]
+        points = points[~(inside & (points[:, 2] > low[2]) & (points[:, 2] < high[2]))]
         bottom = max(low[2] - SLAB, 0.0)
         slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
     if not len(points):

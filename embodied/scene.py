@@ -85,9 +85,14 @@ def owner_of_name(geom: str) -> str:
 
 
 def loose(house: House, catalogue) -> frozenset[str]:
-    """The placements that physics can move: all that stand or lie, not what is fixed or underfoot."""
-    return frozenset(p.id for p in house.placements
-                     if catalogue.assets[p.asset].support in LOOSE and not is_underfoot(p))
+    """The placements that physics can move: all that stand or lie, not what is fixed to the house or underfoot."""
+    return frozenset(p.id for p in house.placements if catalogue.assets[p.asset].support in LOOSE
+                     and not is_underfoot(p) and not is_hung(house, p))
+
+
+def is_hung(house: House, p: Placement) -> bool:
+    """Whether it rests on nothing: a radiator or a wall cabinet, fixed to its wall."""
+    return p.parent is None and p.position[2] > house.storey_of(house.room_by_id[p.room]).elevation + UNDERFOOT
 
 
 def is_underfoot(p: Placement) -> bool:
@@ -323,6 +328,20 @@ def _add_boxes(body: mujoco.MjsBody, owner: str, boxes: Sequence[collision.Box],
             size=box.half, group=COLLISION, rgba=[0.6, 0.7, 0.9, 0.4], density=density, friction=[0.9, 0.005, 0.0001])
         if frame is not None:
             geom.set_frame(frame)
+
+
+def penetrations(scene: Scene, deeper: float = 0.004) -> dict[tuple[str, str], float]:
+    """Pairs of owners whose boxes interpenetrate by more than `deeper` metres at the start, and how deep.
+
+    Static things do not collide with each other: compile with `free` to test them.
+    """
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    depths: dict[tuple[str, str], float] = {}
+    for contact in data.contact:
+        pair = tuple(sorted(scene.owners[scene.owner_of_geom[g] - 1] for g in contact.geom))
+        depths[pair] = max(depths.get(pair, 0.0), -contact.dist)
+    return {pair: depth for pair, depth in sorted(depths.items()) if depth > deeper}
 
 
 def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.interface import Sight
 
+QUALITIES = ("unlit", "baked", "glossy", "reference")
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
@@ -41,11 +42,14 @@ class World:
     def __init__(self, house: House, catalogue: Catalogue, graph: navgraph.NavGraph, cache: Path, *, size: int = 256,
                  quality: str = "unlit", backend: str = "classic", light: str = "normal", file: Path | None = None) -> None:
         """See `open_world`."""
+        if quality not in QUALITIES:
+            raise ValueError(f"quality {quality!r} is unknown; use one of {QUALITIES}")
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.size, self.quality, self.backend, self.light = size, quality, backend, light
         self._path = file
         self._renderer: Renderer | None = None
         self._file: PanoramaFile | None = None
+        self._refused = False
         self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
 
     @property
@@ -110,6 +114,7 @@ class World:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
         if self._open_file() is None:
             write_panoramas(self.path, self._draw_all(progress), self.fingerprint)
+            self._refused = False
             self._recent.cache_clear()
         return self.path
 
@@ -139,7 +144,8 @@ class World:
 
     def _open_file(self) -> PanoramaFile | None:
         """The panorama file, if it is whole and of this very world."""
-        if self._file is None and self.path.exists():
+        if self._file is None and not self._refused and self.path.exists():
+            self._refused = True
             try:
                 file = PanoramaFile(self.path)
             except PanoramaFileError as e:
@@ -149,7 +155,7 @@ class World:
                 log.warning("%s was made from another house or by another version; drawing again", self.path)
                 file.close()
                 return None
-            self._file = file
+            self._file, self._refused = file, False
         return self._file
 
     @functools.cached_property

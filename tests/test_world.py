@@ -1,0 +1,131 @@
+"""World: panoramas drawn when asked and kept, sightings that agree with them, caches that are not believed blindly."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import math
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from embodied import world as worlds
+from embodied.interface import Sight
+from embodied.navgraph import graph_of
+from embodied.panorama_file import PanoramaFile
+from embodied.world import World, open_folder, open_world
+
+NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+@pytest.fixture
+def world(house, tmp_path):
+    with make(house, tmp_path) as w:
+        yield w
+
+
+def make(house, cache, **options) -> World:
+    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ("living_room_1", "living_room_1", "bedroom_1"))
+    return open_world(house, HandCatalogue(), cache, graph=graph, size=options.pop("size", 64), **options)
+
+
+def test_nothing_is_drawn_until_asked(world, tmp_path):
+    assert world._renderer is None and list(tmp_path.iterdir()) == []
+    world.panorama(0)
+    assert world._renderer is not None
+
+
+def test_a_panorama_from_the_file_is_the_one_that_was_drawn(world):
+    drawn = world.panorama(1)
+    path = world.render_all()
+    world.close()
+    kept = world.panorama(1)
+    assert path.exists() and world._renderer is None, "read, not drawn again"
+    assert np.array_equal(kept.ids, drawn.ids)
+    assert np.abs(kept.depth - drawn.depth).max() <= 0.0005 + 1e-6
+    assert np.abs(kept.rgb.astype(int) - drawn.rgb).mean() < 1.0
+
+
+def test_sightings_agree_with_the_panorama(world, house):
+    seen = {s.placement: s for s in world.sightings(0)}
+    assert {"red_box_1", "flag_1", "table_1", "mug_1"} <= set(seen)
+    assert "red_box_2" not in seen, "it stands in the bedroom's far corner"
+    for name in ("red_box_1", "flag_1", "table_1"):
+        x, y, z = np.add(house.placement_by_id[name].position, (0, 0, house.placement_by_id[name].size[2] / 2)) - NODES[0]
+        assert abs((seen[name].yaw - math.atan2(y, x) + math.pi) % (2 * math.pi) - math.pi) < 0.15, name
+        assert abs(seen[name].pitch - math.atan2(z, math.hypot(x, y))) < 0.2, name
+        assert seen[name].distance == pytest.approx(math.sqrt(x * x + y * y + z * z), abs=0.6), name
+    sizes = [s.pixels for s in world.sightings(0)]
+    assert sizes == sorted(sizes, reverse=True)
+    ids = world.panorama(0).ids
+    assert {world.owners[i - 1] for i in np.unique(ids[ids > 0])} & set(house.placement_by_id) == set(seen)
+
+
+def test_sightings_are_kept_and_a_damaged_file_is_made_again(house, tmp_path):
+    with make(house, tmp_path) as w:
+        first = w.sightings(2)
+    (file,) = (tmp_path / "sightings").iterdir()
+    with make(house, tmp_path) as w:
+        assert w.sightings(2) == first and w._renderer is None
+    file.write_bytes(file.read_bytes()[:100])
+    with make(house, tmp_path) as w:
+        assert w.sightings(2) == first
+
+
+def test_another_house_is_another_file(house, tmp_path):
+    emptier = dataclasses.replace(house, placements=house.placements[:1])
+    assert make(house, tmp_path).path != make(emptier, tmp_path).path
+    assert make(house, tmp_path).path != make(house, tmp_path, size=32).path
+
+
+def test_a_truncated_panorama_file_is_reported_and_drawn_again(world, caplog):
+    path = world.render_all()
+    world.close()
+    path.write_bytes(path.read_bytes()[:-7])
+    with caplog.at_level(logging.WARNING):
+        world.render_all()
+    assert "no complete panorama file" in caplog.text
+    with PanoramaFile(path) as file:
+        assert len(file) == 3
+
+
+def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplog):
+    house.save(tmp_path / "house.json")
+    w = open_folder(tmp_path, HandCatalogue(), tmp_path / "cache", size=16)
+    path = w.render_all()
+    w.close()
+    edited = dataclasses.replace(house, placements=house.placements[:1])
+    edited.save(tmp_path / "house.json")
+    again = open_folder(tmp_path, HandCatalogue(), tmp_path / "cache", size=16)
+    with caplog.at_level(logging.WARNING):
+        again.render_all()
+    again.close()
+    assert path == again.path == tmp_path / "panoramas.pano"
+    with PanoramaFile(path) as file:
+        assert file.meta["house"] == edited.digest
+
+
+def test_unknown_nodes_folders_and_sights_are_refused(world, tmp_path):
+    with pytest.raises(IndexError, match="0 to 2"):
+        world.panorama(3)
+    with pytest.raises(FileNotFoundError, match=r"house\.json"):
+        open_folder(tmp_path, HandCatalogue(), tmp_path)
+    assert world.node_of(Sight(world.name, 2)) == 2
+    with pytest.raises(ValueError, match="other house"):
+        world.node_of(Sight("other house", 2))
+
+
+def test_unknown_quality_is_refused_at_once(house, tmp_path):
+    with pytest.raises(ValueError, match="pretty"):
+        make(house, tmp_path, quality="pretty")
+
+
+def test_sources_of_pictures_exist():
+    assert all(any(worlds.ROOT.glob(p)) for p in worlds.PICTURE_SOURCES)
