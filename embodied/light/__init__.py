@@ -1,9 +1,9 @@
 """Light once, look many times: a house's global illumination baked into textures."""
 
 from embodied.light.backend import LightError as LightError
-from embodied.light.bake import Bake as Bake
-from embodied.light.bake import StaleBake as StaleBake
-from embodied.light.bake import bake as bake
-from embodied.light.bake import open_bake as open_bake
+from embodied.light.baking import Bake as Bake
+from embodied.light.baking import StaleBake as StaleBake
+from embodied.light.baking import bake as bake
+from embodied.light.baking import open_bake as open_bake
 from embodied.light.settings import QUALITIES as QUALITIES
 from embodied.light.settings import Settings as Settings

@@ -145,24 +145,41 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096) -> Atlas:
     return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
 
 
-def rasterise(page: Page, fineness: int) -> Texels:
-    """What lies under the centre of each texel, found by shooting rays straight down on the layout."""
-    mi = mitsuba()
-    import drjit as dr
+OFFSETS = ((0.0, 0.0), (-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0),
+           (0.45, 0.45), (-0.45, -0.45), (0.45, -0.45), (-0.45, 0.45), (0.15, -0.15), (-0.15, 0.15))
+"""Where in a texel a face is looked for, one after the other: slivers that miss all centres still get texels of their own."""
 
+
+def rasterise(page: Page, fineness: int) -> Texels:
+    """What lies under each texel, found by shooting rays straight down on the layout; centres first."""
     w, h = page.width * fineness, page.height * fineness
     flat = np.concatenate([page.luxels * fineness, np.zeros((*page.luxels.shape[:2], 1), np.float32)], axis=-1)
-    i = dr.arange(mi.UInt32, w * h)
-    above = mi.Point3f(mi.Float(i % w) + 0.5, mi.Float(i // w) + 0.5, 1.0)
-    hit = scene_of(flat).ray_intersect_preliminary(mi.Ray3f(above, mi.Vector3f(0, 0, -1)))
-    index = np.nonzero(np.asarray(hit.is_valid()))[0]
-    face = np.asarray(hit.prim_index)[index].astype(np.int32)
-    b1, b2 = (np.asarray(hit.prim_uv[k])[index] for k in (0, 1))
-    weights = np.stack([1 - b1 - b2, b1, b2], axis=1).astype(np.float32)
+    scene = scene_of(flat)
+    face, b1, b2 = np.full(w * h, -1, np.int32), np.zeros(w * h, np.float32), np.zeros(w * h, np.float32)
+    left = np.arange(w * h)
+    for dx, dy in OFFSETS:
+        hit, f, u, v = _straight_down(scene, left % w + 0.5 + dx, left // w + 0.5 + dy)
+        face[left[hit]], b1[left[hit]], b2[left[hit]] = f[hit], u[hit], v[hit]
+        left = left[~hit]
+    index = np.nonzero(face >= 0)[0]
+    face = face[index]
+    weights = np.stack([1 - b1[index] - b2[index], b1[index], b2[index]], axis=1)
     normal = mix(weights, page.normals, face)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
     flat_normal = face_normals(page.corners).astype(np.float32)[face]
     return Texels(index, mix(weights, page.corners, face), normal, flat_normal, face, weights, (h, w))
+
+
+def _straight_down(scene, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Whether a face lies under (x, y), which, and where on it."""
+    mi = mitsuba()
+    import drjit as dr
+
+    above = mi.Point3f(mi.Float(np.asarray(x, np.float32)), mi.Float(np.asarray(y, np.float32)), 1.0)
+    hit = scene.ray_intersect_preliminary(mi.Ray3f(above, mi.Vector3f(0, 0, -1)), True)
+    u, v, f, ok = hit.prim_uv.x, hit.prim_uv.y, hit.prim_index, hit.is_valid()
+    dr.eval(u, v, f, ok)
+    return np.asarray(ok), np.asarray(f).astype(np.int32), np.asarray(u), np.asarray(v)
 
 
 def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:

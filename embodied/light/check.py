@@ -10,7 +10,7 @@ from embodied.light.emitters import portals_of
 from embodied.light.solve import AMBIENT, subset
 from embodied.seeds import stream
 
-LUXELS, PATHS = 24, 3000
+LUXELS, PATHS = 24, 12000
 LIMIT = 0.10
 """Largest median relative difference that passes."""
 WORST = 0.35

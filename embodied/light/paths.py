@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.light import radiosity
-from embodied.light.backend import mitsuba
+from embodied.light.backend import constant, mitsuba
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
 from embodied.light.solve import AMBIENT, Luxels
@@ -23,16 +23,38 @@ DEEPEST = 9
 
 @dataclass(frozen=True, eq=False)
 class Lights:
-    """Everything that shines."""
+    """Everything that shines, pooled so that every path picks its own light; k lights, device arrays."""
 
-    portals: tuple[Portal, ...]
-    lamps: tuple[Lamp, ...]
-    lamp_spaces: tuple[Space, ...]
-    """What each lamp's rays may hit."""
+    count: int
+    centre: np.ndarray
+    """(k, 3) metres."""
+    power: np.ndarray
+    """(k,) rough brightness, for choosing."""
+    corner: object
+    along: object
+    up: object
+    normal: object
+    """Flat (k * 3) arrays; zero for lamps."""
+    strength: object
+    """(k,) area / pi of portals, glowing area / pi of lamps."""
+    radiance: object
+    """(k * 3); zero for portals, which take it from the sky."""
+    points: object
+    normals: object
+    """(k * POINTS * 3) of lamps."""
+    bare: object
+    lamp: object
+    """(k,) bool: a bare bulb; any lamp."""
+    spaces: tuple[Space, ...]
+    """Worlds to ask for shadows: the house, and for each bare bulb's lamp the house without it."""
+    space_of_light: object
     portal_scene: object | None
     towards_sun: np.ndarray
     sun: np.ndarray
     """(3,) e of the sun behind the glass."""
+
+
+POINTS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,28 +74,91 @@ def surfaces_of(lux: Luxels) -> Surfaces:
 
 
 def lights_of(atlas, lux: Luxels, space: Space, portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors) -> Lights:
-    """Gather what shines."""
-    own = tuple(
-        radiosity.space_of(atlas, lux.texels, outdoors.picture, frozenset({atlas.owners.index(x.owner)}))
-        if x.owner in atlas.owners else space for x in lamps
-    )
+    """Pool what shines."""
+    mi = mitsuba()
+    k = len(portals) + len(lamps)
+    zero = np.zeros(3)
+    spaces, index = [space], [0] * len(portals)
+    for x in lamps:
+        if x.owner is not None and x.owner in atlas.owners:
+            hidden = frozenset({atlas.owners.index(x.owner)})
+            spaces.append(radiosity.space_of(atlas, lux.texels, outdoors.picture, hidden))
+            index.append(len(spaces) - 1)
+        else:
+            index.append(0)
+    sky = float(outdoors.picture.mean())
+    centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(k, 3)
+    power = np.array([p.area * sky for p in portals] + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1)
+                                                       for x in lamps])
+    fill = lambda a: a[np.arange(POINTS) % len(a)]  # noqa: E731
+    flat = lambda rows: mi.Float(np.ascontiguousarray(np.array(rows, np.float32).reshape(-1)))  # noqa: E731
     scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
-    return Lights(tuple(portals), tuple(lamps), own, scene, outdoors.sun_direction, outdoors.sun * radiosity.GLASS)
+    none = [zero] * len(lamps)
+    return Lights(
+        k, centre, power, flat([p.corner for p in portals] + none), flat([p.along for p in portals] + none),
+        flat([p.up for p in portals] + none), flat([p.normal for p in portals] + none),
+        flat([p.area * radiosity.GLASS / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
+        flat([zero] * len(portals) + [x.radiance for x in lamps]),
+        flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
+        flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
+        mi.Bool([False] * len(portals) + [not x.normals.any() for x in lamps]),
+        mi.Bool([False] * len(portals) + [True] * len(lamps)), tuple(spaces), mi.UInt32(index or [0]), scene,
+        outdoors.sun_direction, outdoors.sun * radiosity.GLASS,
+    )
 
 
-def direct(space: Space, lights: Lights, p: Points):
-    """e (a Color3f) at points straight from all lights, one sample each."""
+def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator, picks: int = 2):
+    """e (a Color3f) at points straight from the lights: the sun, and `picks` others drawn by power over distance squared."""
     mi = mitsuba()
 
     total = mi.Color3f(*(float(x) for x in AMBIENT))
-    for portal in lights.portals:
-        total = total + radiosity.sky_light(space, p, portal, 1)
-    for lamp, own in zip(lights.lamps, lights.lamp_spaces):
-        total = total + radiosity.lamp_light(own, p, lamp, 1)
+    for _ in range(picks if lights.count else 0):
+        total = total + _one_light(space, lights, p, rng) / picks
     if lights.portal_scene is not None:
         share = radiosity.sun_share(space, p, lights.portal_scene, lights.towards_sun, 1)
         total = total + mi.Color3f(*(float(x) for x in lights.sun)) * share
     return total
+
+
+def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator):
+    mi = mitsuba()
+    import drjit as dr
+
+    u = rng.random((3, p.n), np.float32)
+    weights, whole = [], mi.Float(0.0)
+    for c, power in zip(lights.centre, lights.power):
+        far = mi.Point3f(*(constant(x) for x in c)) - p.position
+        weights.append(constant(max(power, 1e-6)) / (dr.squared_norm(far) + 0.3))
+        whole += weights[-1]
+    target, sum_, pick, chance, open_ = mi.Float(u[0]) * whole, mi.Float(0.0), mi.UInt32(0), mi.Float(1.0), mi.Bool(True)
+    for i, w in enumerate(weights):
+        sum_ += w
+        here = open_ & ((target < sum_) | (i == lights.count - 1))
+        pick, chance = dr.select(here, i, pick), dr.select(here, w / whole, chance)
+        open_ &= ~here
+    dr.eval(pick, chance)
+    a, b = mi.Float(u[1]), mi.Float(u[2])
+    at = lambda t: dr.gather(mi.Vector3f, t, pick)  # noqa: E731
+    lamp, bare = dr.gather(mi.Bool, lights.lamp, pick), dr.gather(mi.Bool, lights.bare, pick)
+    spot = pick * POINTS + dr.minimum(mi.UInt32(a * POINTS), POINTS - 1)
+    q = dr.select(lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b)
+    n = dr.select(lamp, dr.gather(mi.Vector3f, lights.normals, spot), at(lights.normal))
+    d = mi.Point3f(q) - p.position
+    far = dr.norm(d)
+    d /= dr.maximum(far, 1e-6)
+    cos, side, active = radiosity.facing(p, d)
+    leaving = dr.select(bare, 1.0, -dr.dot(n, d))
+    active &= leaving > 0
+    reach = dr.select(bare, far - 0.06, far - 4 * radiosity.LIFT)
+    ray = mi.Ray3f(p.position + p.face_normal * side * radiosity.LIFT, d, dr.maximum(reach, 1e-4), 0.0, [])
+    active &= reach > 0
+    which = dr.gather(mi.UInt32, lights.space_of_light, pick)
+    blocked = mi.Bool(False)
+    for i, world in enumerate(lights.spaces):
+        blocked |= world.scene.ray_test(ray, active & (which == i))
+    g = cos * leaving / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4)) * dr.gather(mi.Float, lights.strength, pick)
+    light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space, d, active)))
+    return mi.Color3f(dr.select(active & ~blocked, light * dr.minimum(g, dr.select(bare, 400.0, 4.0)) / chance, 0.0))
 
 
 def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST):
@@ -84,7 +169,7 @@ def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, r
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
     for depth in range(deepest):
         p = _turned(p, rng)
-        total = total + dr.select(alive, throughput * direct(space, lights, p), 0.0)
+        total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)
         u = rng.random((4, p.n), np.float32)
         side = dr.select(p.thin & (mi.Float(u[2]) < 0.5), -1.0, 1.0)
         out = p.face_normal * side

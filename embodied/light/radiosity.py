@@ -158,7 +158,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
         d = q - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-6)
-        cos, side, active = _facing(p, d)
+        cos, side, active = facing(p, d)
         leaving = -dr.dot(n, d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
@@ -188,9 +188,9 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
         d = dr.gather(mi.Point3f, at, i) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-6)
-        cos, side, active = _facing(p, d)
+        cos, side, active = facing(p, d)
         if bare:
-            g = cos / dr.maximum(dr.square(far), 0.0025)
+            g = cos / dr.maximum(dr.square(far), 0.06)
         else:
             leaving = -dr.dot(dr.gather(mi.Vector3f, out, i), d)
             active &= leaving > 0
@@ -217,7 +217,7 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
     for k in range(directions):
         r, turn = (radius * np.sqrt((k + 0.5) / directions), k * 2.399963) if directions > 1 else (0.0, 0.0)
         d = dr.normalize(frame.n + frame.s * constant(r * np.cos(turn)) + frame.t * constant(r * np.sin(turn)))
-        cos, side, active = _facing(p, d)
+        cos, side, active = facing(p, d)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
         active &= portals_scene.ray_test(ray, active)
         total += dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0)
@@ -239,7 +239,7 @@ def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarra
         d = mi.Point3f(*(constant(x) for x in q)) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-5)
-        cos, side, active = _facing(p, d)
+        cos, side, active = facing(p, d)
         leaving = -dr.dot(mi.Vector3f(*(constant(x) for x in n)), d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 3 * LIFT, 0.0, [])
@@ -327,7 +327,7 @@ def reached(units: np.ndarray, sees: Callable[[np.ndarray], np.ndarray], *, trie
     return np.sort(np.concatenate([g for g, h in zip(groups, hit) if h.any()] or [np.zeros(0, np.int64)]))
 
 
-def _facing(p: Points, d):
+def facing(p: Points, d):
     """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
     import drjit as dr
 

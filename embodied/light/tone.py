@@ -15,7 +15,7 @@ import shapely
 from embodied.house import House
 from embodied.light.atlas import gamma
 
-TARGET = 1.1
+TARGET = 0.8
 """Linear value (before the curve) that a white sheet in a room's middle light is brought to."""
 ADAPT = 0.85
 """How far exposure follows a room's own light rather than the house's."""
