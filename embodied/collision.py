@@ -64,7 +64,7 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
     if not len(points):
         return tuple(_box(low, high) for low, high in slabs)
-    if not slabs and max(size) < SMALL:
+    if not slabs and (max(size) < SMALL or is_solid(points)):
         return (_box(points.min(axis=0), points.max(axis=0)),)
     cut = sorted({round(float(high[2]), 4) for _, high in slabs})
     for n in CELLS:
@@ -74,7 +74,7 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
     return tuple(_box(low, high, points.min(axis=0)) for low, high in (*slabs, *bounds))
 
 
-def surface_points(parts: Sequence[MeshPart], n: int = 4000) -> np.ndarray:
+def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
     """(k, 3) points spread evenly over the surface of `parts`, vertices included.
 
     Source: the R2 sequence, M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
@@ -88,6 +88,13 @@ def surface_points(parts: Sequence[MeshPart], n: int = 4000) -> np.ndarray:
     a, b = np.sqrt(k * 0.7548776662466927 % 1)[:, None], (k * 0.5698402909980532 % 1)[:, None]
     spread = (1 - a) * chosen[:, 0] + a * (1 - b) * chosen[:, 1] + a * b * chosen[:, 2]
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
+
+
+def is_solid(points: np.ndarray) -> bool:
+    """Whether a thing all but fills its bounding box: a cupboard, a crate."""
+    boxes = grid_boxes(points, 5)
+    filled = sum(float(np.prod(high - low)) for low, high in boxes)
+    return filled > 0.97 * float(np.prod(points.max(axis=0) - points.min(axis=0)))
 
 
 def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tuple[np.ndarray, np.ndarray]]:
