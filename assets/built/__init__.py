@@ -8,14 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from assets.built.decor import decor_makers
 from assets.built.kitchen import kitchen_makers
 from assets.built.maker import Maker
+from assets.built.soft import soft_makers
 
 __all__ = ["MAKERS", "Maker"]
 
 
 def _all() -> Mapping[str, Maker]:
-    made = [*kitchen_makers()]
+    made = [
+        *kitchen_makers(),
+        *decor_makers(),
+        *soft_makers(),
+    ]
     keys = [m.asset.key for m in made]
     assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)
     return MappingProxyType({m.asset.key: m for m in sorted(made, key=lambda m: m.asset.key)})

@@ -1,0 +1,370 @@
+"""Pictures, posters, mirrors, clocks and vases."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import shapely
+
+from assets.built.maker import (
+    BLACK,
+    BRASS,
+    MIRROR,
+    PAPER,
+    WHITE,
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    material,
+    metal,
+    parts_of,
+    plain,
+    whole_image,
+)
+from assets.built.primitives import (
+    Shape,
+    ball,
+    box,
+    cylinder,
+    flat,
+    lathe,
+    moved,
+    quads,
+    scaled,
+    sheet,
+    tube,
+    turned,
+)
+from assets.materials import MATERIALS
+from assets.records import MeshPart
+
+LIVING = {
+    "living_room": 1.0,
+    "family_room": 1.0,
+    "bedroom": 0.8,
+    "main_bedroom": 0.9,
+    "guest_room": 0.7,
+    "study": 0.6,
+    "library": 0.7,
+    "dining_room": 0.6,
+    "hall": 0.4,
+}
+
+
+FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
+
+
+def picture(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Framed art: a moulded frame, a mat where look['mat'] > 0, the picture, glass over paper."""
+    w, d, h = size
+    name = str(look.get("frame", "oak/0"))
+    wood = FRAMES[name] if name in FRAMES else finish(name)
+    f = float(look.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
+    m = float(look.get("mat", 0.0)) * min(w, h)
+    y0, y1 = -d / 2, d / 2
+    outer = [(-w / 2, 0), (w / 2, 0), (w / 2, h), (-w / 2, h)]
+    frame = []
+    lines = [(0.0, y1), (0.0, y0 + 0.004), (0.25 * f, y0), (0.8 * f, y0 + 0.001), (f, y0 + 0.006), (f, y0 + 0.012)]
+    for (a, ya), (b, yb) in itertools.pairwise(lines):
+        pa, pb = _inset(outer, a), _inset(outer, b)
+        for k in range(4):
+            n = (k + 1) % 4
+            quad = [(*pa[k], ya), (*pa[n], ya), (*pb[n], yb), (*pb[k], yb)]
+            q = quads([[(x, y, z) for x, z, y in quad]])
+            frame.append(q if k % 2 == 0 else Shape(q.vertices, q.faces, q.normals, q.uv[:, ::-1]))
+    back = quads([[(w / 2, y1, 0), (-w / 2, y1, 0), (-w / 2, y1, h), (w / 2, y1, h)]])
+    art = material(look, "art", finish, "art_hills/0")
+    g = f + m
+    x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
+    image = quads([[(x0, y0 + 0.0125, z0), (x1, y0 + 0.0125, z0), (x1, y0 + 0.0125, z1), (x0, y0 + 0.0125, z1)]])
+    image = whole_image(image, art, x0, x1, z0, z1)
+    mat = []
+    if m > 0:
+        a, b = _inset(outer, f), _inset(outer, g)
+        mat = [
+            quads(
+                [
+                    [
+                        (a[k][0], y0 + 0.012, a[k][1]),
+                        (a[(k + 1) % 4][0], y0 + 0.012, a[(k + 1) % 4][1]),
+                        (b[(k + 1) % 4][0], y0 + 0.012, b[(k + 1) % 4][1]),
+                        (b[k][0], y0 + 0.012, b[k][1]),
+                    ]
+                ]
+            )
+            for k in range(4)
+        ]
+    return parts_of((wood, frame), (PAPER, [*mat, back]), (art, image))
+
+
+def _inset(corners, by: float) -> list[tuple[float, float]]:
+    (x0, z0), _, (x1, z1), _ = corners
+    return [(x0 + by, z0 + by), (x1 - by, z0 + by), (x1 - by, z1 - by), (x0 + by, z1 - by)]
+
+
+def canvas(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A painting on a stretched canvas without a frame."""
+    w, d, h = size
+    art = material(look, "art", finish, "art_brushwork/0")
+    return parts_of((art, whole_image(box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002), art, -w / 2, w / 2, 0, h)))
+
+
+def poster(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Unframed paper on the wall, its corners coming off a little."""
+    w, d, h = size
+    x, z = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(0, h, 9))
+    curl = (np.abs(x) / (w / 2)) ** 6 * (np.abs(z - h / 2) / (h / 2)) ** 6
+    y = d / 2 - 0.001 - curl * (d - 0.001) * rng.uniform(0.5, 1.0, (9, 9))
+    art = material(look, "art", finish, "art_poster/0")
+    return parts_of((art, whole_image(sheet(np.stack([x, y, z], -1), 0.0004), art, -w / 2, w / 2, 0, h)))
+
+
+def mirror(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A looking-glass in a slim frame; round where look['round'] is 1."""
+    w, d, h = size
+    y0, f = -d / 2, float(look.get("width", 0.016))
+    name = str(look.get("frame", "black"))
+    rim = FRAMES[name] if name in FRAMES else finish(name)
+    if look.get("round"):
+        ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)][::1], 48)
+        ring = moved(scaled(turned(ring, np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+        disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
+        disc = moved(scaled(turned(disc, np.pi / 2, "x"), w, 1, h), 0, y0 + 0.006, h / 2)
+        disc = Shape(
+            disc.vertices,
+            disc.faces if _faces_front(disc) else disc.faces[:, ::-1],
+            np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)),
+            disc.uv,
+        )
+        back = moved(scaled(turned(cylinder(0.49, 0, 0.004, 0, 32), np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+        return parts_of((rim, ring), (BLACK, back), (MIRROR, disc))
+    boards = [
+        box([-w / 2, y0, 0], [-w / 2 + f, d / 2, h], 0.002),
+        box([w / 2 - f, y0, 0], [w / 2, d / 2, h], 0.002),
+        box([-w / 2 + f, y0, h - f], [w / 2 - f, d / 2, h], 0.002),
+        box([-w / 2 + f, y0, 0], [w / 2 - f, d / 2, f], 0.002),
+    ]
+    glass = quads(
+        [
+            [
+                (-w / 2 + f, y0 + 0.006, f),
+                (w / 2 - f, y0 + 0.006, f),
+                (w / 2 - f, y0 + 0.006, h - f),
+                (-w / 2 + f, y0 + 0.006, h - f),
+            ]
+        ]
+    )
+    back = quads(
+        [[(w / 2 - f, d / 2, f), (-w / 2 + f, d / 2, f), (-w / 2 + f, d / 2, h - f), (w / 2 - f, d / 2, h - f)]]
+    )
+    return parts_of((rim, boards), (BLACK, back), (MIRROR, glass))
+
+
+def _faces_front(shape: Shape) -> bool:
+    a, b, c = (shape.vertices[shape.faces[0, k]] for k in range(3))
+    return float(np.cross(b - a, c - a)[1]) < 0
+
+
+def wall_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A round case with a printed dial behind glass."""
+    w, d, h = size
+    case = lathe([(0, 0), (0.5, 0), (0.5, 0.7 * d), (0.485, d), (0.455, d), (0.45, 0.75 * d), (0.45, 0.72 * d)], 40)
+    case = moved(scaled(turned(case, np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+    t = np.linspace(0, 2 * np.pi, 41)[:-1]
+    disc = turned(flat(shapely.Polygon(np.stack([0.452 * np.cos(t), 0.452 * np.sin(t)], 1)), 0.0), np.pi / 2, "x")
+    disc = moved(scaled(disc, w, 1, h), 0, d / 2 - 0.72 * d, h / 2)
+    face = material(look, "face", finish, "clock_face/0")
+    disc = whole_image(disc, face, -w * 0.452, w * 0.452, h * 0.048, h * 0.952)
+    return parts_of((metal(look, finish, "black"), case), (face, disc))
+
+
+def vase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A turned vase, with dry branches where look['branches'] is 1."""
+    w, _, h = size
+    branches = bool(look.get("branches"))
+    body = h * 0.42 if branches else h
+    belly, neck, at = rng.uniform(0.42, 0.5), rng.uniform(0.16, 0.28), rng.uniform(0.3, 0.55)
+    t = np.linspace(0, 1, 12)
+    r = np.interp(t, [0, at, 0.85, 1], [0.28, belly, neck, neck * 1.2])
+    k = np.array([0.25, 0.5, 0.25])
+    r = np.convolve(np.pad(r, 1, mode="edge"), k, mode="valid")
+    r = r / r.max() * (0.5 if not branches else 0.34)
+    inner = np.maximum(r - 0.035, 0.02)
+    profile = [
+        (0, 0),
+        *zip(r * w, t * body),
+        *[(a * w, b * body) for a, b in zip(inner[:4:-1], t[:4:-1] - 0.005)],
+        (0, body * 0.4),
+    ]
+    clay = (
+        plain((0.85, 0.83, 0.78), 0.55)
+        if look.get("glaze", "white") == "white"
+        else plain(
+            {
+                "blue": (0.16, 0.26, 0.38),
+                "green": (0.25, 0.36, 0.30),
+                "terracotta": (0.66, 0.40, 0.29),
+                "black": (0.08, 0.08, 0.085),
+            }[str(look["glaze"])],
+            0.4,
+        )
+    )
+    twigs, buds = [], []
+    if branches:
+        for _ in range(7):
+            a, lean = rng.uniform(0, 6.28), rng.uniform(0.04, 0.5) * w * 0.9
+            s = np.linspace(0, 1, 6)
+            bow = np.stack(
+                [
+                    np.cos(a) * lean * s**1.5,
+                    np.sin(a) * lean * s**1.5,
+                    body * 0.75 + (h - body * 0.75) * s * rng.uniform(0.82, 1.0),
+                ],
+                1,
+            )
+            bow[1:-1, :2] += rng.normal(0, 0.006, (4, 2))
+            twigs.append(tube(bow, np.linspace(0.0028, 0.0012, 6), 5))
+            for q in np.linspace(0.45, 1, 6):
+                i = min(5, round(q * 5))
+                buds.append(moved(scaled(ball(0.009, 6, 5), 1, 1, 1.5), *(bow[i] + rng.normal(0, 0.008, 3))))
+    return parts_of(
+        (clay, lathe(profile, 28, 0.9)), (plain((0.32, 0.23, 0.16), 0.9), twigs), (plain((0.86, 0.80, 0.72), 0.9), buds)
+    )
+
+
+def decor_makers() -> list[Maker]:
+    made = []
+    frames = (("oak/0", "oak"), ("black", "black"), ("white", "white"), ("walnut/0", "walnut"), ("brass", "golden"))
+    halls = {**LIVING, "corridor": 1.0, "hall": 1.0, "kids_room": 0.4}
+    art = [m for m in MATERIALS.values() if m.family == "art"]
+    for i, m in enumerate(art):
+        stem = m.key.replace("/", "_")
+        frame, word = frames[i % 5]
+        words = {"support": "wall", "rooms": halls, "elevation": 1.2, "colours": m.colours, "materials": m.materials}
+        if m.materials == ("canvas",):
+            made.append(
+                maker(
+                    stem,
+                    "painting",
+                    m.name,
+                    (0.9, 0.035, 0.7),
+                    canvas if i % 2 else picture,
+                    synonyms=("picture",),
+                    look={
+                        "art": m.key,
+                        "frame": "brass" if i % 3 == 0 else frame,
+                        "width": 0.045 if i % 3 == 0 else 0.02,
+                    },
+                    **words,
+                )
+            )
+        else:
+            made.append(
+                maker(
+                    stem,
+                    "picture",
+                    f"{m.name} in a {word} frame",
+                    (0.6, 0.025, 0.8),
+                    picture,
+                    synonyms=("framed picture", "print"),
+                    look={"art": m.key, "frame": frame, "mat": 0.10 if i % 2 else 0.0},
+                    **words,
+                )
+            )
+        if "poster" in stem:
+            made.append(
+                maker(
+                    f"paper_{stem}",
+                    "poster",
+                    m.name,
+                    (0.5, 0.012, 0.7),
+                    poster,
+                    look={"art": m.key},
+                    **{**words, "rooms": {"kids_room": 1.0, "bedroom": 0.5, "study": 0.4, "gym": 0.6}},
+                )
+            )
+    for name, frame, is_round, size in (
+        ("black", "black", 0, (0.6, 0.025, 0.9)),
+        ("oak", "oak/0", 0, (0.7, 0.03, 1.1)),
+        ("brass", "brass", 0, (0.6, 0.03, 0.9)),
+        ("round", "black", 1, (0.7, 0.03, 0.7)),
+        ("round_brass", "brass", 1, (0.6, 0.03, 0.6)),
+        ("white", "white", 0, (0.6, 0.03, 0.8)),
+    ):
+        made.append(
+            maker(
+                f"mirror_{name}",
+                "mirror",
+                ("round " if is_round else "") + f"mirror in a {frame.split('/')[0].replace('brass', 'golden')} frame",
+                size,
+                mirror,
+                support="wall",
+                elevation=1.2,
+                rooms={"bathroom": 1.0, "hall": 0.8, "main_bedroom": 0.6, "bedroom": 0.4, "toilet": 0.8, "closet": 0.6},
+                colours=(frame.split("/")[0],),
+                materials=("glass",),
+                tags=("round",) if is_round else (),
+                look={"frame": frame, "round": is_round},
+            )
+        )
+    for i, (name, rim) in enumerate((("white", "black"), ("black", "black"), ("cream", "brass"))):
+        made.append(
+            maker(
+                f"wall_clock_{name}",
+                "wall clock",
+                f"{name} wall clock",
+                (0.3, 0.045, 0.3),
+                wall_clock,
+                support="wall",
+                elevation=1.8,
+                rooms={"kitchen": 1.0, "living_room": 0.5, "study": 0.6, "hall": 0.4},
+                synonyms=("clock",),
+                colours=(name,),
+                materials=("metal",),
+                look={"face": f"clock_face/{i}", "metal": rim},
+            )
+        )
+    for glaze in ("white", "blue", "green", "terracotta", "black"):
+        spots = (
+            "sideboard",
+            "dining table",
+            "coffee table",
+            "bookcase",
+            "console",
+            "dresser",
+            "side table",
+            "fireplace",
+            "cupboard",
+        )
+        made.append(
+            maker(
+                f"vase_{glaze}",
+                "vase",
+                f"{glaze} vase",
+                (0.14, 0.14, 0.26),
+                vase,
+                on=spots,
+                rooms=LIVING,
+                colours=(glaze,),
+                materials=("ceramic",),
+                look={"glaze": glaze},
+            )
+        )
+        if glaze in ("white", "black", "terracotta"):
+            made.append(
+                maker(
+                    f"vase_branches_{glaze}",
+                    "vase",
+                    f"{glaze} vase with branches",
+                    (0.34, 0.34, 0.75),
+                    vase,
+                    on=spots,
+                    rooms=LIVING,
+                    colours=(glaze,),
+                    materials=("ceramic",),
+                    look={"glaze": glaze, "branches": 1.0},
+                )
+            )
+    return made
