@@ -66,7 +66,7 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         return tuple(_box(low, high) for low, high in slabs)
     if not slabs and (max(size) < SMALL or is_solid(points)):
         return (_box(points.min(axis=0), points.max(axis=0)),)
-    cut = sorted({round(float(high[2]), 4) for _, high in slabs})
+    cut = sorted({round(float(high[2]), 4) + 1e-6 for _, high in slabs} | set(levels(parts)))
     for n in CELLS:
         bounds = grid_boxes(points, n, cut)
         if len(bounds) <= MOST_BOXES:
@@ -90,6 +90,25 @@ def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
 
 
+def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:
+    """Heights of large horizontal faces (undersides just below, tops just above), metres: where to cut the grid.
+
+    Args:
+      share: of the area of the thing's outline that faces at one height must cover.
+    """
+    corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    flat = np.abs(normals[:, 2]) > 0.98 * np.linalg.norm(normals, axis=1)
+    heights = corners[flat][:, :, 2].mean(axis=1)
+    sides = np.where(normals[flat, 2] > 0, 1, -1)
+    keys, group = np.unique(np.stack([np.rint(heights / 0.004), sides]), axis=1, return_inverse=True)
+    areas = np.bincount(group.ravel(), np.abs(normals[flat, 2]), keys.shape[1])
+    mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(np.bincount(group.ravel(), minlength=keys.shape[1]), 1)
+    outline = np.prod(np.ptp(corners.reshape(-1, 3), axis=0)[:2])
+    large = np.argsort(-areas)[:8]
+    return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > share * outline)
+
+
 def is_solid(points: np.ndarray) -> bool:
     """Whether a thing all but fills its bounding box: a cupboard, a crate."""
     boxes = grid_boxes(points, 5)
@@ -107,7 +126,7 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tu
     low, high = points.min(axis=0), points.max(axis=0)
     counts = np.maximum(1, np.rint((high - low) / ((high - low).max() / n + 1e-12))).astype(int)
     edges = [np.linspace(low[i], high[i] + 1e-9, counts[i] + 1) for i in range(3)]
-    edges[2] = np.unique(np.concatenate([edges[2], [z + 1e-6 for z in cut if low[2] < z < high[2]]]))
+    edges[2] = np.unique(np.concatenate([edges[2], [z for z in cut if low[2] < z < high[2]]]))
     cells = [np.clip(np.searchsorted(e, points[:, i], side="right") - 1, 0, len(e) - 2) for i, e in enumerate(edges)]
     shape = tuple(len(e) - 1 for e in edges)
     flat = np.ravel_multi_index(cells, shape)
