@@ -107,18 +107,46 @@ def is_flat(size: tuple[float, float, float], z: float = 0.0) -> bool:
     return size[2] <= 0.03 and z < 0.01
 
 
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An arrangement at a pose, with what it would add to the room."""
+
+    things: tuple[Thing, ...]
+    solids: tuple[Box, ...]
+    clearances: tuple[Box, ...]
+    walk: np.ndarray
+
+
 def pack(
     space: RoomSpace, items: Sequence[Item], poses: Iterable[Pose], group: str, tries: int = 40,
 ) -> list[Thing] | None:
-    """Put the arrangement at the best pose that fits, or return None."""
-    for pose in sorted(poses, key=lambda p: -p.score)[:tries]:
-        things = _put(space, items, pose, group)
-        if things is not None:
-            return things
-    return None
+    """Put the arrangement at the first pose that takes all of it, or at one that takes most of it.
+
+    A worse pose must make up for its rank by more things (PATIENCE poses for one thing).
+    """
+    best: tuple[float, Fit] | None = None
+    for rank, pose in enumerate(sorted(poses, key=lambda p: -p.score)[:tries]):
+        if best is not None and len(items) - rank / PATIENCE <= best[0]:
+            break
+        fit = _fit(space, items, pose, group)
+        if fit is None:
+            continue
+        value = len(fit.things) - rank / PATIENCE
+        if best is None or value > best[0]:
+            best = value, fit
+        if len(fit.things) == len(items):
+            break
+    if best is None:
+        return None
+    fit = best[1]
+    space.add(fit.solids, fit.clearances, fit.walk)
+    return list(fit.things)
 
 
-def _put(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> list[Thing] | None:
+PATIENCE = 6.0
+
+
+def _fit(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> Fit | None:
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     things: list[Thing | None] = []
     boxes: list[Box | None] = []
@@ -174,23 +202,25 @@ def _put(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> lis
         plan = space.walkable(solids, reach)
         if plan is None:
             return None
-    space.add(solids, zones, plan)
-    return _keep_resting(space, items, things)
+    resting, kept = _resting(space, items, things)
+    return Fit(tuple(kept), (*solids, *resting), tuple(zones), plan)
 
 
-def _keep_resting(space: RoomSpace, items, things) -> list[Thing]:
-    """The things that found a place, less those on a surface that would touch more than what carries them."""
-    kept = []
+def _resting(space: RoomSpace, items, things) -> tuple[list[Box], list[Thing]]:
+    """Boxes of what rests on surfaces, and all things less those that would touch more than what carries them."""
+    kept, boxes = [], []
+    own = [t.box for i, t in zip(items, things) if t is not None and i.on is None and not is_flat(i.extent, i.z)]
     for item, thing in zip(items, things):
         if thing is None:
             continue
         if item.on is not None:
             b, carrier = thing.box, thing.parent.box
-            if any(overlap(b, q) and not same_box(q, carrier) for q in space.solids) or not space.inside(b):
+            others = (*space.solids, *own, *boxes)
+            if any(overlap(b, q) and not same_box(q, carrier) for q in others) or not space.inside(b):
                 continue
-            space.add([b])
+            boxes.append(b)
         kept.append(thing)
-    return kept
+    return boxes, kept
 
 
 def _without_optional(items, things, boxes):
@@ -259,7 +289,7 @@ def wall_poses(
         spots += [(s0 + s1) / 2 for s0, s1, o in wall.openings if o.kind == "window"]
         spots += list(np.arange(low, high, step))
         for s in sorted({round(float(s), 3) for s in spots}):
-            if not low - 1e-6 <= s <= high + 1e-6:
+            if not low - 1e-3 <= s <= high + 1e-3:
                 continue
             if any(s - half < b - 0.01 and s + half > a + 0.01 for a, b in doors):
                 continue

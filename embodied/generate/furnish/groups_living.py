@@ -44,7 +44,7 @@ def seating(ctx: Context) -> list[Thing] | None:
             for distance, shift in _distances(ctx, stand, sofa):
                 items = _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich)
                 poses = wall_poses(
-                    ctx.space, stand.size[0], score=lambda w, s: _screen_score(ctx, w, s, distance, stand.size[0]),
+                    ctx.space, stand.size[0], score=lambda w, s, far=distance: _screen_score(ctx, w, s, far, stand.size[0]),
                 )
                 found = ctx.put(items, poses, "seating", tries=14)
                 if found:
@@ -138,7 +138,7 @@ def sofa_group(ctx: Context) -> list[Thing] | None:
             items.append(Item(chair, x, y - 0.1, facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10), optional=True,
                               role="armchair"))
         found = ctx.put(items, wall_poses(
-            ctx.space, w, score=lambda wall, s: 1.2 * centred(wall, s) + 0.4 * ctx.rng.random()
+            ctx.space, w, score=lambda wall, s, w=w: 1.2 * centred(wall, s) + 0.4 * ctx.rng.random()
             - 0.5 * at_window(wall, s, w),
         ), "seating", tries=40)
         if found:
@@ -213,17 +213,17 @@ def dining(ctx: Context, table_role: str = "dining table", chair_role: str = "di
             items = table_items(ctx, table, chair, wall=against)
             if against:
                 poses = wall_poses(
-                    ctx.space, table.size[0] + 0.3, score=lambda w, s: _table_wall_score(ctx, w, s, table),
+                    ctx.space, table.size[0] + 0.3, score=lambda w, s, table=table: _table_wall_score(ctx, w, s, table),
                 )
             else:
-                poses = floor_poses(ctx.space, score=lambda x, y, yaw: _table_score(ctx, x, y, yaw, table), yaws=yaws)
+                poses = floor_poses(ctx.space, score=lambda x, y, yaw: _table_score(ctx, x, y, yaw), yaws=yaws)
             found = ctx.put(items, poses, "dining", tries=24)
             if found:
                 return found
     return None
 
 
-def _table_score(ctx: Context, x: float, y: float, yaw: float, table: Asset) -> float:
+def _table_score(ctx: Context, x: float, y: float, yaw: float) -> float:
     x0, y0, x1, y1 = ctx.space.polygon.bounds
     along_long = (x1 - x0 >= y1 - y0) == (abs(math.cos(yaw)) > 0.5)
     centre = math.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2)

@@ -370,7 +370,7 @@ def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
                                       z=1.55, optional=True, role="wall lamp"))
             poses = wall_poses(
                 ctx.space, w + 0.04, step=0.15,
-                score=lambda wall, s: 0.5 * centred(wall, s) - 1.5 * at_window(wall, s, w) + 0.5 * ctx.rng.random(),
+                score=lambda wall, s, w=w: 0.5 * centred(wall, s) - 1.5 * at_window(wall, s, w) + 0.5 * ctx.rng.random(),
             )
             found = ctx.put(items, poses, "washing", tries=40)
             if found:
@@ -391,7 +391,7 @@ def bathing(ctx: Context, role: str) -> list[Thing] | None:
         if mat is not None:
             items.append(Item(mat, 0.0, -d - 0.08 - mat.size[1] / 2, optional=True, role="bath mat"))
 
-        def score(wall: Wall, s: float) -> float:
+        def score(wall: Wall, s: float, w: float = w, h: float = h) -> float:
             return 2.0 * at_corner(wall, s, w) - (0.2 if h < 1.2 else 3.0) * at_window(wall, s, w) \
                 + 0.4 * ctx.rng.random()
 

@@ -43,7 +43,7 @@ def desk(ctx: Context) -> list[Thing] | None:
             sign = 1 if ctx.chance(0.5) else -1
             items.append(Item(lamp, sign * w * 0.36, d * 0.2, wobble(ctx.rng, 20), on=0, role="desk lamp"))
         found = ctx.put(items, wall_poses(
-            ctx.space, w, score=lambda wall, s: 0.9 * at_window(wall, s, w) + 0.4 * at_corner(wall, s, w)
+            ctx.space, w, score=lambda wall, s, w=w: 0.9 * at_window(wall, s, w) + 0.4 * at_corner(wall, s, w)
             + 0.3 * centred(wall, s) + 0.5 * ctx.rng.random(),
         ), "desk", tries=36)
         if found:
@@ -185,7 +185,7 @@ def doormat(ctx: Context) -> list[Thing] | None:
     asset = ctx.pick("doormat")
     if asset is None:
         return None
-    w, d, _ = asset.size
+    d = asset.size[1]
     for wall in ctx.space.walls:
         for s0, s1, o in wall.openings:
             if o.kind in ("front_door", "back_door"):

@@ -439,6 +439,5 @@ def oddities(ctx: Context) -> None:
             continue
         asset = ctx.pick(role, most=(3.0, 0.8, height - z - 0.02))
         for wall in sorted(ctx.space.walls, key=lambda w: (has_window(w), -w.length)):
-            if mount(ctx, asset, wall, wall.length * ctx.rng.uniform(0.3, 0.7), z, "wall", margin=margin,
-                     role=asset.object_class):
+            if mount(ctx, asset, wall, wall.length * ctx.rng.uniform(0.3, 0.7), z, "wall", margin=margin, role=role):
                 break
