@@ -53,13 +53,14 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
       size: (width, depth, height) of the placed object, metres.
     """
     scale = np.asarray(size) / np.asarray(asset.size)
-    slabs, points = [], surface_points(parts)
+    slabs, free, points = [], [], surface_points(parts)
     for s in asset.surfaces:
         low = np.array([s.x0, s.y0, s.z]) * scale
         high = np.array([s.x1, s.y1, s.z + s.headroom]) * scale
         inside = np.all((points[:, :2] > low[:2]) & (points[:, :2] < high[:2]), axis=1)
         points[inside & (np.abs(points[:, 2] - low[2]) < EVEN), 2] = low[2]
         points = points[~(inside & (points[:, 2] > low[2]) & (points[:, 2] < high[2]))]
+        free.append((low, high))
         bottom = max(low[2] - SLAB, 0.0)
         slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
     if not len(points):
@@ -71,6 +72,8 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         bounds = grid_boxes(points, n, cut)
         if len(bounds) <= MOST_BOXES:
             break
+    for low, high in free:
+        bounds = [piece for b in bounds for piece in without(b, (low, high))]
     return tuple(_box(low, high, points.min(axis=0)) for low, high in (*slabs, *bounds))
 
 
@@ -88,6 +91,26 @@ def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
     a, b = np.sqrt(k * 0.7548776662466927 % 1)[:, None], (k * 0.5698402909980532 % 1)[:, None]
     spread = (1 - a) * chosen[:, 0] + a * (1 - b) * chosen[:, 1] + a * b * chosen[:, 2]
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
+
+
+def without(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The part of box `one` outside box `other` as up to six boxes; all given as (low, high) corners."""
+    low, high = one[0].copy(), one[1].copy()
+    if np.any(low >= other[1] - 1e-6) or np.any(high <= other[0] + 1e-6):
+        return [one]
+    pieces = []
+    for axis in (2, 0, 1):
+        if low[axis] < other[0][axis] - 1e-6:
+            cut = high.copy()
+            cut[axis] = other[0][axis]
+            pieces.append((low.copy(), cut))
+            low[axis] = other[0][axis]
+        if high[axis] > other[1][axis] + 1e-6:
+            cut = low.copy()
+            cut[axis] = other[1][axis]
+            pieces.append((cut, high.copy()))
+            high[axis] = other[1][axis]
+    return pieces
 
 
 def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:

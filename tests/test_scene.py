@@ -143,6 +143,17 @@ def test_collision_boxes_leave_support_surfaces_free():
     assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.5, abs=5e-3)
 
 
+def test_cutting_a_box_out_of_a_box_keeps_the_rest():
+    rng = np.random.default_rng(2)
+    one, other = (np.zeros(3), np.array([1.0, 2.0, 3.0])), (np.array([0.2, -1.0, 1.0]), np.array([0.7, 1.5, 2.0]))
+    pieces = collision.without(one, other)
+    assert sum(float(np.prod(h - low)) for low, h in pieces) == pytest.approx(6.0 - 0.5 * 1.5 * 1.0)
+    for point in rng.uniform(one[0], one[1], (200, 3)):
+        inside = [bool(np.all(point > low) and np.all(point < h)) for low, h in pieces]
+        assert sum(inside) == (not (np.all(point > other[0]) and np.all(point < other[1])))
+    assert collision.without(one, (one[1], one[1] + 1)) == [one]
+
+
 def test_few_boxes_cover_a_complicated_thing():
     rng = np.random.default_rng(0)
     points = rng.uniform(0, 1, (3000, 3))
