@@ -21,7 +21,13 @@ RADIUS = 0.2
 """Radius of the agent's body, metres."""
 CELL = 0.1
 """Grid on which viewpoints are chosen, metres."""
-LONGEST = 2.3
+APART = 0.8
+"""Least distance between viewpoints of one room, in units of the wanted spacing."""
+LOOKS = 16
+"""Candidates per viewpoint whose views of the others are compared."""
+CROWDED = 0.75
+"""Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
+LONGEST = 2.8
 """Longest edge in units of the wanted spacing."""
 
 
@@ -117,8 +123,9 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
             raise HouseError(f"room {r.id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
                              "widen its door or move the furniture that blocks it")
     room_of_cell[~reach] = -1
-    nodes = _spread(grid, room_of_cell, len(rooms), spacing)
+    nodes = _spread(space, grid, room_of_cell, rooms, spacing)
     nodes = _join(house, storey, space, grid, reach, nodes, spacing)
+    nodes = _thinned(space, grid, room_of_cell, nodes, spacing)
     xy = grid.xy[nodes]
     pairs = _pruned(xy, _visible_pairs(space, xy, LONGEST * spacing))
     return xy.tolist(), [rooms[room_of_cell[n]].id for n in nodes], pairs
@@ -195,34 +202,59 @@ class _Grid:
         return csr_matrix((np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
 
 
-def _spread(grid: _Grid, room_of_cell: np.ndarray, rooms: int, spacing: float) -> list[int]:
-    """Cells of the viewpoints: in each room first its calmest spot, then a loose packing of the rest."""
+def _spread(space, grid: _Grid, room_of_cell: np.ndarray, rooms, spacing: float) -> list[int]:
+    """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see others."""
     chosen: list[int] = []
-    apart = 0.86 * spacing
-    for k in range(rooms):
+    apart = APART * spacing
+    order = sorted(range(len(rooms)), key=lambda k: (rooms[k].kind not in ("hall", "corridor", "stairwell"), k))
+    for k in order:
         cells = np.flatnonzero(room_of_cell == k)
-        if len(cells) == 0:
-            continue
         xy, calm = grid.xy[cells], np.minimum(grid.clearance[cells], 0.5)
         gap = np.full(len(cells), np.inf)
-        elsewhere = np.full(len(cells), np.inf)
-        if chosen:
-            elsewhere = cKDTree(grid.xy[chosen]).query(xy)[0]
-        middle = xy.mean(0)
-        value = 2.0 * calm - 0.15 * np.hypot(*(xy - middle).T) + 0.2 * np.minimum(elsewhere, 1.2)
-        if len(cells) > 400:
-            value = 2.0 * calm + 0.05 * np.hypot(*(xy - middle).T) + 0.2 * np.minimum(elsewhere, 1.2)
-        best = int(np.argmax(value))
-        while True:
+        elsewhere = cKDTree(grid.xy[chosen]).query(xy)[0] if chosen else np.full(len(cells), np.inf)
+        open_ = np.ones(len(cells), bool)
+        while open_.any():
+            # close to the wanted distance from the room's others, well clear of obstacles
+            value = 1.2 * calm - 0.5 * np.abs(np.minimum(gap, 1.5 * apart) - apart) - 0.4 * np.maximum(0, 1 - elsewhere)
+            ranked = np.flatnonzero(open_)[np.argsort(-value[open_], kind="stable")]
+            top = ranked[: max(1, len(ranked) // 2)]
+            top = top[np.linspace(0, len(top) - 1, min(LOOKS, len(top))).astype(int)]
+            best = int(top[np.argmax(value[top] + 0.5 * np.minimum(_seen(space, grid, cells[top], chosen, spacing), 3))])
             chosen.append(int(cells[best]))
             gap = np.minimum(gap, np.hypot(*(xy - xy[best]).T))
-            open_ = (gap >= apart) & (elsewhere >= 0.45 * apart)
-            if not open_.any():
-                break
-            # next: close to the wanted distance from what is there, well clear of obstacles
-            value = np.where(open_, 1.5 * calm - 0.6 * np.abs(gap - apart * 1.05), -np.inf)
-            best = int(np.argmax(value))
+            open_ = (gap >= apart) & (elsewhere >= 0.5 * apart)
     return chosen
+
+
+def _seen(space, grid: _Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
+    """(n,) how many chosen viewpoints, not too near, each cell sees."""
+    if not chosen:
+        return np.zeros(len(cells))
+    xy, others = grid.xy[cells], grid.xy[chosen]
+    d = np.hypot(*(xy[:, None] - others[None]).transpose(2, 0, 1))
+    i, j = np.nonzero((d > 0.6 * spacing) & (d < 2.0 * spacing))
+    ok = shapely.covers(space, shapely.linestrings(np.stack([xy[i], others[j]], 1))) if len(i) else np.zeros(0, bool)
+    return np.bincount(i[ok], minlength=len(cells)).astype(float)
+
+
+def _thinned(space, grid: _Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
+    """The nodes without those that crowd another one and that neither their room nor the graph needs."""
+    xy = grid.xy[nodes]
+    pairs = _visible_pairs(space, xy, LONGEST * spacing)
+    lengths = np.hypot(*(xy[pairs[:, 0]] - xy[pairs[:, 1]]).T)
+    alive = np.ones(len(nodes), bool)
+    rooms = room_of_cell[nodes]
+    for a, b in pairs[np.argsort(lengths, kind="stable")][: int((lengths < CROWDED * spacing).sum())].tolist():
+        for k in (a, b) if grid.clearance[nodes[a]] <= grid.clearance[nodes[b]] else (b, a):
+            if not (alive[a] and alive[b]) or (alive & (rooms == rooms[k])).sum() < 2:
+                continue
+            alive[k] = False
+            kept = pairs[alive[pairs].all(1)]
+            at = np.cumsum(alive) - 1
+            n = int(alive.sum())
+            if connected_components(csr_matrix((np.ones(len(kept)), at[kept].T), shape=(n, n)), directed=False)[0] > 1:
+                alive[k] = True
+    return [n for n, keep in zip(nodes, alive) if keep]
 
 
 def _visible_pairs(space: shapely.Polygon, xy: np.ndarray, longest: float) -> np.ndarray:
@@ -244,7 +276,7 @@ def _pruned(xy: np.ndarray, pairs: np.ndarray) -> list[tuple[int, int]]:
     kept = []
     for (a, b), d in sorted(zip(map(tuple, pairs.tolist()), lengths.tolist()), key=lambda e: (-e[1], e[0])):
         around = [near[a][k] + near[b][k] for k in near[a] if k in near[b] and max(near[a][k], near[b][k]) < 0.98 * d]
-        if around and min(around) < 1.05 * d:
+        if around and min(around) < 1.01 * d:
             del near[a][b], near[b][a]
         else:
             kept.append((a, b))
