@@ -10,22 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from embodied.assistants.advisor import Advisor
-from embodied.assistants.anna import Anna
 from embodied.assistants.descriptions import Describer, frequent_classes
-from embodied.assistants.hari import HariAssistant
 from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
 from embodied.datasets.scale import Scale, scale
-from embodied.env import HannaEnv, HelpEnv, VnlaEnv
-from embodied.hari_env import HariEnv
+from embodied.env import HelpEnv
+from embodied.environments import environment_maker
 from embodied.house import House
 from embodied.interface import FindObject, Language, Route, Task
-from embodied.language.plain import PlainLanguage
-from embodied.moves import PanoramicMoves
 from embodied.navgraph import NavGraph, from_matterport
 from embodied.records import load_lines
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
-from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -139,21 +133,11 @@ class Dataset:
           worlds: worlds with pictures by house name; without, the tasks play in Places.
         """
         places = worlds or self.places(split)
-        if self.kind == "hanna":
-            graphs = {name: w.graph for name, w in places.items()}
-            anna = Anna(graphs, {name: self.routes(name) for name in places}, split=ANNA_SPLIT[split])
-            moves = PanoramicMoves()
-            return lambda: HannaEnv(places, anna, moves)
-        if self.kind == "vnla":
-            teacher = VnlaTeacher()
-            advisor = Advisor(teacher, language or PlainLanguage())
-            return lambda: VnlaEnv(places, advisor, teacher.moves)
-        if self.kind == "hari":
-            describer, moves = self.describer(), PanoramicMoves()
-            assistant = HariAssistant(describer)
-            return lambda: HariEnv(places, assistant, describer, moves=moves)
-        moves = PanoramicMoves()
-        return lambda: HelpEnv(places, moves=moves)
+        return environment_maker(
+            self.kind, places, wording=ANNA_SPLIT.get(split, ""), language=language,
+            routes={name: self.routes(name) for name in places} if self.kind == "hanna" else None,
+            describer=self.describer() if self.kind == "hari" else None,
+        )
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""

@@ -1,0 +1,52 @@
+"""Which environment and assistant belong to which kind of task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from embodied.assistants.advisor import Advisor
+from embodied.assistants.anna import Anna
+from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.assistants.hari import HariAssistant
+from embodied.env import HannaEnv, HelpEnv, VnlaEnv
+from embodied.hari_env import HariEnv
+from embodied.interface import Language, Route
+from embodied.language.plain import PlainLanguage
+from embodied.moves import PanoramicMoves
+from embodied.teachers.vnla import VnlaTeacher
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+
+def environment_maker(
+    kind: str, worlds: Mapping[str, World], *, routes: Mapping[str, Sequence[Route]] | None = None,
+    wording: str = "test", describer: Describer | None = None, language: Language | None = None,
+) -> Callable[[], HelpEnv]:
+    """A maker of environments for a kind of task; all it makes share assistant and caches.
+
+    Args:
+      routes: HANNA's, by world; `wording` is the split of them that is spoken.
+      describer: HARI's; frequent objects are counted over `worlds` where not given.
+      language: of VNLA's advisor.
+
+    Raises:
+      ValueError: an unknown kind.
+    """
+    if kind in ("find", "vln"):
+        moves = PanoramicMoves()
+        return lambda: HelpEnv(worlds, moves=moves)
+    if kind == "hanna":
+        anna = Anna({name: w.graph for name, w in worlds.items()}, routes or {}, split=wording)
+        moves = PanoramicMoves()
+        return lambda: HannaEnv(worlds, anna, moves)
+    if kind == "vnla":
+        teacher = VnlaTeacher()
+        advisor = Advisor(teacher, language or PlainLanguage())
+        return lambda: VnlaEnv(worlds, advisor, teacher.moves)
+    if kind == "hari":
+        say = describer or Describer(frequent_classes(worlds.values()))
+        assistant, moves = HariAssistant(say), PanoramicMoves()
+        return lambda: HariEnv(worlds, assistant, say, moves=moves)
+    raise ValueError(f"unknown kind of task {kind!r}")

@@ -1,0 +1,98 @@
+"""One house or one split, ready to play in: worlds, tasks, environments and cheap features."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from assets.cache import digest, write_bytes
+from assets.catalogue import load_catalogue
+from assets.records import ROOM_KINDS
+from embodied.assistants.routes import build_routes
+from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.parts import part_tasks
+from embodied.datasets.store import Dataset
+from embodied.env import HelpEnv
+from embodied.environments import environment_maker
+from embodied.features import semantic_features
+from embodied.interface import Task
+from embodied.language.plain import PlainLanguage
+from embodied.world import World, open_world
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+
+TASKS = 200
+"""Tasks of a generated house."""
+AREA = (70.0, 110.0)
+"""Size of a generated house, square metres: a flat, so that it is ready in seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Playground:
+    worlds: Mapping[str, World]
+    tasks: tuple[Task, ...]
+    make_env: Callable[[], HelpEnv]
+    features: Mapping[str, np.ndarray]
+    """(nodes, 36, D) float32 by world; empty when not asked for."""
+
+
+def make_playground(
+    kind: str, data: Path | None, split: str, *, seed: int, cache: Path, worlds: Mapping[str, World] | None = None,
+    with_features: bool = True,
+) -> Playground:
+    """A split of a data set, or one flat generated from `seed` where `data` is None.
+
+    Raises:
+      ValueError: the data set is of another kind.
+    """
+    catalogue = load_catalogue(cache)
+    if data is None:
+        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds)
+    else:
+        whole = Dataset(data)
+        if whole.kind != kind:
+            raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
+        worlds = worlds or {n: whole.open_world(n, catalogue, cache) for n in whole.names(split)}
+        tasks, make_env = whole.tasks(split), whole.environment(split, worlds=worlds)
+    features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if with_features else {}
+    return Playground(worlds, tasks, make_env, features)
+
+
+def seen_features(world: World, catalogue: Catalogue, cache: Path) -> np.ndarray:
+    """The semantic features of a world over all classes of the catalogue, kept in the cache."""
+    classes = tuple(catalogue.classes)
+    path = cache / "semantic" / f"{digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes)[:32]}.npy"
+    if path.exists():
+        return np.load(path, allow_pickle=False)
+    features = semantic_features(world, classes, ROOM_KINDS)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, _npy(features))
+    return features
+
+
+def _npy(array: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    np.save(out, array, allow_pickle=False)
+    return out.getvalue()
+
+
+def _flat(
+    kind: str, seed: int, cache: Path, catalogue: Catalogue, worlds: Mapping[str, World] | None
+) -> tuple[Mapping[str, World], tuple[Task, ...], Callable[[], HelpEnv]]:
+    """One world (generated unless given), tasks in it, and a maker of environments."""
+    language = PlainLanguage()
+    if worlds is None:
+        name = f"flat_{seed}"
+        house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
+        worlds = {name: open_world(house, catalogue, cache, graph=graph)}
+    name, world = next(iter(worlds.items()))
+    routes = build_routes(world, seed=seed, language=language, house_split="test") if kind in ("hanna", "vln") else ()
+    part = "main_unseen" if kind == "hari" else "main"
+    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language)[part]
+    return worlds, tuple(tasks), environment_maker(kind, worlds, routes={name: routes})

@@ -1,0 +1,211 @@
+"""Gymnasium spaces of an observation and of an action, and how records become arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from embodied.interface import (
+    TURNS,
+    VIEWS,
+    Action,
+    Ask,
+    Description,
+    Feature,
+    FeatureSource,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Sight,
+    Stop,
+)
+
+INTENTIONS = tuple(Intention)
+KINDS = ("object", "room", "action")
+LARGE = 1e6
+"""Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes of the spaces; what does not fit is an error, not a silent cut (text apart)."""
+
+    candidates: int = 16
+    """Most moves at one pose; real and generated graphs stay below 14."""
+    text: int = 1000
+    """Most characters of an instruction; longer ones are cut."""
+    features: int = 21
+    """HARI: most feature sets of a description (a room and 20 objects)."""
+    stack: int = 3
+    """HARI: most goals on the stack."""
+    descriptions: bool = False
+    """HARI: whether descriptions are part of the observation."""
+
+    @property
+    def actions(self) -> int:
+        """Moves, then stop, then one request per intention."""
+        return self.candidates + 1 + len(INTENTIONS)
+
+
+def action_space(layout: Layout) -> spaces.Discrete:
+    return spaces.Discrete(layout.actions)
+
+
+def observation_space(layout: Layout, size: int) -> spaces.Dict:
+    """`size` is D of the features. Everything an Observation holds, padded with zeros."""
+    panorama = spaces.Box(-LARGE, LARGE, (VIEWS, size), np.float32)
+    whole = {
+        "panorama": panorama,
+        "target": panorama,
+        "has_target": spaces.Discrete(2),
+        "instruction": spaces.Box(0, 255, (layout.text,), np.uint8),
+        "candidates": spaces.Box(-1.0, 1.0, (layout.candidates, 4), np.float32),
+        "candidate_views": spaces.MultiDiscrete([VIEWS + 1] * layout.candidates),
+        "action_mask": spaces.MultiBinary(layout.actions),
+        "pose": spaces.MultiDiscrete([TURNS, 3]),
+        "mode": spaces.Discrete(2),
+        "clock": spaces.Box(0.0, LARGE, (3,), np.float32),
+    }
+    if layout.descriptions:
+        whole["state"] = _description_space(layout)
+        whole["goals"] = spaces.Box(0, LARGE, (layout.stack, layout.features, 5), np.float32)
+    return spaces.Dict(whole)
+
+
+def encode(o: Observation, source: FeatureSource, layout: Layout, names: dict[str, int]) -> dict[str, object]:
+    """An Observation as a member of `observation_space`.
+
+    'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
+    one (0 is padding); 'clock' is time, time on task and requests left (1e6 when
+    there is no budget). `names` numbers the words of descriptions and grows as they appear.
+
+    Raises:
+      ValueError: more candidates than the layout has room for.
+    """
+    n = len(o.candidates)
+    if n > layout.candidates:
+        raise ValueError(f"{n} candidates at one pose, the layout holds {layout.candidates}; enlarge Layout.candidates")
+    candidates = np.zeros((layout.candidates, 4), dtype=np.float32)
+    c = o.candidates
+    candidates[:n] = np.stack([np.sin(c.bearing), np.cos(c.bearing), np.sin(c.slope), np.cos(c.slope)], axis=1)
+    views = np.zeros(layout.candidates, dtype=np.int64)
+    views[:n] = c.view + 1
+    left = LARGE if o.requests_left is None else o.requests_left
+    whole = {
+        "panorama": source.features(o.sight).copy(),
+        "target": _features(o.target, source),
+        "has_target": np.int64(o.target is not None),
+        "instruction": codes_of(o.instruction, layout.text),
+        "candidates": candidates,
+        "candidate_views": views,
+        "action_mask": action_mask(o, layout),
+        "pose": np.array([o.turn, o.tilt + 1], dtype=np.int64),
+        "mode": np.int64(o.mode is Mode.SUB),
+        "clock": np.array([o.time, o.time_on_task, left], dtype=np.float32),
+    }
+    if layout.descriptions:
+        whole["state"] = _description(o.state_description, layout, names)
+        goals = np.zeros((layout.stack, layout.features, 5), dtype=np.float32)
+        for i, d in enumerate(o.goal_descriptions):
+            goals[i] = _description(d, layout, names)
+        whole["goals"] = goals
+    return whole
+
+
+def codes_of(text: str, length: int) -> np.ndarray:
+    """(length,) uint8: the text as ASCII codes, cut or padded with zeros.
+
+    Not a gymnasium Text space, because AsyncVectorEnv (Gymnasium 1.4) does not refresh texts that
+    lie in shared memory.
+    """
+    codes = np.frombuffer(text.encode("ascii", "replace")[:length], dtype=np.uint8)
+    return np.concatenate([codes, np.zeros(length - len(codes), dtype=np.uint8)])
+
+
+def text_of(codes: np.ndarray) -> str:
+    """The text behind `codes_of`."""
+    return bytes(np.asarray(codes, dtype=np.uint8)).rstrip(b"\0").decode("ascii", "replace")
+
+
+def action_mask(o: Observation, layout: Layout) -> np.ndarray:
+    """(actions,) int8: 1 where the action is possible."""
+    mask = np.zeros(layout.actions, dtype=np.int8)
+    mask[: len(o.candidates)] = o.candidates.allowed
+    mask[layout.candidates] = 1
+    for intention in o.can_ask:
+        mask[layout.candidates + 1 + INTENTIONS.index(intention)] = 1
+    return mask
+
+
+def decode(action: int, layout: Layout) -> Action:
+    """The record behind an action's number."""
+    if action < layout.candidates:
+        return Move(int(action))
+    if action == layout.candidates:
+        return Stop()
+    return Ask(INTENTIONS[int(action) - layout.candidates - 1])
+
+
+def number(action: Action, layout: Layout) -> int:
+    """The number of an action; inverse of `decode`."""
+    if isinstance(action, Move):
+        return action.candidate
+    if isinstance(action, Stop):
+        return layout.candidates
+    return layout.candidates + 1 + INTENTIONS.index(action.intention)
+
+
+class Numbers(gym.ObservationWrapper):
+    """For learners that cannot read: the instruction becomes word numbers, the dictionary one flat vector.
+
+    Words are numbered by a stable hash into `vocabulary` bins; the vector is (instruction word
+    counts, candidates, has_target, mode, clock, action mask, mean of the panorama's features).
+    """
+
+    def __init__(self, env: gym.Env, vocabulary: int = 256) -> None:
+        super().__init__(env)
+        self._vocabulary = vocabulary
+        size = len(self.observation(env.observation_space.sample()))
+        self.observation_space = spaces.Box(-LARGE, LARGE, (size,), np.float32)
+
+    def observation(self, observation: dict[str, object]) -> np.ndarray:
+        words = np.zeros(self._vocabulary, dtype=np.float32)
+        for word in text_of(observation["instruction"]).lower().split():
+            words[_stable(word) % self._vocabulary] += 1.0
+        parts = (
+            words, np.ravel(observation["candidates"]), [observation["has_target"], observation["mode"]],
+            np.minimum(observation["clock"], 100.0) / 100.0, observation["action_mask"],
+            np.mean(observation["panorama"], axis=0),
+        )
+        return np.nan_to_num(np.concatenate([np.ravel(p) for p in parts])).astype(np.float32)
+
+
+def _stable(word: str) -> int:
+    total = 0
+    for c in word:
+        total = (total * 131 + ord(c)) % 2_147_483_647
+    return total
+
+
+def _features(sight: Sight | None, source: FeatureSource) -> np.ndarray:
+    return np.zeros((VIEWS, source.size), dtype=np.float32) if sight is None else source.features(sight).copy()
+
+
+def _description_space(layout: Layout) -> spaces.Box:
+    """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
+    return spaces.Box(0, LARGE, (layout.features, 5), np.float32)
+
+
+def _description(description: Description, layout: Layout, names: dict[str, int]) -> np.ndarray:
+    rows = np.zeros((layout.features, 5), dtype=np.float32)
+    for i, f in enumerate(description[: layout.features]):
+        rows[i] = _feature(f, names)
+    return rows
+
+
+def _feature(f: Feature, names: dict[str, int]) -> tuple[int, ...]:
+    return (KINDS.index(f.kind) + 1, names.setdefault(f.name, len(names) + 1), f.horizontal, f.vertical + 1, f.distance)

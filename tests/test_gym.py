@@ -1,0 +1,140 @@
+"""Gymnasium: the checker, vector environments, masks, rewards, pictures, and a learner off the shelf."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hand_worlds import grid_world
+
+import embodied.gym_env
+from embodied.env import ActionError
+from embodied.interface import Ask, Intention, Move, Stop
+from embodied.spaces import Layout, Numbers, decode, number, text_of
+from embodied.teachers.shortest import shortest_action
+
+KINDS = ("find", "vln", "vnla", "hanna", "hari")
+
+
+def make(kind: str, tmp: str, **options):
+    return embodied.gym_env.make(kind, cache=tmp, worlds={"grid": grid_world()}, **options)
+
+
+@pytest.fixture
+def tmp(tmp_path) -> str:
+    return str(tmp_path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_environment_checker_has_nothing_to_say(kind, tmp):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gym.make(
+            f"embodied/{embodied.gym_env.IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array"
+        )
+        check_env(env.unwrapped, skip_render_check=False)
+
+
+def test_all_are_registered():
+    for name in ("Find", "VLN", "VNLA", "HANNA", "HARI"):
+        assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym_env:make"
+
+
+@pytest.mark.parametrize("vector", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
+def test_vector_environments_agree_with_single_ones(vector, tmp):
+    envs = vector([functools.partial(make, "hanna", tmp) for _ in range(2)])
+    observation, _ = envs.reset(seed=[3, 4])
+    alone = make("hanna", tmp)
+    first, _ = alone.reset(seed=4)
+    assert (observation["candidates"][1] == first["candidates"]).all()
+    for action in (0, 1, 0):
+        observation, reward, *_ = envs.step(np.array([0, action]))
+        first, r, *_ = alone.step(action)
+        assert text_of(observation["instruction"][1]) == text_of(first["instruction"]) and reward[1] == r
+        assert (observation["action_mask"][1] == first["action_mask"]).all()
+    envs.close()
+
+
+def test_the_same_seed_plays_the_same_episode(tmp):
+    rewards = []
+    for _ in range(2):
+        env, total = make("hanna", tmp, shaping=True), []
+        observation, _ = env.reset(seed=11)
+        rng = np.random.default_rng(0)
+        for _ in range(30):
+            observation, reward, terminated, truncated, _ = env.step(int(rng.choice(np.flatnonzero(observation["action_mask"]))))
+            total.append(reward)
+            if terminated or truncated:
+                break
+        rewards.append(total)
+    assert rewards[0] == rewards[1]
+
+
+def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
+    env = make("hanna", tmp, patience=2)
+    before, _ = env.reset(seed=0)
+    bad = int(np.flatnonzero(before["action_mask"] == 0)[0])
+    after, _, terminated, truncated, info = env.step(bad)
+    assert "does not exist" in info["invalid_action"] and not terminated and not truncated
+    assert all(np.array_equal(before[k], after[k]) for k in before)
+    assert env.step(bad)[3], "patience is over"
+    strict = make("hanna", tmp, strict=True)
+    strict.reset(seed=0)
+    with pytest.raises(ActionError):
+        strict.step(bad)
+
+
+def test_actions_have_numbers():
+    layout = Layout()
+    for action in (Move(3), Stop(), Ask(), Ask(Intention.SUB)):
+        assert decode(number(action, layout), layout) == action
+
+
+def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
+    for shaping in (False, True):
+        env = make("find", tmp, shaping=shaping)
+        env.reset(seed=2)
+        inner, total, done, n = env._env, 0.0, False, 0
+        start = env._potential()
+        while not done:
+            s = inner.situation
+            action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+            _, reward, done, _, info = env.step(number(action, Layout()))
+            total, n = total + reward, n + 1
+        assert info["success"] == 1 and info["spl"] == pytest.approx(1)
+        assert total == pytest.approx(1 - 0.01 * n + (start if shaping else 0))
+
+
+def test_haris_reward_is_minus_its_cost(tmp):
+    env = make("hari", tmp)
+    o, _ = env.reset(seed=0)
+    assert env.step(number(Ask(Intention.CUR), Layout()))[1] == pytest.approx(-0.01)
+    assert env.step(number(Stop(), Layout()))[1] <= -4
+    assert o["goals"].shape == (3, 21, 5)
+
+
+def test_the_picture_shows_view_plan_and_words(tmp):
+    env = make("hanna", tmp, render_mode="rgb_array")
+    env.reset(seed=0)
+    image = env.render()
+    assert image.shape[0] == 544 and image.shape[1] > 900 and image.dtype == np.uint8 and image.std() > 10
+
+
+def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
+    env = make("find", tmp, layout=Layout(candidates=1))
+    with pytest.raises(ValueError, match="enlarge Layout"):
+        env.reset(seed=0)
+
+
+@pytest.mark.parametrize("learner", ["PPO"])
+def test_stable_baselines_learns_to_walk_to_a_mug(learner, tmp):
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = Numbers(make("find", tmp, shaping=True))
+    model = getattr(sb3, learner)("MlpPolicy", env, n_steps=128, batch_size=64, n_epochs=2, seed=0, device="cpu")
+    model.learn(384)
+    action, _ = model.predict(env.reset(seed=1)[0])
+    assert env.action_space.contains(int(action))
