@@ -362,7 +362,8 @@ def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
             top = z + h
             mirror = ctx.pick("mirror", most=(1.2, 0.2, 1.4))
             if mirror is not None and top < 1.2:
-                size = (min(max(0.75 * w, 0.45), 1.1), mirror.size[1], min(0.8, mirror.size[2] or 0.8))
+                wide = min(max(0.75 * w, 0.45), 1.1)
+                size = (wide, mirror.size[1], wide if "round" in mirror.tags else 0.8)
                 items.append(Item(mirror, 0.0, WALL_GAP - size[1] / 2, z=1.2, size=size, optional=True, role="mirror"))
                 lamp = ctx.pick("wall lamp", most=(0.6, 0.3, 0.6))
                 if lamp is not None and ctx.chance(0.5):

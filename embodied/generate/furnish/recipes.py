@@ -83,9 +83,11 @@ RECIPES: dict[str, tuple[tuple[str, float, str, float], ...]] = {
     "office cabinet": (("book", 0.5, "any", 0.4), ("printer", 0.4, "side", 0.02), ("photo frame", 0.4, "back", 0.3),
                        ("bonsai", 0.3, "any", 0.5), ("letter tray", 0.3, "any", 0.1)),
     "cupboard": (("vase", 0.3, "any", 0.0), ("folded clothes", 0.2, "any", 0.2)),
-    "bed": (("teddy bear", 0.3, "back", 0.4), ("folded clothes", 0.12, "front", 0.4), ("tablet", 0.06, "any", 0.8)),
-    "sofa": (("cushion", 0.8, "side", 0.2), ("cushion", 0.7, "side", 0.2), ("cushion", 0.3, "back", 0.3)),
-    "armchair": (("cushion", 0.35, "back", 0.15),),
+    "bed": (("blanket", 0.3, "front", 0.1), ("cushion", 0.25, "back", 0.2), ("teddy bear", 0.3, "back", 0.4), ("folded clothes", 0.12, "front", 0.4), ("tablet", 0.06, "any", 0.8)),
+    "sofa": (("cushion", 0.8, "side", 0.2), ("cushion", 0.7, "side", 0.2), ("cushion", 0.3, "back", 0.3),
+             ("blanket", 0.3, "side", 0.15)),
+    "corner sofa": (("cushion", 0.8, "back", 0.2), ("cushion", 0.7, "back", 0.2), ("blanket", 0.3, "side", 0.2)),
+    "armchair": (("cushion", 0.35, "back", 0.15), ("blanket", 0.1, "back", 0.2)),
     "bench": (("handbag", 0.4, "any", 0.3), ("hat", 0.3, "any", 0.5), ("cap", 0.2, "any", 0.5)),
     "trunk": (("folded clothes", 0.4, "any", 0.2), ("book", 0.3, "any", 0.4)),
     "bistro table": (("coffee cup", 0.5, "any", 3.2), ("small plant", 0.4, "centre", 3.2)),
@@ -120,7 +122,7 @@ MOST_ALIKE: dict[str, int] = {
     "coffee maker": 1, "bread box": 1, "television": 1, "stereo": 1, "printer": 1, "aquarium": 1, "laptop": 2,
     "computer": 1, "knife block": 1, "espresso machine": 1, "toaster oven": 1, "chess set": 1, "christmas tree": 1,
     "small christmas tree": 0, "birthday cake": 1, "radio": 1, "keys": 1, "remote control": 1, "newspaper": 1,
-    "alarm clock": 2, "storage box": 6, "ashtray": 1, "deer figurine": 1, "teddy bear": 2, "toothbrush cup": 2,
+    "alarm clock": 2, "storage box": 6, "blanket": 2, "ashtray": 1, "deer figurine": 1, "teddy bear": 2, "toothbrush cup": 2,
     "chopping board": 1, "fruit bowl": 1, "soap dispenser": 2, "game console": 1, "video projector": 1,
 }
 """Object class to how many of it one room may hold on its surfaces; 2 for the others."""

@@ -20,8 +20,12 @@ def hang_all(ctx: Context) -> None:
     """Everything on walls and ceiling, after the furniture stands."""
     ceiling_lamps(ctx)
     switches(ctx)
-    curtains(ctx)
-    radiators(ctx)
+    if ctx.chance(0.5):
+        radiators(ctx)
+        curtains(ctx)
+    else:
+        curtains(ctx)
+        radiators(ctx)
     above_furniture(ctx)
     if ctx.kind == "hall":
         hooks(ctx)
@@ -139,7 +143,7 @@ def curtains(ctx: Context) -> None:
     """Curtains at the windows of rooms one lives in, blinds where curtains do not fit."""
     if ctx.kind in (*PLAIN, "toilet", "gym"):
         return
-    asset = ctx.pick("curtain", avoid=())
+    asset = ctx.pick("curtain", most=(9.0, 0.2, 9.0), avoid=())
     blind = ctx.pick("window blind", avoid=())
     bare = ctx.chance(0.12)
     for wall in ctx.space.walls:
@@ -165,18 +169,21 @@ def curtains(ctx: Context) -> None:
 
 
 def radiators(ctx: Context) -> None:
-    """A radiator under a window, else on a free outer wall."""
-    if ctx.kind in ("garage", "pantry", "closet", "corridor", "stairwell", "toilet"):
+    """A radiator under a window, else on what is free of an outer wall."""
+    if ctx.kind in ("garage", "pantry", "closet", "corridor", "stairwell", "toilet") or ctx.roles("towel radiator"):
         return
-    count = 0
-    for wall in ctx.space.walls:
+    left = 1 + (ctx.space.area > 16)
+    outer = [w for w in ctx.space.walls if has_window(w)]
+    for wall in outer:
         for s0, s1, o in wall.openings:
-            if o.kind != "window" or o.sill < 0.75 or count >= 1 + (ctx.space.area > 16):
-                continue
-            asset = ctx.pick("radiator", most=(s1 - s0 + 0.2, 0.3, o.sill - 0.14), avoid=())
-            if asset is not None and mount(ctx, asset, wall, (s0 + s1) / 2, 0.1, "heating", away=0.015,
-                                           role="radiator"):
-                count += 1
+            if left and o.kind == "window" and o.sill >= 0.75:
+                asset = ctx.pick("radiator", most=(s1 - s0 + 0.2, 0.3, o.sill - 0.14), avoid=())
+                left -= mount(ctx, asset, wall, (s0 + s1) / 2, 0.1, "heating", away=0.015, role="radiator") is not None
+    for wall in outer:
+        for a, b in _stretches(wall):
+            if left and b - a > 0.7:
+                asset = ctx.pick("radiator", most=(min(b - a - 0.2, 1.5), 0.25, 1.0), avoid=())
+                left -= mount(ctx, asset, wall, (a + b) / 2, 0.1, "heating", away=0.015, role="radiator") is not None
 
 
 def above_furniture(ctx: Context) -> None:
@@ -227,6 +234,8 @@ def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: flo
     w = min(width * 0.85 / count - 0.06 * (count - 1), ctx.rng.uniform(0.7, 1.2) if count == 1 else 0.55)
     w = max(w, 0.26)
     shape = ctx.rng.choice([0.7, 0.75, 1.0, 1.35]) if count == 1 else ctx.rng.choice([1.0, 1.3, 1.4])
+    if asset.object_class == "poster":
+        shape = 1.4
     h = min(w * shape, 0.95, ctx.space.height - lowest - 0.25)
     if h < 0.2:
         return 0
@@ -277,7 +286,8 @@ def _stretches(wall: Wall) -> list[tuple[float, float]]:
 
 def _mirror_size(ctx: Context, mirror: Asset, width: float, height: float) -> tuple[float, float, float]:
     if mirror.key.startswith("built/"):
-        return width, mirror.size[1], height
+        side = min(width, height, 0.8)
+        return (side, mirror.size[1], side) if "round" in mirror.tags else (width, mirror.size[1], height)
     return mirror.size
 
 
