@@ -23,7 +23,6 @@ from torch import Tensor, nn
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
 from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, slot_distribution, target_similarity
 
-
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""
 

@@ -17,7 +17,8 @@ from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
 from agents.vision.bank import FeatureBank
 from agents.vocabulary import Vocabulary
-from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Stop, Thought
+from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
+from embodied.teachers.shortest import shortest_action
 
 Chooser = Callable[[np.ndarray, np.random.Generator], int]
 
@@ -93,16 +94,22 @@ class HannaPolicy:
 
     def act(
         self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
-        rngs: Sequence[np.random.Generator],
+        rngs: Sequence[np.random.Generator], imposed: Sequence[int | None] | None = None,
     ) -> tuple[list[Action | None], HannaMemory]:
-        """One step of every running episode; see embodied.interface.Policy."""
+        """One step of every running episode; see embodied.interface.Policy.
+
+        Args:
+          imposed: navigation actions (0 is stop, c + 1 candidate c) that replace the network's own
+            choice in some episodes; whether to ask stays its own decision.
+        """
         positions = tuple(i for i, o in enumerate(observations) if o is not None)
         seen = [observations[i] for i in positions]
         memory = self.start(positions) if memory is None else memory.keep(positions)
         if not positions:
             return [None] * len(observations), memory
-        percept = self.percept(seen, memory)
-        scores, networks = self.network(memory.networks, percept)
+        with torch.set_grad_enabled(self.keep_moments and torch.is_grad_enabled()):
+            percept = self.percept(seen, memory)
+            scores, networks = self.network(memory.networks, percept)
         moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
         asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
         reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
@@ -118,6 +125,8 @@ class HannaPolicy:
             )
             rng = rngs[position]
             index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
+            if imposed is not None and imposed[position] is not None:
+                index = imposed[position]
             can_ask = Intention.HELP in o.can_ask
             if can_ask and self.ask_rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
                 actions[position] = Ask(Intention.HELP, thought)
@@ -193,3 +202,26 @@ class HannaPolicy:
 def for_training(policy: HannaPolicy, ask_rule: AskRule = ask_sampled) -> HannaPolicy:
     """The same networks, sampling their actions and keeping what they said."""
     return dataclasses.replace(policy, choose=choose_sampled, ask_rule=ask_rule, keep_moments=True)
+
+
+@dataclass(frozen=True, eq=False)
+class PerfectInterpretation:
+    """The skyline of Table 4.3: the teacher walks whenever an instruction is followed.
+
+    Asking, and walking on the main task, are still the agent's own.
+    """
+
+    policy: HannaPolicy
+    privileged: bool = True
+
+    def act(
+        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
+        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+    ) -> tuple[list[Action | None], HannaMemory]:
+        imposed = [None if s is None or s.mode is Mode.MAIN else _teacher_index(s) for s in situations]
+        return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)
+
+
+def _teacher_index(s: Situation) -> int:
+    action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+    return 0 if isinstance(action, Stop) else action.candidate + 1

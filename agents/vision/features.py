@@ -7,7 +7,6 @@ A feature file belongs to one house and one encoder, and says so: `<folder>/<enc
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 

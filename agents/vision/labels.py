@@ -6,19 +6,27 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from agents.vision.features import EQUIRECT, margin, strip_of
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from assets.cache import atomic_path
 from assets.records import ROOM_KINDS
-from embodied.house import House
+from embodied.house import OPENING_KINDS, House
 from embodied.parts import owners
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.world import World
 
 VISIBLE = 0.003
 """An object class counts as visible in a view if it covers this share of the picture."""
-NEAREST = 0.1
-"""Metres; distances are clipped from below before their logarithm is taken."""
+NEAREST, FARTHEST = 0.1, 50.0
+"""Metres; distances are clipped to this range before their logarithm is taken."""
+SHELL = ("floor", "ceiling", "skirting", "wall", "stairs", "outdoor")
+"""Parts of a house that are no objects; doors and windows go by the kind of their opening."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +70,34 @@ class HouseStrips:
 def shell_class(owner: str) -> str:
     """'wall' of 'kitchen_1/wall_3', 'door' of 'door_2/leaf', 'stairs', 'outdoor'."""
     place, piece = owner.split("/")
-    if piece.split("_")[0] in ("floor", "ceiling", "skirting", "wall", "stairs"):
+    if piece.split("_")[0] in SHELL:
         return piece.split("_")[0]
     return place.rstrip("0123456789").rstrip("_")
 
 
-def classes_of(houses: Sequence[House]) -> tuple[str, ...]:
-    """Every class that may be seen in `houses`, sorted."""
-    names = {p.object_class for house in houses for p in house.placements}
-    shell = {shell_class(o) for house in houses for o in owners(house) if "/" in o}
-    return tuple(sorted(names | shell))
+def all_classes(catalogue: Catalogue) -> tuple[str, ...]:
+    """Every class that any house may show, sorted: the catalogue's objects and the parts of the shell."""
+    return tuple(sorted({*catalogue.classes, *OPENING_KINDS, *SHELL}))
+
+
+def look(world: World, classes: Sequence[str]) -> HouseStrips:
+    """Draw every node of a world and label what is seen."""
+    object_class, room_of_id = ids_to_labels(world.house, classes)
+    rgb, share, rooms, depths = [], [], [], []
+    rows = margin()
+    for node in range(len(world.graph.positions)):
+        panorama = world.panorama(node)
+        ids, depth = panorama.equirect_ids(EQUIRECT)[rows], panorama.equirect_depth(EQUIRECT)[rows]
+        labels = cell_labels(ids, np.minimum(depth, FARTHEST), object_class, room_of_id, len(classes))
+        rgb.append(strip_of(panorama))
+        share.append(labels[0])
+        rooms.append(labels[1])
+        depths.append(labels[2])
+    room = [ROOM_KINDS.index(world.house.room_by_id[str(r)].kind) for r in world.graph.room_of_node]
+    return HouseStrips(
+        world.house.name, tuple(classes), np.stack(rgb), np.stack(share), np.stack(rooms), np.stack(depths),
+        np.array(room, dtype=np.int8),
+    )
 
 
 def ids_to_labels(house: House, classes: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

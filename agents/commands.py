@@ -1,0 +1,274 @@
+"""Entry points of the console command for everything that learns: train vision, train hanna, features, eval.
+
+Each pair (`add_...`, `run_...`) declares the options of one subcommand and runs it. The console
+command composes them (embodied.cli); what belongs to viz, such as recordings, is passed in from
+there as a function.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import typing
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from agents.evaluate import failures, hanna_policies, predictions, request_share
+from agents.hanna.agent import SHIPPED as SHIPPED_AGENT
+from agents.hanna.agent import load_agent, new_agent
+from agents.imitation.config import SCALES, TrainingConfig
+from agents.imitation.training import Split, train
+from agents.vision.encoder import SHIPPED as SHIPPED_ENCODER
+from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
+from agents.vision.features import encode_panoramas, feature_path, load_bank, load_features, save_features
+from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
+from agents.vision.probe import Labelled, read
+from agents.vision.training import VisionConfig, save_training, train_encoder, whitened
+from agents.vocabulary import build_vocabulary
+from assets.cache import default_cache, write_json
+from assets.catalogue import load_catalogue
+from embodied.datasets.store import Dataset
+from embodied.evaluate import AGENTS, evaluate, spread
+from embodied.evaluate import agent as agent_without_learning
+from embodied.interface import Episode
+from embodied.records import save_lines
+from embodied.tables import as_json, markdown, save
+from embodied.teachers.hanna import HannaTeacher
+
+Note = Callable[[str], None]
+FACES = 192
+"""Side of the cube faces from which features are made: the strip's resolution."""
+
+
+# Options -----------------------------------------------------------------------------------------
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Options that all of them share."""
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built")
+    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR", help="where expensive products are kept")
+    parser.add_argument("--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)")
+
+
+def add_encoder(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
+                        help="an encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)")
+    parser.add_argument("--network", metavar="NAME", help="torchvision network of --encoder: resnet18 to resnet152; "
+                        "'random' for an untrained compact one")
+
+
+def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
+    """One option per field of a configuration; without it, the field keeps its default."""
+    hints = typing.get_type_hints(config)
+    for f in dataclasses.fields(config):
+        if f.name in skip:
+            continue
+        option = f"--{f.name.replace('_', '-')}"
+        if hints[f.name] is bool:
+            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=f"default: {f.default}")
+        else:
+            parser.add_argument(option, type=hints[f.name], default=None, metavar=hints[f.name].__name__.upper(),
+                                help=f"default: {f.default}")
+
+
+def chosen(args: argparse.Namespace, config):
+    """`config` with the fields that were given on the command line."""
+    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}
+    return dataclasses.replace(config, **{k: v for k, v in given.items() if v is not None})
+
+
+def add_train_vision(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where strips, weights and numbers go")
+    add_fields(parser, VisionConfig)
+
+
+def add_features(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+
+
+def add_train_hanna(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it")
+    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
+    parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    add_fields(parser, TrainingConfig)
+
+
+def add_eval(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)")
+    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
+    parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
+    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
+
+
+# Vision ------------------------------------------------------------------------------------------
+
+def run_train_vision(args: argparse.Namespace, note: Note = print) -> int:
+    """Render strips of all houses, train on the training houses, judge on the others, save."""
+    torch.set_num_threads(args.threads)
+    data, config = Dataset(args.data), chosen(args, VisionConfig())
+    train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
+    strips = {n: _strips(data, n, args, note) for n in (*train_names, *test_names)}
+    seen = [strips[n] for n in train_names]
+    encoder, heads, classes = train_encoder(seen, config, note=note)
+    encoder = whitened(encoder, seen)
+    save_training(encoder, heads, classes, config, args.out)
+    encoder = load_encoder(args.out / "encoder.safetensors")
+    numbers = {}
+    for name, who in (("trained", encoder), ("random", whitened(random_encoder(config.network, seed=config.seed), seen))):
+        halves = [labelled(data, [strips[n] for n in names], who, classes) for names in (train_names, test_names)]
+        reading = read(*halves, seed=config.seed)
+        numbers[name] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
+        numbers[name]["ap by class"] = dict(zip(classes, reading.ap, strict=True))
+        note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
+    write_json(args.out / "readings.json", numbers, indent=1)
+    return 0
+
+
+def labelled(data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str]) -> Labelled:
+    """Features of houses and what a linear reader should read from them."""
+    columns = [houses[0].classes.index(c) for c in classes]
+    features = [np.concatenate([encoder.encode_strips(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
+    return Labelled(
+        np.concatenate(features), np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
+        np.concatenate([h.room for h in houses]).astype(np.int64),
+        np.concatenate([mean_log_depth_of_views(h.log_depth) for h in houses]),
+        np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
+        np.concatenate([data.place(h.name).graph.positions for h in houses]),
+    )
+
+
+def _strips(data: Dataset, name: str, args: argparse.Namespace, note: Note) -> HouseStrips:
+    path = args.out / "strips" / f"{name}.npz"
+    if not path.exists():
+        catalogue = load_catalogue(args.cache)
+        with data.open_world(name, catalogue, args.cache, size=FACES) as world:
+            look(world, all_classes(catalogue)).save(path)
+        note(f"drawn: {name}")
+    return HouseStrips.load(path)
+
+
+def _houses(data: Dataset, splits: Sequence[str]) -> list[str]:
+    return list(dict.fromkeys(n for s in splits for n in data.names(s)))
+
+
+# Features ----------------------------------------------------------------------------------------
+
+def encoder_of(args: argparse.Namespace) -> Encoder:
+    """The encoder that --encoder and --network describe."""
+    if args.network == "random":
+        return random_encoder(seed=0)
+    return imagenet_encoder(args.network, args.encoder) if args.network else load_encoder(args.encoder)
+
+
+def run_features(args: argparse.Namespace, note: Note = print) -> int:
+    """Features of every house of a data set; houses that have them are skipped."""
+    torch.set_num_threads(args.threads)
+    data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
+    made = 0
+    for name in _houses(data, data.splits):
+        place, path = data.place(name), feature_path(args.data / "features", encoder.digest, name)
+        try:
+            load_features(path, encoder=encoder.digest, source=place.house.digest)
+            continue
+        except (FileNotFoundError, ValueError):
+            pass  # missing, damaged or of another house: made anew
+        with data.open_world(name, load_catalogue(args.cache), args.cache, size=FACES, quality=args.quality) as world:
+            panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
+            save_features(path, encode_panoramas(encoder, panoramas), encoder, place.house.digest)
+        made += 1
+        note(f"{name}: {len(place.graph.positions)} nodes")
+    note(f"{made} houses made, encoder {encoder.digest[:16]}")
+    return 0
+
+
+# HANNA -------------------------------------------------------------------------------------------
+
+def split_of(data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None) -> Split:
+    """A split of a data set, ready to be played with features."""
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in data.names(name)}
+    tasks = data.tasks(name)
+    return Split(
+        data.places(name), tasks if limit is None else spread(tasks, limit), data.environment(name),
+        load_bank(paths, encoder.digest).to(device),
+    )
+
+
+def vocabulary_of(data: Dataset):
+    """Words of the training split: requests and the routes that training hears."""
+    routes = [r.instruction for n in data.names("train") for r in data.routes(n) if r.split == "train_seen"]
+    return build_vocabulary([*(t.request for t in data.tasks("train")), *routes], least=2)
+
+
+def run_train_hanna(
+    args: argparse.Namespace, note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> int:
+    """Train an agent on a data set's training houses, validating on its unseen validation houses."""
+    torch.set_num_threads(args.threads)
+    data, encoder, config = Dataset(args.data), encoder_of(args), chosen(args, SCALES[args.scale])
+    training = split_of(data, "train", encoder, args.device)
+    validation = split_of(data, "val_unseen", encoder, args.device, config.validation_tasks)
+    agent = new_agent(config, vocabulary_of(data), encoder.digest, encoder.size)
+    agent.network.to(args.device)
+    parameters = sum(p.numel() for p in agent.network.parameters())
+    note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
+    train(agent, training, validation, HannaTeacher(), args.out, minutes=args.minutes, note=note, on_validation=on_validation)
+    return 0
+
+
+def run_eval(args: argparse.Namespace, note: Note = print) -> int:
+    """Tables 4.3 to 4.5 for one agent and the agents without learning, and why its episodes fail."""
+    torch.set_num_threads(args.threads)
+    data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
+    rows, extra = [], {}
+    for split in args.split:
+        worlds = data.places(split)
+        judged = {**_without_learning(), **hanna_policies(agent, split_of(data, split, encoder).bank)}
+        names = args.only or list(judged)
+        if unknown := sorted(set(names) - set(judged)):
+            raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
+
+        def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds=worlds) -> None:
+            if args.out:
+                save_lines(args.out / f"episodes_{split}_{name.replace(' ', '_').replace(',', '')}.jsonl", episodes)
+            if name == "learned":
+                extra[split] = about(episodes, worlds)
+
+        rows += evaluate(
+            data, split, {n: judged[n] for n in names}, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep
+        )
+    note(markdown(rows, ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")))
+    note(json.dumps(extra, indent=1))
+    if args.out:
+        save(rows, args.out, "table")
+        write_json(args.out / "behaviour.json", {"rows": json.loads(as_json(rows)), "behaviour": extra}, indent=1)
+    return 0
+
+
+def _without_learning():
+    return {name: agent_without_learning("hanna", name) for name in AGENTS["hanna"]}
+
+
+def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:
+    """Figures D.1 and D.2 and the kinds of failure, as numbers."""
+    return {
+        "request share": request_share(episodes), "failures": dataclasses.asdict(failures(episodes, worlds)),
+        "conditions": [{**dataclasses.asdict(p), "f1": p.f1} for p in predictions(episodes, worlds)],
+    }
+
+

@@ -1,0 +1,129 @@
+"""Learned HANNA agents to be judged beside those without learning, and why their episodes fail.
+
+The judging itself is embodied.evaluate.evaluate, the same for everybody.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.hanna.agent import HannaAgent
+from agents.hanna.asking import RULES
+from agents.hanna.policy import PerfectInterpretation
+from agents.vision.bank import FeatureBank
+from embodied.interface import Ask, Episode, Mode, Policy, Stop
+from embodied.teachers.hanna import HannaTeacher, segments
+from embodied.teachers.shortest import nearest
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+REASONS = ("lost", "uncertain_wrong", "never_asked")
+
+
+def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Policy]:
+    """Variants of a learned agent by the names of Tables 4.3 to 4.5.
+
+    'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
+    authors train an agent for each rule (`embodied train hanna --ask-rule ...`).
+    """
+    learned = agent.policy(bank)
+    return {
+        "learned": learned,
+        "learned, no ask": dataclasses.replace(learned, ask_rule=RULES["never"][1]),
+        "learned, random ask": dataclasses.replace(learned, ask_rule=RULES["random"][1]),
+        "learned, ask every 5": dataclasses.replace(learned, ask_rule=RULES["every5"][1]),
+        "learned, target image only": dataclasses.replace(learned, read_assistance=False, _encoded={}),
+        "learned, perfect interpretation": PerfectInterpretation(learned),
+    }
+
+
+@dataclass(frozen=True)
+class Failures:
+    """How unsuccessful episodes failed, as shares of all episodes."""
+
+    ran_out: float
+    """The horizon cut them short."""
+    stopped_elsewhere: float
+    """They stopped in the main task away from every goal."""
+    passed_goal: float
+    """They were at a goal at some time and did not stop there (part of the two above)."""
+    never_asked: float
+    """They never asked (part of the first two)."""
+    departed_wrong: float
+    """Share of sub-tasks left more than 2 m from their target."""
+
+
+def failures(episodes: Sequence[Episode], worlds: dict[str, World]) -> Failures:
+    """Why episodes failed."""
+    out = {"limit": 0, "stop": 0, "passed": 0, "silent": 0}
+    left, wrong = 0, 0
+    for e in episodes:
+        graph = worlds[e.task.world].graph
+        near = [
+            graph.distance[v, nearest(graph, v, e.task.goal_nodes)] <= e.task.radius + 1e-9 for v in e.nodes
+        ]
+        if not near[-1]:
+            out["limit" if e.ended == "limit" else "stop"] += 1
+            out["passed"] += any(near)
+            out["silent"] += e.requests == 0
+        for piece in segments(e.steps):
+            if piece[0].mode is Mode.SUB and isinstance(piece[-1].action, Stop):
+                left += 1
+                wrong += graph.distance[piece[-1].pose.node, piece[0].targets[0]] > 2.0 + 1e-9
+    n = max(1, len(episodes))
+    return Failures(out["limit"] / n, out["stop"] / n, out["passed"] / n, out["silent"] / n, wrong / max(1, left))
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How well one condition is predicted (Figure D.2), over steps where help could be asked."""
+
+    reason: str
+    accuracy: float
+    precision: float
+    recall: float
+    true_share: float
+    predicted_share: float
+    steps: int
+
+    @property
+    def f1(self) -> float:
+        both = self.precision + self.recall
+        return 2 * self.precision * self.recall / both if both else 0.0
+
+
+def predictions(episodes: Sequence[Episode], worlds: dict[str, World]) -> tuple[Prediction, ...]:
+    """Figures D.1(b) and D.2: predicted against true conditions, reasons at probability 0.5 and more."""
+    truth, said = [], []
+    teacher = HannaTeacher()
+    for e in episodes:
+        for step, label in zip(e.steps, teacher.relabel(e, worlds[e.task.world]), strict=True):
+            thought = step.action.thought
+            if label.reasons is not None and thought is not None and thought.reasons is not None:
+                truth.append(label.reasons)
+                said.append([p >= 0.5 for p in thought.reasons])
+    if not truth:
+        return ()
+    t, s = np.array(truth, dtype=bool), np.array(said, dtype=bool)
+    share = lambda hit, of: float(hit[of].mean()) if of.any() else float("nan")
+    return tuple(
+        Prediction(
+            name, float((t[:, i] == s[:, i]).mean()), share(t[:, i], s[:, i]), share(s[:, i], t[:, i]),
+            float(t[:, i].mean()), float(s[:, i].mean()), len(t),
+        )
+        for i, name in enumerate(REASONS)
+    )
+
+
+def request_share(episodes: Sequence[Episode]) -> float:
+    """Share of all steps at which help was asked for (Figure D.1a)."""
+    kinds = [type(s.action) for e in episodes for s in e.steps]
+    return kinds.count(Ask) / max(1, len(kinds))
+
+

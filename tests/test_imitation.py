@@ -1,0 +1,369 @@
+"""The losses of 4.2.3 by hand, and training as a whole: it learns, resumes exactly, and fails clearly."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hand_worlds import grid_world
+
+from agents.hanna.agent import load_agent, new_agent, save_agent
+from agents.hanna.policy import choose_likeliest, choose_sampled
+from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.collect import collect, imitation_loss
+from agents.imitation.config import SCALES, TrainingConfig
+from agents.imitation.losses import (
+    IGNORE,
+    curiosity,
+    help_loss,
+    navigation_loss,
+    negative_log_likelihood,
+    reason_loss,
+    relative_entropy,
+)
+from agents.imitation.training import Split, TrainingError, for_training, tasks_of_update, train
+from agents.vision.bank import FeatureBank
+from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
+from embodied import metrics
+from embodied.assistants.anna import Anna
+from embodied.assistants.routes import build_routes
+from embodied.env import HannaEnv
+from embodied.interface import Ask, Move, Observation, Sight, Stop
+from embodied.language.plain import PlainLanguage
+from embodied.moves import PanoramicMoves
+from embodied.rollout import play
+from embodied.tasks.hanna import hanna_pool, hanna_task
+from embodied.teachers.hanna import HannaTeacher
+
+torch.set_num_threads(1)
+
+TINY = dataclasses.replace(
+    SCALES["mini"], hidden_size=32, navigation_embedding=32, ask_embedding=8, self_heads=2, text_heads=2, dropout=0.1,
+    iterations=4, batch=6, training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
+    instruction_length=40, learning_rate=3e-3,
+)
+
+
+def setting(side: int = 6, houses: int = 1) -> Split:
+    """Grids with people and routes, and features that tell the nodes apart."""
+    worlds = {f"grid{i}": grid_world(side, name=f"grid{i}") for i in range(houses)}
+    routes = {n: build_routes(w, seed=3, language=PlainLanguage(), house_split="test") for n, w in worlds.items()}
+    tasks = []
+    for world in worlds.values():
+        pool = hanna_pool(world, seed=3)
+        tasks += [hanna_task(pool, i, seed=3, language=PlainLanguage()) for i in range(min(30, len(pool)))]
+    anna = Anna({n: w.graph for n, w in worlds.items()}, routes, split="test")
+    moves = PanoramicMoves()
+    rng = np.random.default_rng(0)
+    bank = FeatureBank({n: rng.normal(size=(side * side, 36, 16)) for n in worlds}, "tests")
+    return Split(worlds, tasks, lambda: HannaEnv(worlds, anna, moves), bank)
+
+
+def agent_for(split: Split, config: TrainingConfig = TINY):
+    world = next(iter(split.worlds.values()))
+    routes = build_routes(world, seed=3, language=PlainLanguage(), house_split="test")
+    words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
+    return new_agent(config, words, split.bank.digest, split.bank.size)
+
+
+def run(folder, config=TINY, split=None, **options):
+    split = split or setting()
+    agent = agent_for(split, config)
+    progress = train(agent, split, split, HannaTeacher(), folder, note=lambda line: None, **options)
+    return agent, progress
+
+
+# Losses ------------------------------------------------------------------------------------------
+
+def test_the_navigation_loss_is_that_of_equation_4_13():
+    logits = torch.log(torch.tensor([[0.5, 0.2, 0.3], [0.1, 0.8, 0.1], [0.2, 0.2, 0.6]]))
+    labels = torch.tensor([0, 1, IGNORE])
+    negatives = torch.tensor([[False, True, True], [False, False, False], [True, False, False]])
+    expected = [-math.log(0.5) + 2.0 * (math.log(0.2) + math.log(0.3)) / 2, -math.log(0.8), 0.0]
+    assert torch.allclose(navigation_loss(logits, labels, negatives, 2.0), torch.tensor(expected))
+    assert torch.allclose(navigation_loss(logits, labels, negatives, 0.0), negative_log_likelihood(logits, labels))
+
+
+def test_the_curiosity_loss_pushes_past_mistakes_down_even_beside_masked_actions():
+    logits = torch.tensor([[1.0, 0.5, -torch.inf]], requires_grad=True)
+    curiosity(logits, torch.tensor([0]), torch.tensor([[False, True, False]])).sum().backward()
+    assert torch.isfinite(logits.grad).all()
+    assert logits.grad[0, 1] > 0  # gradient descent lowers it
+    assert logits.grad[0, 2] == 0
+
+
+def test_the_help_loss_is_that_of_equation_4_14():
+    ask = torch.log(torch.tensor([[0.25, 0.75], [0.5, 0.5]]))
+    labels = torch.tensor([1, IGNORE])
+    rho = torch.tensor([[0.9, 0.2, 0.5], [0.9, 0.9, 0.9]])
+    reasons = torch.tensor([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    binary = -(math.log(0.9) + math.log(0.8) + math.log(0.5)) / 3
+    assert torch.allclose(reason_loss(rho.logit(), reasons, labels), torch.tensor([binary, 0.0]))
+    expected = torch.tensor([-math.log(0.75) + binary, 0.0])
+    assert torch.allclose(help_loss(ask, labels, rho.logit(), reasons), expected)
+    assert torch.allclose(help_loss(ask, labels, None, reasons), torch.tensor([-math.log(0.75), 0.0]))
+
+
+def test_entropy_in_base_37_of_37_equal_actions_is_one():
+    assert relative_entropy(torch.full((1, 37), 1 / 37), 37).item() == pytest.approx(1.0)
+    assert relative_entropy(torch.eye(37)[:1], 37).item() == 0.0
+
+
+# Words, draws, batches ---------------------------------------------------------------------------
+
+def test_words_keep_their_numbers_and_strangers_are_unknown():
+    words = build_vocabulary(["Find a mug.", "find a towel, please"])
+    assert words.words[:6] == ("<PAD>", "<UNK>", "<EOS>", "a", "find", ",")
+    assert tokenize("Don't go 60 degrees; stop!") == ["don't", "go", "60", "degrees", ";", "stop", "!"]
+    numbers = words.encode("find the mug", 6)
+    assert numbers.tolist() == [words.number_of["find"], 1, words.number_of["mug"], 2, 0, 0]
+    assert words.encode("find a mug", 2).tolist() == [words.number_of["find"], words.number_of["a"]]
+    with pytest.raises(ValueError, match="starts with"):
+        Vocabulary(("mug",))
+
+
+def test_sampled_choices_have_their_frequencies_and_never_take_the_impossible():
+    rng = np.random.default_rng(0)
+    p = np.array([0.2, 0.0, 0.5, 0.3, 0.0])
+    counts = np.bincount([choose_sampled(p, rng) for _ in range(4000)], minlength=5) / 4000
+    assert counts[1] == counts[4] == 0
+    assert np.allclose(counts, p, atol=0.03)
+    assert choose_likeliest(p, rng) == 2
+
+
+def test_every_pass_of_training_takes_every_task_once():
+    tasks = setting().tasks[:10]
+    taken = [t.id for u in range(5) for t in tasks_of_update(tasks, u, 4, seed=0)]
+    for start in (0, 10):
+        assert sorted(taken[start : start + 10]) == sorted(t.id for t in tasks)
+    assert taken[:10] != taken[10:]
+
+
+# Play --------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("model", ["hanna", "lstm"])
+def test_an_episode_does_not_depend_on_the_batch_around_it(model):
+    split = setting(houses=2)
+    policy = agent_for(split, dataclasses.replace(TINY, model=model)).policy(split.bank)
+    policy.network.eval()
+    policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)
+    tasks = [dataclasses.replace(t, horizon=12) for t in split.tasks[::5]]
+    with torch.inference_mode():
+        together = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
+        alone = play(split.make_env, policy, tasks, seed=1, batch=1)
+        backwards = play(split.make_env, policy, tasks[::-1], seed=1, batch=5)[::-1]
+    assert together == alone == backwards
+    assert any(isinstance(s.action, Ask) for e in together for s in e.steps)
+    assert any(isinstance(s.action, Move) for e in together for s in e.steps)
+    assert len({len(e.steps) for e in together}) > 1  # some leave the batch before others
+
+
+def test_actions_are_described_by_the_view_they_lie_in_and_stop_by_nothing():
+    split = setting()
+    policy = agent_for(split).policy(split.bank)
+    task = split.tasks[0]
+    seen = split.make_env().reset(task)
+    percept = policy.percept([seen], policy.start((0,)))
+    assert torch.equal(percept.actions[0, 0], torch.zeros(policy.network.config.action_size))
+    first = split.bank.features(seen.sight)[seen.candidates.view[0]]
+    assert np.allclose(percept.actions[0, 1, : split.bank.size], first)
+    assert percept.actions[0, 1, split.bank.size] == pytest.approx(math.sin(seen.candidates.bearing[0]), abs=1e-6)
+    ahead = split.bank.features(seen.sight)[12 + seen.turn]
+    assert np.allclose(percept.current[0, 12], ahead)  # row 12 looks where the agent looks
+    relative = (seen.candidates.view[0] % 12 - seen.turn) % 12
+    assert percept.action_slots[0].tolist()[:2] == [36, seen.candidates.view[0] // 12 * 12 + relative]
+    assert torch.equal(percept.target, torch.zeros(1, 36, split.bank.size))
+
+
+def test_two_observations_that_differ_only_in_what_is_private_look_the_same():
+    """An agent that turned together with its world cannot tell: bearings and views are its own."""
+    split = setting()
+    policy = agent_for(split).policy(FeatureBank({"a": np.arange(36.0)[None, :, None] * np.ones((1, 36, 16))}, "tests"))
+    env = split.make_env()
+    seen = env.reset(split.tasks[0])
+
+    def turned(o: Observation, k: int) -> Observation:
+        view = o.candidates.view // 12 * 12 + (o.candidates.view % 12 + k) % 12
+        return dataclasses.replace(
+            o, sight=Sight("a", 0), turn=(o.turn + k) % 12, candidates=dataclasses.replace(o.candidates, view=view)
+        )
+
+    bank = policy.bank.features(Sight("a", 0))
+    rolled = np.concatenate([np.roll(bank[12 * b : 12 * b + 12], 4, 0) for b in range(3)])
+    other = dataclasses.replace(policy, bank=FeatureBank({"a": rolled[None]}, "tests"))
+    a = policy.percept([turned(seen, 0)], policy.start((0,)))
+    b = other.percept([turned(seen, 4)], other.start((0,)))
+    for name in ("current", "actions", "action_slots"):
+        assert torch.equal(getattr(a, name), getattr(b, name)), name
+
+
+def test_labels_line_up_with_what_the_networks_said():
+    """The teacher's word about step t of episode i is compared with the scores of that very step."""
+    split = setting()
+    agent = agent_for(split)
+    tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:5]]
+    teacher = HannaTeacher()
+    experience = collect(split.make_env, for_training(agent.policy(split.bank)), tasks, teacher, split.worlds, seed=0)
+    labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in experience.episodes]
+    rows = [(t, i) for t in range(8) for i, e in enumerate(experience.episodes) if t < len(e.steps)]
+    assert len(rows) == len(experience.targets.moves)
+    for row, (t, i) in enumerate(rows):
+        step, label = experience.episodes[i].steps[t], labels[i][t]
+        expected = IGNORE if label.move is None else 0 if isinstance(label.move, Stop) else label.move.candidate + 1
+        assert experience.targets.moves[row] == expected
+        assert experience.targets.asks[row] == (IGNORE if label.ask is None else int(label.ask))
+        n = len(step.candidate_nodes)
+        said = experience.said.moves[row].softmax(-1).detach().numpy()
+        assert np.allclose(np.append(said[1 : n + 1], said[0]), step.action.thought.moves, atol=1e-5)
+        assert said[n + 1 :].sum() == 0
+
+
+# Learning ----------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("model", ["hanna", "lstm"])
+def test_it_overfits_one_batch(model):
+    """Loss on the same eight episodes falls to a fraction; nothing in the gradient's way is broken."""
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, model=model, dropout=0.0))
+    optimizer = torch.optim.Adam(agent.network.parameters(), 5e-3)
+    learner = dataclasses.replace(for_training(agent.policy(split.bank)), choose=choose_likeliest)
+    tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:8]]
+    losses, rights = [], []
+    for _ in range(40):
+        played = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0)
+        navigation, asking = imitation_loss(played.said, played.targets, 0.0, len(tasks))
+        optimizer.zero_grad()
+        (navigation + asking).backward()
+        optimizer.step()
+        known = played.targets.moves != IGNORE
+        rights.append(float((played.said.moves.argmax(-1) == played.targets.moves)[known].float().mean()))
+        losses.append(float((navigation / known.sum()).detach()))
+    assert np.mean(rights[-5:]) > 0.8, rights
+    assert np.mean(losses[-5:]) < 0.5 * losses[0], losses
+
+
+def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
+    straight, _ = run(tmp_path / "straight")
+    half = dataclasses.replace(TINY, iterations=2)
+    run(tmp_path / "broken", half)
+    resumed, progress = run(tmp_path / "broken")
+    assert progress.update == 4
+    for name, value in straight.network.state_dict().items():
+        assert torch.equal(value, resumed.network.state_dict()[name]), name
+    a, b = ((tmp_path / d / "validation.jsonl").read_text().splitlines() for d in ("straight", "broken"))
+    assert [json.loads(line)["spl"] for line in a] == [json.loads(line)["spl"] for line in b]
+
+
+def test_training_writes_what_a_researcher_looks_at(tmp_path):
+    seen = []
+    _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
+    assert seen == [(2, 6), (4, 6)]
+    lines = [json.loads(line) for line in (tmp_path / "validation.jsonl").read_text().splitlines()]
+    assert [line["update"] for line in lines] == [2, 4]
+    assert progress.best == max(line["success"] for line in lines)
+    assert list(tmp_path.glob("events.out.tfevents.*"))
+    assert json.loads((tmp_path / "settings.json").read_text())["batch"] == 6
+
+
+def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
+    run(tmp_path)
+    before = (tmp_path / "checkpoint.pt").read_bytes()
+    with pytest.raises(CheckpointError, match="batch 6 -> 5"):
+        run(tmp_path, dataclasses.replace(TINY, batch=5))
+    other = setting()
+    worlds = {n: other.bank._table.numpy() for n in other.worlds}
+    with pytest.raises(CheckpointError, match="learned from encoder tests"):
+        run(tmp_path, split=dataclasses.replace(other, bank=FeatureBank(worlds, "another encoder")))
+    assert (tmp_path / "checkpoint.pt").read_bytes() == before
+    (tmp_path / "checkpoint.pt").write_bytes(before[: len(before) // 2])
+    with pytest.raises(CheckpointError, match="cut short"):
+        run(tmp_path)
+    torch.save({"format": "something else"}, tmp_path / "checkpoint.pt")
+    with pytest.raises(CheckpointError, match="'something else'"):
+        run(tmp_path)
+
+
+def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_path):
+    run(tmp_path, dataclasses.replace(TINY, iterations=2))
+    before = (tmp_path / "checkpoint.pt").read_bytes()
+    bad = setting()
+    bad.bank._table[:] = torch.nan
+    with pytest.raises(TrainingError, match="update 2.*last checkpoint is intact"):
+        run(tmp_path, split=bad)
+    assert (tmp_path / "checkpoint.pt").read_bytes() == before
+
+
+def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
+    split = setting()
+    agent, path = agent_for(split), tmp_path / "agent.safetensors"
+    save_agent(agent, path)
+    again = load_agent(path)
+    assert again.config == agent.config and again.vocabulary == agent.vocabulary
+    for name, value in agent.network.state_dict().items():
+        assert torch.allclose(value, again.network.state_dict()[name], atol=2e-3), name
+    other = FeatureBank({"x": np.zeros((1, 36, 16))}, "another encoder")
+    with pytest.raises(ValueError, match="features come from encoder another"):
+        again.policy(other)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_agent(path)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"model": "gpt"}, "model must be one of"), ({"ask_rule": "often"}, "ask_rule must be one of"),
+    ({"batch": 0}, "batch must be at least 1"), ({"learning_rate": 0.0}, "learning_rate must be positive"),
+    ({"alpha": -1.0}, "alpha must not be negative"),
+])
+def test_impossible_settings_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        dataclasses.replace(TINY, **change)
+
+
+def test_table_d1_is_the_default():
+    d1 = SCALES["paper"]
+    assert (d1.hidden_size, d1.navigation_embedding, d1.ask_embedding, d1.batch) == (256, 256, 128, 32)
+    assert (d1.learning_rate, d1.dropout, d1.alpha, d1.iterations) == (1e-4, 0.3, 1.0, 30_000)
+    assert (d1.training_steps, d1.evaluation_steps, d1.instruction_length) == (20, 50, 50)
+    assert TrainingConfig.from_json(d1.to_json()) == d1
+
+
+def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
+    here = Path(__file__).parent
+    code = (
+        "import sys, dataclasses; sys.path.insert(0, sys.argv[2]); import test_imitation as t; from pathlib import Path\n"
+        "split = t.setting(); agent = t.agent_for(split, dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6))\n"
+        "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), note=lambda line: print(line, flush=True))\n"
+    )
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path), str(here)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, env=environment,
+    )
+    assert process.stdout.readline().startswith("20/")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert "KeyboardInterrupt" in err and "goes on from there" in out, (out, err)
+    update = int(out.split("stopped after update ")[1].split(";")[0])
+    saved = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+    assert saved["progress"]["update"] == update >= 20
+    assert time.time() - (tmp_path / "checkpoint.pt").stat().st_mtime < 60
+
+
+def test_success_in_the_progress_line_is_the_judges():
+    split = setting()
+    policy = agent_for(split).policy(split.bank)
+    policy.network.eval()
+    with torch.inference_mode():
+        episodes = play(split.make_env, policy, split.tasks[:4], seed=0, batch=4)
+    world = split.worlds[episodes[0].task.world]
+    assert all(metrics.success(e, world.graph) in (0.0, 1.0) for e in episodes)
