@@ -162,8 +162,9 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tu
     occupied = np.isfinite(lows[..., 0])
     filled = ndimage.binary_fill_holes(occupied)
     snap, boxes = 0.25 * (high - low) / counts, []
-    while (left := np.argwhere(filled)).size:
-        x, y, z = left[0]
+    for x, y, z in np.argwhere(filled).tolist():
+        if not filled[x, y, z]:
+            continue
         block = _grow(filled, x, y, z)
         filled[block] = False
         if occupied[block].any():

@@ -258,12 +258,9 @@ def _bevel_faces(vertices: np.ndarray) -> list[list[int]]:
         for sy in (False, True):
             for sz in (False, True):
                 faces.append([octant[(0, sx, sy, sz)], octant[(1, sx, sy, sz)], octant[(2, sx, sy, sz)]])
-    done = []
-    for f in faces:
-        p = vertices[f]
-        outward = np.dot(np.cross(p[1] - p[0], p[2] - p[0]), p.mean(0)) > 0
-        done.append(f if outward else f[::-1])
-    return done
+    p = vertices[np.asarray(faces)]
+    outward = np.sum(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * p.mean(axis=1), axis=1) > 0
+    return [f if out else f[::-1] for f, out in zip(faces, outward, strict=True)]
 
 
 def bar(a: Sequence[float], b: Sequence[float], width: float, height: float, bevel: float = 0.0) -> Shape:
