@@ -69,7 +69,7 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         return (_box(points.min(axis=0), points.max(axis=0)),)
     cut = sorted({round(float(high[2]), 4) + 1e-6 for _, high in slabs} | set(levels(parts)))
     for n in CELLS:
-        bounds = grid_boxes(points, n, cut)
+        bounds = grid_boxes(points, n, cut, MOST_BOXES)
         if len(bounds) <= MOST_BOXES:
             break
     for low, high in free:
@@ -139,10 +139,11 @@ def is_solid(points: np.ndarray) -> bool:
     return filled > 0.97 * float(np.prod(points.max(axis=0) - points.min(axis=0)))
 
 
-def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tuple[np.ndarray, np.ndarray]]:
+def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = (),
+               most: int = 10**6) -> list[tuple[np.ndarray, np.ndarray]]:
     """(low, high) corners of boxes that cover `points` (k, 3), from a grid of cubes, n along the longest side.
 
-    The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
+    Gives up when there are more than `most`. The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
     shrunk to the points in it, so a table top stays thin and its height exact; what nearly reaches
     the bounds of the whole reaches them, so that a thing stands on all its feet.
     """
@@ -165,6 +166,8 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = ()) -> list[tu
     for x, y, z in np.argwhere(filled).tolist():
         if not filled[x, y, z]:
             continue
+        if len(boxes) > most:
+            break
         block = _grow(filled, x, y, z)
         filled[block] = False
         if occupied[block].any():
