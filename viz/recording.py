@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import rerun as rr
+from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
@@ -133,6 +134,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("plot/requests", rr.Scalars(state.requests))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
     recording.log("text/dialogue", rr.TextDocument("\n\n".join(state.dialogue), media_type=rr.MediaType.MARKDOWN))
+    log_path(recording, world, state.nodes)
     if step.next_pose.node != state.nodes[-1]:
         state.nodes.append(step.next_pose.node)
     state.count += 1
@@ -155,12 +157,13 @@ def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float
     """The agent's pose, what it sees ahead, and the panorama around it with its gaze in the middle."""
     panorama = world.panorama(node)
     height, width = pictures.view
-    view = panorama.view(yaw, pitch, VFOV, pictures.view)
-    recording.log("agent/camera", rr.Transform3D(translation=world.graph.positions[node], mat3x3=camera_axes(yaw, pitch)))
+    view = panorama.view_rgb(yaw, pitch, VFOV, pictures.view)
+    recording.log("agent/camera", rr.Transform3D(
+        translation=world.graph.positions[node], quaternion=rr.Quaternion(xyzw=camera_turn(yaw, pitch))))
     recording.log("agent/camera/image", rr.Pinhole(
-        fov_y=float(VFOV), aspect_ratio=width / height, width=width, height=height,
+        width=width, height=height, focal_length=float(height / 2 / np.tan(VFOV / 2)),
         camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.9, color=PALETTE["agent"],
-    ), encoded(view.rgb, pictures.jpeg))
+    ), encoded(view, pictures.jpeg))
     equirect = panorama.equirect(pictures.panorama)
     shift = int(round(yaw / (2 * np.pi) * equirect.shape[1]))
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), pictures.jpeg))
@@ -170,7 +173,7 @@ def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float
 
 def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> None:
     """The path walked so far."""
-    points = world.graph.positions[nodes] - [0, 0, 1.4]
+    points = world.graph.positions[nodes if len(nodes) > 1 else 2 * nodes] - [0, 0, 1.4]
     recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
 
 
@@ -228,6 +231,11 @@ def event_level(step: Step) -> str:
 def sight_picture(world: World, sight: Sight, height: int) -> np.ndarray:
     """The equirectangular panorama of a Sight, (height, 2 height, 3) uint8."""
     return world.panorama(world.node_of(sight)).equirect(height)
+
+
+def camera_turn(yaw: float, pitch: float) -> np.ndarray:
+    """(4,) quaternion x y z w that turns the camera's frame (x right, y down, z forward) into the world's."""
+    return Rotation.from_matrix(camera_axes(yaw, pitch)).as_quat()
 
 
 def camera_axes(yaw: float, pitch: float) -> np.ndarray:

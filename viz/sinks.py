@@ -42,6 +42,7 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
       name: what the viewer calls it.
       properties: fingerprint of renderer, device and versions, kept inside the recording.
     """
+    rr.set_strict_mode(True)  # a call that cannot be logged is an error, not a warning
     recording = rr.RecordingStream(APPLICATION)
     with contextlib.ExitStack() as stack:
         outputs = []
