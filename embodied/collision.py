@@ -72,6 +72,8 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         bounds = grid_boxes(points, n, cut, MOST_BOXES)
         if len(bounds) <= MOST_BOXES:
             break
+    else:
+        bounds = [(points.min(axis=0), points.max(axis=0))]
     for low, high in free:
         bounds = [piece for b in bounds for piece in without(b, (low, high))]
     return tuple(_box(low, high, points.min(axis=0)) for low, high in (*slabs, *bounds))
@@ -143,9 +145,10 @@ def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = (),
                most: int = 10**6) -> list[tuple[np.ndarray, np.ndarray]]:
     """(low, high) corners of boxes that cover `points` (k, 3), from a grid of cubes, n along the longest side.
 
-    Gives up when there are more than `most`. The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
+    The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
     shrunk to the points in it, so a table top stays thin and its height exact; what nearly reaches
-    the bounds of the whole reaches them, so that a thing stands on all its feet.
+    the bounds of the whole reaches them, so that a thing stands on all its feet. Stops as soon as
+    there are more than `most` boxes.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     counts = np.maximum(1, np.rint((high - low) / ((high - low).max() / n + 1e-12))).astype(int)
