@@ -11,44 +11,33 @@ from __future__ import annotations
 import dataclasses
 import functools
 import importlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
 from tqdm import tqdm
 
 from assets.cache import default_cache
 from assets.importer import Recipe, import_model, scaled
+from assets.own import OwnModel, import_own, read_own
 from assets.packs import pack_of
-from assets.records import ROOM_KINDS, SUPPORTS, Asset, Finish, MeshPart, SupportSurface
+from assets.records import Asset, Finish, MeshPart
+from assets.rows import CatalogueError, check_classes, read_json, read_models
 
 DATA = Path(__file__).parent / "data"
-
-CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
-MODEL_FIELDS = (
-    "class", "name", "size", "support", "rooms", "synonyms", "on", "clearance", "tags", "elevation",
-    "colours", "materials", "surfaces", "emits", "yaw", "creator", "licence", "lamp",
-    "glow", "two_sided", "flipped", "dropped", "looks", "faces",
-)
-"""What a line of catalogue.json may hold; the last row and `yaw` go into the importer's Recipe."""
-
-
-class CatalogueError(ValueError):
-    """A catalogue that cannot be read: says what was expected, what came and what to do."""
-
 
 class Catalogue:
     """All assets by key, and their meshes on demand."""
 
     def __init__(
-        self, assets: Mapping[str, Asset], recipes: Mapping[str, Recipe], cache: Path, packs: Sequence[Path] = ()
+        self, assets: Mapping[str, Asset], recipes: Mapping[str, Recipe], cache: Path, packs: Sequence[Path] = (),
+        own: Mapping[str, OwnModel] = MappingProxyType({}),
     ):
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
         self.cache = Path(cache)
         self.packs = tuple(packs)
         self._recipes = dict(recipes)
+        self._own = dict(own)
         self._imported = functools.lru_cache(maxsize=512)(self._import)
         self._scaled = functools.lru_cache(maxsize=1024)(self._scale)
 
@@ -77,8 +66,7 @@ class Catalogue:
           CatalogueError: unknown key.
           PackError, MeshError: the model's pack is missing or damaged.
         """
-        asset = self._asset(key)
-        return self._scaled(key, tuple(asset.size if size is None else size), tuple(params))
+        return self._scaled(key, tuple(self._asset(key).size if size is None else size), tuple(params))
 
     def build(self, keys: Sequence[str] = ()) -> None:
         """Import the models `keys` (all if none) into the cache, with a progress bar; what is
@@ -94,6 +82,8 @@ class Catalogue:
 
     def _import(self, key: str) -> tuple[MeshPart, ...]:
         recipe = self._recipes[key]
+        if key in self._own:
+            return import_own(self._own[key], recipe, self.cache)
         pack = pack_of(key, self.packs)
         return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[key].rotation), self.cache)
 
@@ -116,97 +106,18 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    classes = read_classes(DATA / "classes.json")
-    assets, recipes = read_models(DATA / "catalogue.json", classes, read_json(DATA / "packs.json"))
+    classes = read_json(DATA / "classes.json")
+    check_classes("classes.json", classes)
+    rows, licences = read_json(DATA / "catalogue.json"), read_json(DATA / "packs.json")
+    assets, recipes = read_models("catalogue.json", rows, classes, licences)
     assets |= {key: maker.asset for key, maker in sorted(_makers().items())}
-    return Catalogue(assets, recipes, cache or default_cache(), packs)
-
-
-def read_json(path: Path) -> dict:
-    """The JSON object in `path`.
-
-    Raises:
-      CatalogueError: missing, not JSON, or not an object.
-    """
-    try:
-        body = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise CatalogueError(f"{path} does not exist; docs/assets.md shows what it should hold") from e
-    except (UnicodeDecodeError, json.JSONDecodeError) as e:
-        raise CatalogueError(f"{path} is not JSON ({e})") from e
-    if not isinstance(body, dict):
-        raise CatalogueError(f"{path} should hold a JSON object, got {type(body).__name__}")
-    return body
-
-
-def read_classes(path: Path) -> dict[str, dict]:
-    """The shared fields of every object class, checked."""
-    classes = read_json(path)
-    for name, row in classes.items():
-        _check_row(f"{path.name}: class {name!r}", row, CLASS_FIELDS)
-    return classes
-
-
-def read_models(
-    path: Path, classes: Mapping[str, dict], packs: Mapping[str, dict]
-) -> tuple[dict[str, Asset], dict[str, Recipe]]:
-    """The assets of one catalogue file over the classes it names, and how to import each."""
-    assets, recipes = {}, {}
-    for key, row in read_json(path).items():
-        where = f"{path.name}: model {key!r}"
-        _check_row(where, row, MODEL_FIELDS)
-        if row.get("class") not in classes:
-            raise CatalogueError(f"{where} has the unknown class {row.get('class')!r}; use one of data/classes.json")
-        pack = packs.get(key.split("/")[0], {})
-        assets[key] = _asset(where, key, classes[row["class"]] | row, classes[row["class"]], pack)
-        recipes[key] = _recipe(assets[key], row)
-    return assets, recipes
-
-
-def _recipe(asset: Asset, row: Mapping) -> Recipe:
-    lists = {name: tuple(row.get(name, ())) for name in ("two_sided", "flipped", "glow", "dropped")}
-    return Recipe(
-        asset.key, asset.size, yaw=float(row.get("yaw", 0.0)), emits=asset.emits, faces=int(row.get("faces", 0)),
-        looks=tuple(sorted(row.get("looks", {}).items())), **lists,
-    )
-
-
-def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -> Asset:
-    size = row.get("size")
-    if not isinstance(size, list) or len(size) != 3 or not all(np.isfinite(s) and 0 < s < 30 for s in size):
-        raise CatalogueError(f"{where} should have a size of three lengths in metres, got {size!r}")
-    return Asset(
-        key=key,
-        object_class=row["class"],
-        name=row.get("name", row["class"]),
-        size=tuple(float(s) for s in size),
-        support=row["support"],
-        rooms=MappingProxyType({k: float(row["rooms"][k]) for k in ROOM_KINDS if k in row.get("rooms", {})}),
-        synonyms=tuple(row.get("synonyms", ())),
-        colours=tuple(row.get("colours", ())),
-        materials=tuple(row.get("materials", ())),
-        on=tuple(row.get("on", ())),
-        elevation=float(row.get("elevation", 0.0)),
-        clearance=float(row.get("clearance", 0.0)),
-        surfaces=tuple(SupportSurface(str(s[0]), *(float(v) for v in s[1:])) for s in row.get("surfaces", ())),
-        tags=tuple(dict.fromkeys((*shared.get("tags", ()), *row.get("tags", ())))),
-        emits=tuple(row["emits"]) if row.get("emits") else None,
-        lamp=tuple(row["lamp"]) if row.get("lamp") else None,
-        pack=key.split("/")[0],
-        creator=row.get("creator", ""),
-        licence=row.get("licence", pack.get("licence", "")),
-    )
-
-
-def _check_row(where: str, row: object, fields: tuple[str, ...]) -> None:
-    if not isinstance(row, dict):
-        raise CatalogueError(f"{where} should be an object, got {row!r}")
-    if unknown := sorted(set(row) - set(fields)):
-        raise CatalogueError(f"{where} has the unknown fields {unknown}; it may hold {list(fields)}")
-    if row.get("support", "floor") not in SUPPORTS:
-        raise CatalogueError(f"{where} has the unknown support {row['support']!r}; use one of {SUPPORTS}")
-    if unknown := sorted(set(row.get("rooms", {})) - set(ROOM_KINDS)):
-        raise CatalogueError(f"{where} names the unknown room kinds {unknown}; use {ROOM_KINDS}")
+    models: dict[str, OwnModel] = {}
+    for folder in own:
+        more, more_recipes, more_models = read_own(Path(folder), classes)
+        if twice := sorted(set(more) & set(assets)):
+            raise CatalogueError(f"{folder} has the keys {twice}, which are taken; give it another \"pack\" name")
+        assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
+    return Catalogue(assets, recipes, cache or default_cache(), packs, models)
 
 
 def _makers() -> Mapping:

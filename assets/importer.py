@@ -73,9 +73,10 @@ class RawPart:
     image: Image.Image | None = None
 
 
-def import_model(pack: Pack, recipe: Recipe, cache: Path) -> tuple[MeshPart, ...]:
-    """The parts of a library's model, from the cache if it is there and sound."""
-    obj = pack.entries[recipe.key].model
+def import_model(pack: Pack, recipe: Recipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
+    """The parts of a library's model (the OBJ entry `obj`, that of the recipe's key if None), from
+    the cache if it is there and sound."""
+    obj = obj or pack.entries[recipe.key].model
     return cached(recipe, pack.digest, cache, lambda: read_obj(pack.read, obj, f"{pack.path.name}: {obj}"))
 
 
