@@ -25,6 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
     parser.add_argument("--panoramas", choices=("unlit", "baked", "glossy"), help="also draw every viewpoint, this well")
     parser.add_argument("--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)")
+    parser.add_argument("--export", type=Path, metavar="DIR", help="also write the files that the published programs read")
     parser.add_argument("--workers", type=int, default=2, metavar="N", help="processes on this machine (default: %(default)s)")
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_cache(parser)
@@ -35,6 +36,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
+    from embodied.compat import export
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
     from embodied.datasets.store import Dataset
 
@@ -53,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
             packs=tuple(args.pack), ray_address=args.ray,
         )
     data = Dataset(args.out)
+    if args.export:
+        note(f"{len(export(data, args.export))} files for the published programs in {args.export}")
     show(args, {"folder": str(args.out), "digest": data.digest, "splits": data.index["splits"]},
          f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}")
     return 0

@@ -1,0 +1,106 @@
+"""Exported files say, in Matterport's conventions, what our records say in ours."""
+
+from __future__ import annotations
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+from hand_worlds import line_world
+from test_datasets import build
+
+from embodied.compat import (
+    action_list,
+    export,
+    in_matterport_order,
+    read_features,
+    scan_name,
+    tokenised,
+    view_index,
+    write_features,
+)
+from embodied.geometry import heading_of_yaw
+from embodied.interface import Pose
+from embodied.navgraph import from_matterport
+
+
+def test_views_agree_about_where_they_look():
+    for view in range(36):
+        index = view_index(view)
+        assert np.isclose(np.cos(index % 12 * np.pi / 6), np.cos(heading_of_yaw(view % 12 * np.pi / 6)))
+        assert np.isclose(np.sin(index % 12 * np.pi / 6), np.sin(heading_of_yaw(view % 12 * np.pi / 6)))
+        assert index // 12 == view // 12 and view_index(index) == view
+    assert view_index(Pose(0, 3, 0).view) == 12, "our turn 3 looks along +y, Matterport's heading 0"
+
+
+def test_the_action_list_of_a_node_on_the_line():
+    """Facing +y (bin 0) at node 1: east is 90 degrees to the right, west to the left."""
+    stop, *others = action_list(line_world().graph, 1, 0)
+    assert stop == {"relViewIndex": -1, "absViewIndex": 0, "nextViewpointId": "n1"}
+    east, west = (next(a for a in others if a["nextViewpointId"] == n) for n in ("n2", "n0"))
+    assert east["rel_heading"] == pytest.approx(np.pi / 2) and (east["absViewIndex"], east["relViewIndex"]) == (15, 15)
+    assert west["rel_heading"] == pytest.approx(-np.pi / 2) and west["absViewIndex"] == 21
+    turned = action_list(line_world().graph, 1, 3)[1]
+    assert (turned["nextViewpointId"], turned["relViewIndex"], turned["absViewIndex"]) == ("n2", 12, 15), "straight ahead"
+
+
+def test_hannas_files_hold_together(tmp_path):
+    data = build(tmp_path / "d", tmp_path / "c")
+    export(data, tmp_path / "out")
+    items = json.loads((tmp_path / "out/hanna/hanna_train.json").read_text())
+    spaces = json.loads((tmp_path / "out/hanna/panoramic_action_space.json").read_text())
+    routes = json.loads((tmp_path / "out/hanna/routes.json").read_text())
+    tasks = data.tasks("train")
+    assert len(items) == len(tasks) and len({i["path_id"] for i in items}) == len(items)
+    for item, task in zip(items, tasks, strict=True):
+        graph = data.place(task.world).graph
+        assert [p[-1] for p in item["paths"]] == [graph.ids[g] for g in task.goal_nodes]
+        for path in item["paths"]:
+            for a, b in itertools.pairwise(path):
+                assert any(x["nextViewpointId"] == b for x in spaces[f"{item['scan']}_{a}_0"])
+    for scan, some in routes.items():
+        splits = {r["split"] for r in some}
+        assert splits == ({"train_seen", "train_unseen"} if scan.startswith("train") else {scan[:-4]})
+        assert all(isinstance(r["path_id"], str) and "_" not in r["path_id"] and 0 <= r["view_id"] < 36 for r in some)
+    scans = (tmp_path / "out/connectivity/scans.txt").read_text().split()
+    assert sorted(scans) == sorted(routes)
+    graph = from_matterport(tmp_path / "out/connectivity" / f"{scans[0]}_connectivity.json")
+    assert np.allclose(graph.positions, data.place("test_0000").graph.positions)
+    vocabulary = (tmp_path / "out/hanna/vocab.txt").read_text().split("\n")
+    assert vocabulary[:3] == ["<PAD>", "<UNK>", "<EOS>"] and "find" in vocabulary
+
+
+def test_r2r_items_have_three_instructions(tmp_path):
+    data = build(tmp_path / "d", tmp_path / "c", "vln")
+    export(data, tmp_path / "out")
+    for split in data.splits:
+        items = json.loads((tmp_path / "out" / f"R2R_{split}.json").read_text())
+        assert items and all(len(i["instructions"]) == 3 and len(i["path"]) >= 2 for i in items)
+        assert {i["scan"] for i in items} <= {scan_name(n) for n in data.names(split)}
+
+
+def test_vnla_trajectories_end_with_stop_and_walk_the_path(tmp_path):
+    data = build(tmp_path / "d", tmp_path / "c", "vnla")
+    export(data, tmp_path / "out")
+    for item in json.loads((tmp_path / "out/asknav/asknav_train.json").read_text()):
+        for path, trajectory in zip(item["paths"], item["trajectories"], strict=True):
+            assert trajectory[-1] == [0, 0, 0] and sum(a == [1, 0, 0] for a in trajectory) >= len(path) - 1
+        assert item["object_name"] in item["instructions"][0]
+
+
+def test_feature_files_survive(tmp_path):
+    features = np.random.default_rng(0).normal(size=(36, 5)).astype(np.float32)
+    write_features(tmp_path / "f.tsv", [("test_0001", "v000", features)])
+    (key, again), = read_features(tmp_path / "f.tsv").items()
+    assert key == ("test0001", "v000") and (again == features).all()
+    assert (in_matterport_order(features)[12] == features[15]).all(), "viewIndex 12 looks along +y, our view 15"
+
+
+def test_other_kinds_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="no published program"):
+        export(build(tmp_path / "d", tmp_path / "c", "hari"), tmp_path / "out")
+
+
+def test_tokens_are_lower_case_and_apart():
+    assert tokenised("Go straight, then turn left.") == "go straight , then turn left ."

@@ -1,0 +1,63 @@
+"""People stand beside the starts of their routes, look at them, and are in nobody's way."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import shapely
+from hand_worlds import grid_world, thing
+
+from assets.records import Asset
+from embodied.geometry import facing_of, wrap
+from embodied.house import House, check
+from embodied.people import BODY, CLASS, PASSAGE, add_people
+from embodied.tasks.goals import find_instances
+
+FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
+CATALOGUE = SimpleNamespace(of_class=lambda name: (FIGURE,) if name == CLASS else ())
+
+
+def populated(starts=(0, 14, 14, 30), world=None) -> tuple[House, object]:
+    world = world or grid_world(6, spacing=2.2)
+    return add_people(world.house, world.graph, starts, CATALOGUE, seed=1), world
+
+
+def test_one_person_per_start_looking_at_it():
+    house, world = populated()
+    people = [p for p in house.placements if p.object_class == CLASS]
+    assert len(people) == 3
+    for p, node in zip(people, (0, 14, 30), strict=True):
+        offset = world.graph.positions[node, :2] - p.position[:2]
+        assert 0.5 <= np.hypot(*offset) <= 1.4 and p.room == world.graph.room_of_node[node]
+        assert abs(wrap(facing_of(p.yaw) - math.atan2(offset[1], offset[0]))) < 1e-3
+
+
+def test_nobody_blocks_an_edge_or_stands_in_furniture():
+    house, world = populated(range(36))
+    ways = shapely.MultiLineString([world.graph.positions[list(e), :2].tolist() for e in world.graph.edges])
+    people = [shapely.Point(p.position[:2]) for p in house.placements if p.object_class == CLASS]
+    assert len(people) > 20
+    assert all(ways.distance(p) >= PASSAGE - 1e-3 for p in people)
+    assert all(a.distance(b) >= 2 * BODY - 1e-2 for i, a in enumerate(people) for b in people[:i])
+    check(house)
+
+
+def test_a_crowded_start_goes_without():
+    world = grid_world(6, spacing=2.2)
+    x, y, _ = world.graph.positions[0]
+    table = dataclasses.replace(thing("table", 1, "kitchen_1", x, y), size=(3.2, 3.2, 0.7))
+    full = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=(table,)))
+    assert not [p for p in populated((0,), full)[0].placements if p.object_class == CLASS]
+
+
+def test_people_are_not_objects_to_look_for():
+    house, world = populated()
+    there = dataclasses.replace(world, house=house)
+    assert CLASS not in {x.object_class for x in find_instances(there, 3.0)}
+
+
+def test_the_same_seed_gives_the_same_people():
+    assert populated()[0] == populated()[0]
