@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from assets.built.bath import bath_makers
 from assets.built.decor import decor_makers
 from assets.built.kitchen import kitchen_makers
+from assets.built.lamps import lamps_makers
 from assets.built.maker import Maker
 from assets.built.soft import soft_makers
 
@@ -21,6 +23,8 @@ def _all() -> Mapping[str, Maker]:
         *kitchen_makers(),
         *decor_makers(),
         *soft_makers(),
+        *lamps_makers(),
+        *bath_makers(),
     ]
     keys = [m.asset.key for m in made]
     assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)

@@ -1,0 +1,595 @@
+"""Bathroom: vanity, shower, towels, mats and what stands around the basin."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from assets.built.maker import (
+    CHROME,
+    GLASS,
+    PORCELAIN,
+    FinishOf,
+    Look,
+    Maker,
+    front,
+    handle,
+    maker,
+    material,
+    metal,
+    parts_of,
+    plain,
+    surface,
+)
+from assets.built.primitives import (
+    Shape,
+    box,
+    cylinder,
+    extruded,
+    joined,
+    lathe,
+    moved,
+    quads,
+    scaled,
+    sheet,
+    shifted_uv,
+    tube,
+    turned,
+)
+from assets.built.soft import layers
+from assets.records import MeshPart
+
+BATH = {"bathroom": 1.0, "toilet": 0.4}
+BASINS = ("bathroom vanity", "washbasin", "wall washbasin", "double vanity")
+
+
+def vanity(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A drawer cabinet hung off the floor, a ceramic top with an oval basin, a mixer tap."""
+    w, d, h = size
+    tap = 0.14
+    top = h - tap
+    z0, z1, y = 0.28, top - 0.05, -d / 2 + 0.01
+    body = box([-w / 2 + 0.01, y + 0.02, z0], [w / 2 - 0.01, d / 2, z1], 0.001)
+    mid = (z0 + z1) / 2
+    doors = [
+        front(-w / 2 + 0.01, w / 2 - 0.01, a, b, y, str(look.get("style", "flat"))) for a, b in ((z0, mid), (mid, z1))
+    ]
+    grips = [handle(0, b - 0.05, y, "bar", False, w * 0.3) for b in (mid, z1)]
+    t = np.linspace(0, 2 * np.pi, 41)[:-1]
+    rx, ry, deep, cy = min(0.24, w * 0.38), d * 0.30, 0.10, -0.03
+    hole = np.stack([rx * np.cos(t), cy + ry * np.sin(t)], 1)
+    plate = shapely.box(-w / 2, -d / 2, w / 2, d / 2).difference(shapely.Polygon(hole))
+    slab = extruded(plate, top - 0.05, top)
+    profile = [(0.08, -deep), (0.55, -deep * 0.93), (0.85, -deep * 0.6), (0.97, -0.015), (1.0, 0.0)]
+    bowl = lathe([(0.0, -deep), *profile], 40, 0.9)
+    bowl = Shape(bowl.vertices, bowl.faces[:, ::-1], -bowl.normals, bowl.uv)
+    bowl = moved(scaled(bowl, rx, ry, 1), 0, cy, top)
+    drain = moved(cylinder(0.022, 0, 0.003, 0.001, 14), 0, cy, top - deep)
+    ty = cy + ry + 0.035
+    spout = tube(
+        [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)], 0.011, 10
+    )
+    lever = tube([(0, ty, top + 0.09), (0, ty + 0.005, top + 0.13), (0, ty - 0.05, top + tap)], 0.006, 8)
+    base = moved(cylinder(0.022, 0, 0.012, 0.003, 14), 0, ty, top)
+    wood = material(look, "front", finish, "oak/0")
+    return parts_of(
+        (wood, [body, *doors]),
+        (metal(look, finish, "black"), grips),
+        (PORCELAIN, [slab, bowl]),
+        (CHROME, [drain, spout, lever, base]),
+    )
+
+
+def shower(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A corner shower: tray, two glass screens (one with a way in), mixer, rail and head on the back wall."""
+    w, d, h = size
+    rim, t = 0.045, 0.05
+    tray = [
+        box([-w / 2, -d / 2, 0], [w / 2, d / 2, 0.02]),
+        box([-w / 2, -d / 2, 0], [w / 2, -d / 2 + t, rim], 0.01),
+        box([-w / 2, d / 2 - t, 0], [w / 2, d / 2, rim], 0.01),
+        box([-w / 2, -d / 2 + t, 0], [-w / 2 + t, d / 2 - t, rim], 0.01),
+        box([w / 2 - t, -d / 2 + t, 0], [w / 2, d / 2 - t, rim], 0.01),
+    ]
+    x, y, g = w / 2 - 0.025, -d / 2 + 0.025, 0.004
+    door = min(0.6, w * 0.55)
+    glass = [box([x - g, y, rim], [x + g, d / 2, h]), box([-x + door, y - g, rim], [x, y + g, h])]
+    posts = [
+        box([x - 0.012, y - 0.012, rim], [x + 0.012, y + 0.012, h], 0.003),
+        box([x - 0.012, d / 2 - 0.02, rim], [x + 0.012, d / 2, h], 0.003),
+        box([-x + door - 0.01, y - 0.01, rim], [-x + door + 0.01, y + 0.01, h], 0.003),
+        box([-w / 2, y - 0.012, h - 0.03], [x, y + 0.012, h], 0.003),
+    ]
+    by = d / 2 - 0.05
+    rail = tube([(0, by, 1.05), (0, by, h - 0.02)], 0.010, 10)
+    neck = tube([(0, by, h - 0.03), (0, by - 0.05, h - 0.012), (0, by - 0.28, h - 0.012)], 0.010, 10)
+    head = moved(lathe([(0, -0.02), (0.11, -0.02), (0.11, -0.010), (0.02, 0.0), (0, 0.0)], 28), 0, by - 0.28, h - 0.02)
+    mixer = [moved(turned(cylinder(0.022, -0.13, 0.13, 0.004, 14), np.pi / 2, "y"), 0, by, 1.08)]
+    s = np.linspace(0, 1, 14)
+    hose = tube(
+        np.stack(
+            [
+                0.10 + 0.05 * np.sin(np.pi * s),
+                by - 0.02 - 0.05 * np.sin(np.pi * s),
+                1.06 - 0.55 * np.sin(np.pi * s) + 0.45 * s,
+            ],
+            1,
+        ),
+        0.006,
+        7,
+    )
+    stays = [box([-0.012, by, z], [0.012, d / 2, z + 0.02]) for z in (1.07, h - 0.12)]
+    drain = moved(cylinder(0.045, 0, 0.004, 0.001, 18), -w * 0.1, d * 0.25, 0.02)
+    return parts_of(
+        (PORCELAIN, tray), (GLASS, glass), (CHROME, [*posts, rail, neck, head, *mixer, hose, *stays, drain])
+    )
+
+
+def _draped(w: float, h: float, d: float, *, rng: np.random.Generator) -> Shape:
+    """A towel over a rail: a long front, a shorter back, soft folds."""
+    rows, cols = 26, 18
+    r = d * 0.22
+    long, short = h - r, (h - r) * 0.72
+    s = np.linspace(0, 1, rows + 1)
+    total = long + np.pi * r + short
+    y, z = np.empty(rows + 1), np.empty(rows + 1)
+    for i, q in enumerate(s * total):
+        if q < long:
+            y[i], z[i] = -r, q
+        elif q < long + np.pi * r:
+            a = (q - long) / r
+            y[i], z[i] = -r * np.cos(a), long + r * np.sin(a)
+        else:
+            y[i], z[i] = r, long - (q - long - np.pi * r)
+    x = np.linspace(-w / 2, w / 2, cols + 1)
+    phase = rng.uniform(0, 6.28)
+    sway = np.sin(np.linspace(0, 2 * np.pi * rng.uniform(1.2, 2.0), cols + 1) + phase)
+    hang = np.clip(1 - z / long, 0, 1)
+    yy = y[:, None] * (1 + 0.0 * sway) + np.sign(y)[:, None] * d * 0.16 * hang[:, None] * (0.8 + sway[None])
+    xx = x[None] * (1 - 0.03 * hang[:, None] * np.abs(sway[None]))
+    return sheet(np.stack([xx, yy, z[:, None] + 0 * xx], -1), 0.006)
+
+
+def towel_rail(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A rail on two posts with a towel over it."""
+    w, d, h = size
+    y, z = -d * 0.1, h - 0.035
+    rail = tube([(-w / 2, y, z), (w / 2, y, z)], 0.008, 10)
+    posts = [
+        joined(
+            tube([(x, y, z), (x, d / 2, z)], 0.007, 8),
+            moved(turned(cylinder(0.022, 0, 0.006, 0.002, 14), np.pi / 2, "x"), x, d / 2, z),
+        )
+        for x in (-w / 2 + 0.02, w / 2 - 0.02)
+    ]
+    tw = w * float(look.get("share", 0.72))
+    towel = moved(
+        shifted_uv(_draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng), *rng.random(2)),
+        rng.uniform(-0.05, 0.05) * w,
+        y,
+        0,
+    )
+    return parts_of(
+        (metal(look, finish, "chrome"), [rail, *posts]), (material(look, "cloth", finish, "terry/0"), towel)
+    )
+
+
+def hanging_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A towel on a hook: gathered above, falling in folds."""
+    w, d, h = size
+    rows, cols = 16, 30
+    x = np.linspace(-1, 1, cols + 1)[None]
+    t = np.linspace(0, 1, rows + 1)[:, None]
+    spread = 0.12 + 0.88 * np.sin(np.pi / 2 * np.clip((1 - t) * 1.6, 0, 1)) ** 0.8
+    fold = np.sin(3.2 * np.pi * x + 1.0 + 0.6 * t)
+    z = (h - 0.03) * t - 0.05 * h * (np.abs(x) * (1 - spread)) - 0.04 * np.abs(x) * (1 - t)
+    y = d * 0.05 - 0.22 * d * fold * (0.35 + 0.65 * (1 - t))
+    hook = joined(
+        tube([(0, d / 2, h - 0.03), (0, -d * 0.1, h - 0.035), (0, -d * 0.25, h - 0.005)], 0.006, 8),
+        moved(turned(cylinder(0.02, 0, 0.006, 0.002, 14), np.pi / 2, "x"), 0, d / 2, h - 0.03),
+    )
+    cloth = sheet(np.stack(np.broadcast_arrays(x * spread * w / 2, y, z), -1), 0.006)
+    return parts_of((CHROME, hook), (material(look, "cloth", finish, "terry/0"), cloth))
+
+
+def towels(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Folded towels on one another."""
+    return parts_of((material(look, "cloth", finish, "terry/0"), layers(size, int(look.get("layers", 3)), rng=rng)))
+
+
+def bath_mat(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A thick terry mat with a flat hem."""
+    w, d, h = size
+    hem = [box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.55], 0.003)]
+    pile = box([-w / 2 + 0.03, -d / 2 + 0.03, 0], [w / 2 - 0.03, d / 2 - 0.03, h], 0.006)
+    return parts_of((material(look, "cloth", finish, "terry/0"), [*hem, pile]))
+
+
+def toilet_brush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, _, h = size
+    r = w / 2
+    cup = lathe([(0, 0), (r, 0), (r, h * 0.42), (r * 0.86, h * 0.42), (r * 0.84, h * 0.1), (0, h * 0.1)], 24)
+    stick = lathe(
+        [(0, h * 0.2), (0.007, h * 0.2), (0.007, h * 0.8), (0.011, h * 0.84), (0.011, h * 0.98), (0.006, h), (0, h)],
+        12,
+        0.9,
+    )
+    lid = lathe([(0, h * 0.42), (r * 0.8, h * 0.42), (r * 0.5, h * 0.46), (0, h * 0.47)], 24, 0.9)
+    return parts_of((metal(look, finish, "white"), cup), (CHROME, [stick, lid]))
+
+
+def soap_dispenser(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, d, h = size
+    r = min(w, d) * 0.5
+    body = lathe(
+        [(0, 0), (r * 0.94, 0), (r, 0.006), (r, h * 0.62), (r * 0.85, h * 0.70), (r * 0.35, h * 0.72), (0, h * 0.72)],
+        24,
+        0.6,
+    )
+    pump = [
+        lathe(
+            [
+                (0, h * 0.7),
+                (r * 0.38, h * 0.7),
+                (r * 0.38, h * 0.78),
+                (r * 0.14, h * 0.79),
+                (r * 0.14, h * 0.93),
+                (0, h * 0.93),
+            ],
+            14,
+        ),
+        tube([(0, 0, h * 0.955), (0, -r * 0.98, h * 0.935)], h * 0.03, 7),
+        lathe([(0, h * 0.92), (r * 0.3, h * 0.93), (r * 0.3, h), (0, h)], 14),
+    ]
+    colour = {
+        "white": PORCELAIN,
+        "black": plain((0.06, 0.06, 0.065), 0.35),
+        "amber": plain((0.35, 0.17, 0.06), 0.1),
+        "green": plain((0.36, 0.46, 0.38), 0.3),
+    }[str(look.get("colour", "white"))]
+    return parts_of((colour, body), (CHROME if look.get("colour") != "black" else plain((0.1, 0.1, 0.1), 0.4), pump))
+
+
+def toothbrush_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, _, h = size
+    r, cup = w / 2, h * 0.5
+    body = lathe([(0, 0), (r * 0.9, 0), (r * 0.97, cup), (r * 0.87, cup), (r * 0.8, 0.008), (0, 0.008)], 22)
+    brushes = []
+    for k, c in enumerate(((0.20, 0.45, 0.70), (0.85, 0.40, 0.42), (0.92, 0.92, 0.90))[: 2 + int(rng.integers(2))]):
+        a = 2.2 * k + rng.uniform(0, 1)
+        foot, top = (
+            np.array([-0.4 * r * np.cos(a), -0.4 * r * np.sin(a), 0.012]),
+            np.array([0.75 * r * np.cos(a), 0.75 * r * np.sin(a), h * rng.uniform(0.9, 0.99)]),
+        )
+        stick = tube([foot, (foot + top) / 2, top], [0.004, 0.005, 0.0035], 6)
+        head = moved(box([-0.005, -0.006, -0.014], [0.005, 0.006, 0.010], 0.001), *(top + [0.004, 0, 0]))
+        brushes += [(plain(c, 0.35), stick), (plain((0.93, 0.95, 0.96), 0.8), head)]
+    return parts_of((PORCELAIN, body), *brushes)
+
+
+def paper_roll(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A toilet roll on a wall bracket, its end hanging."""
+    w, d, h = size
+    r = min(h * 0.42, d * 0.42)
+    roll = moved(
+        turned(lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 28), np.pi / 2, "y"),
+        0,
+        -d / 2 + r,
+        h - r - 0.012,
+    )
+    loose = box([-0.05, -d / 2, 0], [0.05, -d / 2 + 0.0015, h - r - 0.012])
+    arm = tube(
+        [
+            (w / 2 - 0.008, d / 2, h - r - 0.012),
+            (w / 2 - 0.008, -d / 2 + r, h - r - 0.012),
+            (-w / 2, -d / 2 + r, h - r - 0.012),
+        ],
+        0.006,
+        8,
+    )
+    plate = box([w / 2 - 0.03, d / 2 - 0.006, h - r - 0.035], [w / 2, d / 2, h], 0.002)
+    return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), (CHROME, [arm, plate]))
+
+
+def bin_(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A round bin: open waste basket, or pedal bin where look['lid'] is 1."""
+    w, d, h = size
+    r = w / 2
+    top = h * 0.9 if look.get("lid") else h
+    low = 0.82 if not look.get("lid") else 0.97
+    wall = 0.004
+    shell = lathe([(0, 0), (r * low, 0), (r, top), (r - wall, top), (r * low - wall, 0.006), (0, 0.006)], 32)
+    shell = scaled(shell, 1, d / w, 1)
+    main = material(look, "skin", finish, "brushed_steel/0") if "skin" in look else metal(look, finish, "white")
+    if not look.get("lid"):
+        return parts_of((main, shell))
+    t = np.linspace(0, np.pi / 2, 8)
+    lid = lathe([(0, top), (r, top), *np.stack([r * np.cos(t), top + (h - top) * np.sin(t)], 1)[1:]], 32, 0.6)
+    pedal = box([-0.04, -d / 2 - 0.02, 0.008], [0.04, -d / 2 + 0.02, 0.02], 0.003)
+    return parts_of((main, [shell, lid]), (plain((0.06, 0.06, 0.06), 0.5), pedal))
+
+
+def laundry_basket(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Wickerwork with a rolled rim and clothes looking out."""
+    w, d, h = size
+    body = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.06).buffer(0.06, quad_segs=4)
+    ring = np.asarray(shapely.geometry.polygon.orient(body).exterior.coords)[:-1]
+    top = h * 0.93
+    lay = []
+    for scale0, scale1, z0, z1, flip in ((0.84, 0.985, 0.0, top, False), (0.80, 0.945, 0.01, top, True)):
+        a = np.column_stack([ring * scale0, np.full(len(ring), z0)])
+        b = np.column_stack([ring * scale1, np.full(len(ring), z1)])
+        corners = np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], 1)
+        run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
+        uv = np.stack(
+            [
+                np.stack([run[:-1], 0 * run[:-1]], 1),
+                np.stack([run[1:], 0 * run[1:]], 1),
+                np.stack([run[1:], 0 * run[1:] + h], 1),
+                np.stack([run[:-1], 0 * run[:-1] + h], 1),
+            ],
+            1,
+        )
+        lay.append(quads(corners[:, ::-1] if flip else corners, uv[:, ::-1] if flip else uv))
+    bottom = quads([[(-w * 0.4, -d * 0.4, 0), (-w * 0.4, d * 0.4, 0), (w * 0.4, d * 0.4, 0), (w * 0.4, -d * 0.4, 0)]])
+    rim = tube(np.column_stack([ring * 0.965, np.full(len(ring), top)]), min(0.014, h * 0.03), 8, closed=True)
+    x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13))
+    bump = sum(
+        rng.normal(0, 0.5) * np.sin(rng.uniform(1.5, 4) * (x * np.cos(a) + y * np.sin(a)) + a)
+        for a in rng.uniform(0, 6, 6)
+    )
+    edge = np.maximum(np.abs(x), np.abs(y))
+    z = top * 0.9 + (h - top * 0.9) * np.clip(0.55 + 0.25 * bump, 0, 1) * (1 - edge**4)
+    heap = sheet(np.stack([x * w * 0.43, y * d * 0.43, z], -1))
+    return parts_of(
+        (material(look, "skin", finish, "wicker/0"), [*lay, bottom, rim]),
+        (material(look, "cloth", finish, "cotton/3"), heap),
+    )
+
+
+def bath_makers() -> list[Maker]:
+    made = []
+    for name, wood, colour, metal_name in (
+        ("oak", "oak/0", "brown", "black"),
+        ("white", "lacquer_white/0", "white", "steel"),
+        ("walnut", "walnut/0", "dark brown", "brass"),
+        ("navy", "lacquer_navy_blue/0", "blue", "brass"),
+    ):
+        made.append(
+            maker(
+                f"vanity_{name}",
+                "bathroom vanity",
+                f"{name} vanity with a basin",
+                (0.8, 0.48, 0.99),
+                vanity,
+                support="against_wall",
+                rooms=BATH,
+                clearance=0.7,
+                synonyms=("washbasin", "sink", "basin"),
+                colours=(colour, "white"),
+                materials=("wood", "ceramic"),
+                surfaces=(
+                    surface("rim_left", 0.85, 0.14, 0.44, x=-0.33),
+                    surface("rim_right", 0.85, 0.14, 0.44, x=0.33),
+                ),
+                look={"front": wood, "metal": metal_name, "style": "shaker" if name == "navy" else "flat"},
+            )
+        )
+    made.append(
+        maker(
+            "shower",
+            "shower",
+            "glass shower",
+            (0.9, 0.9, 2.05),
+            shower,
+            support="corner",
+            rooms={"bathroom": 1.0},
+            clearance=0.6,
+            synonyms=("shower cubicle",),
+            colours=("white",),
+            materials=("glass",),
+        )
+    )
+    for i, colour in enumerate(("white", "grey", "blue", "sand", "green", "pink", "navy blue")):
+        cloth, words = {"cloth": f"terry/{i}"}, {"colours": (colour.split()[-1],), "materials": ("terry", "fabric")}
+        stem = colour.replace(" ", "_")
+        made.append(
+            maker(
+                f"towel_rail_{stem}",
+                "towel rail",
+                f"rail with a {colour} towel",
+                (0.6, 0.11, 0.55),
+                towel_rail,
+                support="wall",
+                elevation=0.75,
+                rooms=BATH,
+                synonyms=("towel holder",),
+                look=cloth,
+                **words,
+            )
+        )
+        made.append(
+            maker(
+                f"hanging_towel_{stem}",
+                "hanging towel",
+                f"{colour} towel on a hook",
+                (0.30, 0.12, 0.75),
+                hanging_towel,
+                support="wall",
+                elevation=0.85,
+                rooms=BATH,
+                synonyms=("towel",),
+                look=cloth,
+                **words,
+            )
+        )
+        made.append(
+            maker(
+                f"towels_{stem}",
+                "towel",
+                f"folded {colour} towels",
+                (0.34, 0.26, 0.16),
+                towels,
+                on=(
+                    *BASINS,
+                    "shelving unit",
+                    "cupboard",
+                    "stool",
+                    "bathtub",
+                    "washing machine",
+                    "tumble dryer",
+                    "open wall shelf",
+                    "storage shelf",
+                ),
+                rooms={**BATH, "laundry_room": 1.0},
+                synonyms=("towels",),
+                look=cloth,
+                **words,
+            )
+        )
+        if i < 5:
+            made.append(
+                maker(
+                    f"bath_mat_{stem}",
+                    "bath mat",
+                    f"{colour} bath mat",
+                    (0.75, 0.5, 0.018),
+                    bath_mat,
+                    support="floor",
+                    rooms={"bathroom": 1.0},
+                    synonyms=("mat",),
+                    tags=("flat",),
+                    look=cloth,
+                    **words,
+                )
+            )
+    made.append(
+        maker(
+            "toilet_brush_white",
+            "toilet brush",
+            "white toilet brush",
+            (0.10, 0.10, 0.38),
+            toilet_brush,
+            support="floor",
+            rooms={"toilet": 1.0, "bathroom": 1.0},
+            colours=("white",),
+            materials=("plastic",),
+            look={"metal": "white"},
+        )
+    )
+    made.append(
+        maker(
+            "toilet_brush_steel",
+            "toilet brush",
+            "steel toilet brush",
+            (0.09, 0.09, 0.38),
+            toilet_brush,
+            support="floor",
+            rooms={"toilet": 1.0, "bathroom": 1.0},
+            colours=("silver",),
+            materials=("steel",),
+            look={"metal": "steel"},
+        )
+    )
+    made.append(
+        maker(
+            "toilet_paper",
+            "toilet paper holder",
+            "toilet roll on its holder",
+            (0.14, 0.13, 0.16),
+            paper_roll,
+            support="wall",
+            elevation=0.62,
+            rooms={"toilet": 1.0, "bathroom": 1.0},
+            synonyms=("toilet roll",),
+            colours=("white",),
+            materials=("metal", "paper"),
+        )
+    )
+    for colour in ("white", "black", "amber", "green"):
+        made.append(
+            maker(
+                f"soap_dispenser_{colour}",
+                "soap dispenser",
+                f"{colour} soap dispenser",
+                (0.07, 0.075, 0.17),
+                soap_dispenser,
+                on=(*BASINS, "kitchen sink"),
+                rooms={**BATH, "kitchen": 0.3},
+                synonyms=("soap",),
+                colours=(colour.replace("amber", "brown"),),
+                materials=("ceramic",),
+                look={"colour": colour},
+            )
+        )
+    made.append(
+        maker(
+            "toothbrush_cup",
+            "toothbrush cup",
+            "cup with toothbrushes",
+            (0.085, 0.085, 0.19),
+            toothbrush_cup,
+            on=BASINS,
+            rooms={"bathroom": 1.0},
+            synonyms=("toothbrushes",),
+            colours=("white",),
+            materials=("ceramic",),
+        )
+    )
+    for name, extra, colour in (
+        ("white", {"metal": "white"}, "white"),
+        ("black", {"metal": "black"}, "black"),
+        ("wicker", {"skin": "wicker/0"}, "beige"),
+    ):
+        made.append(
+            maker(
+                f"waste_bin_{name}",
+                "waste bin",
+                f"{name} waste bin",
+                (0.26, 0.26, 0.30),
+                bin_,
+                support="floor",
+                rooms={"study": 1.0, "bathroom": 0.6, "bedroom": 0.5, "kids_room": 0.6, "main_bedroom": 0.4},
+                synonyms=("bin", "wastebasket"),
+                colours=(colour,),
+                materials=("metal" if name != "wicker" else "wicker",),
+                look=extra,
+            )
+        )
+    for name, extra, size in (
+        ("steel", {"skin": "brushed_steel/0"}, (0.30, 0.30, 0.62)),
+        ("white", {"metal": "white"}, (0.22, 0.22, 0.30)),
+        ("black", {"metal": "black"}, (0.30, 0.30, 0.60)),
+    ):
+        made.append(
+            maker(
+                f"pedal_bin_{name}",
+                "trash can",
+                f"{name} pedal bin",
+                size,
+                bin_,
+                support="floor",
+                rooms={"kitchen": 1.0, "bathroom": 0.6},
+                synonyms=("bin", "garbage can", "pedal bin"),
+                colours=(name.replace("steel", "silver"),),
+                materials=("steel",),
+                look={"lid": 1.0, **extra},
+            )
+        )
+    for i, name in enumerate(("natural", "dark", "white")):
+        made.append(
+            maker(
+                f"laundry_basket_{name}",
+                "laundry basket",
+                f"{name} wicker laundry basket",
+                (0.48, 0.36, 0.42),
+                laundry_basket,
+                support="floor",
+                rooms={"laundry_room": 1.0, "bathroom": 0.6, "main_bedroom": 0.3},
+                synonyms=("hamper", "washing basket"),
+                colours=("beige", "brown", "white")[i : i + 1],
+                materials=("wicker",),
+                look={"skin": f"wicker/{i}", "cloth": ("cotton/3", "cotton/0", "cotton/2")[i]},
+            )
+        )
+    return made

@@ -1,0 +1,399 @@
+"""Lamps: pendants, ceiling lamps, downlights, sconces, floor and bedside lamps. Shades and bulbs glow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assets.built.maker import (
+    BULB,
+    SHADE,
+    WHITE,
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    material,
+    metal,
+    parts_of,
+    plain,
+    tinted,
+)
+from assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, moved, scaled, tube, turned, two_sided
+from assets.records import Finish, MeshPart
+
+OPAL = plain((0.96, 0.94, 0.89), 0.3, emission=(7.0, 5.9, 4.5))
+GLOW = plain((1.0, 0.96, 0.88), 0.3, emission=BULB)
+
+
+def _bulb(z: float, r: float = 0.03) -> Shape:
+    """A glowing bulb whose middle is at z."""
+    return moved(scaled(ball(r, 12, 9), 1, 1, 1.15), 0, 0, z)
+
+
+def _drum(r0: float, r1: float, z0: float, z1: float, segments: int = 32) -> Shape:
+    """A fabric shade, open above and below."""
+    return two_sided(lathe([(r0, z0), (r1, z1)], segments))
+
+
+def _cloth(look: Look, finish: FinishOf) -> Finish:
+    return tinted(material(look, "shade", finish, "linen/1"), SHADE)
+
+
+def pendant(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Canopy, cord and a shade: 'dome', 'drum', 'globe' or 'cone'."""
+    w, _, h = size
+    r, kind = w / 2, str(look.get("kind", "dome"))
+    body = min(h * 0.45, w * {"dome": 0.55, "drum": 0.6, "globe": 1.0, "cone": 0.75}[kind])
+    canopy = [lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)]
+    cord = tube([(0, 0, body - 0.01), (0, 0, h - 0.02)], 0.003, 6)
+    socket = lathe([(0, body - 0.045), (0.02, body - 0.045), (0.022, body), (0.012, body + 0.03), (0, body + 0.03)], 16)
+    rim = metal(look, finish, "black")
+    if kind == "globe":
+        return parts_of((rim, [*canopy, cord, socket]), (OPAL, moved(ball(r, 28, 17), 0, 0, r)))
+    if kind == "drum":
+        ring = tube(
+            [(r * 0.97 * np.cos(t), r * 0.97 * np.sin(t), 0.006) for t in np.linspace(0, 6.283, 33)[:-1]],
+            0.003,
+            5,
+            closed=True,
+        )
+        return parts_of(
+            (rim, [*canopy, cord, socket, ring]),
+            (_cloth(look, finish), _drum(r, r * 0.96, 0, body)),
+            (GLOW, _bulb(body * 0.5)),
+        )
+    t = np.linspace(0, 1, 12)
+    outer = (
+        np.stack([r * np.cos(t * 1.42), body * np.sin(t * np.pi / 2)], 1)
+        if kind == "dome"
+        else np.stack([r * (1 - 0.82 * t), body * t], 1)
+    )
+    shell = lathe([*outer, (0.0, body)], 32, 0.9)
+    inner = lathe([(0.0, body - 0.004), *(outer[::-1] * [0.985, 0.985])], 32, 0.9)
+    return parts_of(
+        (rim, [*canopy, cord, socket, shell]), (plain((0.95, 0.94, 0.90), 0.5), inner), (GLOW, _bulb(body * 0.45))
+    )
+
+
+def flush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A flat bowl of opal glass, or a fabric drum with a diffuser, under the ceiling."""
+    w, _, h = size
+    r = w / 2
+    base = lathe([(0, h - 0.02), (r * 0.92, h - 0.02), (r * 0.94, h), (0, h)], 32)
+    if look.get("kind") == "drum":
+        glass = lathe([(0, 0.012), (r * 0.97, 0.012), (r * 0.97, 0.018), (0, 0.018)], 36)
+        return parts_of((WHITE, base), (_cloth(look, finish), _drum(r, r, 0, h - 0.004, 36)), (OPAL, glass))
+    t = np.linspace(0, np.pi / 2, 10)
+    bowl = lathe([*np.stack([r * np.sin(t), (h - 0.02) * (1 - np.cos(t))], 1), (r, h - 0.012), (0, h - 0.012)], 36, 0.6)
+    return parts_of((metal(look, finish, "steel"), base), (OPAL, bowl))
+
+
+def panel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A square LED panel in a slim frame."""
+    w, d, h = size
+    f = 0.02
+    rim = [
+        box([-w / 2, -d / 2, 0], [-w / 2 + f, d / 2, h], 0.002),
+        box([w / 2 - f, -d / 2, 0], [w / 2, d / 2, h], 0.002),
+        box([-w / 2 + f, -d / 2, 0], [w / 2 - f, -d / 2 + f, h], 0.002),
+        box([-w / 2 + f, d / 2 - f, 0], [w / 2 - f, d / 2, h], 0.002),
+    ]
+    glass = box([-w / 2 + f, -d / 2 + f, 0.004], [w / 2 - f, d / 2 - f, h])
+    return parts_of((WHITE, rim), (plain((0.97, 0.96, 0.93), 0.4, emission=(6.0, 5.6, 5.0)), glass))
+
+
+def downlight(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A recessed spotlight: a ring and a glowing disc."""
+    w, _, h = size
+    r = w / 2
+    ring = lathe([(r * 0.72, h * 0.7), (r * 0.75, 0.001), (r * 0.9, 0), (r, h * 0.5), (r, h), (0, h)], 24, 0.5)
+    disc = lathe([(0, h * 0.55), (r * 0.74, h * 0.55), (r * 0.74, h * 0.7), (0, h * 0.7)], 24)
+    return parts_of(
+        (metal(look, finish, "white"), ring), (plain((1.0, 0.97, 0.92), 0.3, emission=(26.0, 22.5, 18.0)), disc)
+    )
+
+
+def sconce(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A wall lamp: plate, arm and a fabric shade or an opal globe."""
+    w, d, h = size
+    r = min(w / 2, d * 0.4)
+    back, y = d / 2, -d / 2 + r
+    plate = moved(turned(cylinder(0.05, 0, 0.015, 0.004, 20), np.pi / 2, "x"), 0, back, h * 0.35)
+    s = np.linspace(0, 1, 8)
+    arm = tube(np.stack([0 * s, back - (back - y) * s, h * 0.35 - 0.25 * h * np.sin(np.pi * s) * 0.5], 1), 0.007, 8)
+    rim = metal(look, finish, "brass")
+    if look.get("kind") == "globe":
+        return parts_of((rim, [plate, arm]), (OPAL, moved(ball(r, 20, 13), 0, y, h - r)))
+    stem = tube([(0, y, h * 0.35), (0, y, h * 0.55)], 0.007, 8)
+    shade = moved(_drum(r, r * 0.7, h * 0.4, h, 24), 0, y, 0)
+    return parts_of(
+        (rim, [plate, arm, stem]), (_cloth(look, finish), shade), (GLOW, moved(_bulb(h * 0.66, 0.024), 0, y, 0))
+    )
+
+
+def standing(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Foot, stem or tripod, and a fabric shade: floor lamps and table lamps alike."""
+    w, _, h = size
+    r, kind = w / 2, str(look.get("kind", "stem"))
+    tall = h > 0.9
+    sh = min(h * (0.22 if tall else 0.45), w * 0.85)
+    z0 = h - sh
+    stem: list[Shape] = []
+    if kind == "tripod":
+        for k in range(3):
+            a = 2 * np.pi * k / 3 + 0.5
+            stem.append(
+                tube(
+                    [
+                        (0.02 * np.cos(a), 0.02 * np.sin(a), z0 + 0.02),
+                        (r * 0.92 * np.cos(a), r * 0.92 * np.sin(a), 0.0),
+                    ],
+                    [0.010, 0.014],
+                    8,
+                )
+            )
+        stem.append(moved(cylinder(0.035, 0, 0.03, 0.006, 16), 0, 0, z0 - 0.005))
+    elif kind == "ceramic":
+        t = np.linspace(0, 1, 12)
+        stem.append(
+            lathe(
+                [
+                    (0, 0),
+                    *np.stack([r * (0.28 + 0.30 * np.sin(np.pi * t**0.8)), t * (z0 - 0.03)], 1),
+                    (0.012, z0 - 0.01),
+                    (0.012, z0 + 0.03),
+                    (0, z0 + 0.03),
+                ],
+                28,
+                0.9,
+            )
+        )
+    else:
+        foot = min(0.15 if tall else 0.075, r * 0.75)
+        stem += [
+            lathe(
+                [
+                    (0, 0),
+                    (foot, 0),
+                    (foot, 0.012),
+                    (foot * 0.9, 0.02),
+                    (0.012, 0.03),
+                    (0.011, z0 + 0.05),
+                    (0, z0 + 0.05),
+                ],
+                28,
+                0.8,
+            )
+        ]
+    spider = [
+        tube([(-r * 0.8, 0, h - 0.03), (r * 0.8, 0, h - 0.03)], 0.002, 5),
+        tube([(0, -r * 0.8, h - 0.03), (0, r * 0.8, h - 0.03)], 0.002, 5),
+        tube([(0, 0, z0), (0, 0, h - 0.03)], 0.003, 5),
+    ]
+    body = material(look, "body", finish, "brass/0") if "body" in look else metal(look, finish, "brass")
+    shade = _drum(r, r * float(look.get("taper", 0.8)), z0, h - 0.004)
+    return parts_of(
+        (body, [joined(*stem)]),
+        (metal(look, finish, "brass"), spider),
+        (_cloth(look, finish), shade),
+        (GLOW, _bulb(z0 + sh * 0.45)),
+    )
+
+
+def desk_lamp(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Weighted foot, two arms, a metal head that looks down."""
+    w, d, h = size
+    foot = moved(cylinder(min(0.09, d * 0.45), 0, 0.022, 0.006, 24), -w * 0.22, 0, 0)
+    a, b, c = np.array([-w * 0.22, 0, 0.02]), np.array([-w * 0.38, 0, h * 0.55]), np.array([w * 0.12, 0, h * 0.97])
+    arms = [
+        tube([a, b], 0.006, 8),
+        tube([b, c], 0.006, 8),
+        moved(ball(0.012, 10, 7), *b),
+        moved(ball(0.012, 10, 7), *c),
+    ]
+    head = lathe([(0.075, -0.085), (0.055, -0.03), (0.028, 0.0), (0.022, 0.03), (0, 0.03)], 24, 0.9)
+    inner = lathe([(0, -0.002), (0.026, -0.004), (0.053, -0.033), (0.073, -0.085)], 24, 0.9)
+    tilt = 0.35
+    place = [moved(turned(s, -tilt, "y"), w * 0.2, 0, h * 0.9) for s in (head, inner, _bulb(-0.05, 0.022))]
+    return parts_of(
+        (metal(look, finish, "black"), [foot, *arms, place[0]]),
+        (plain((0.93, 0.92, 0.88), 0.4), place[1]),
+        (GLOW, place[2]),
+    )
+
+
+def lamps_makers() -> list[Maker]:
+    living = {
+        "living_room": 1.0,
+        "dining_room": 1.0,
+        "kitchen": 0.6,
+        "bedroom": 0.6,
+        "main_bedroom": 0.6,
+        "hall": 0.5,
+        "family_room": 0.8,
+    }
+    anywhere = {
+        **living,
+        "corridor": 1.0,
+        "bathroom": 1.0,
+        "toilet": 1.0,
+        "laundry_room": 1.0,
+        "closet": 1.0,
+        "study": 0.8,
+        "stairwell": 1.0,
+        "pantry": 1.0,
+    }
+    made = []
+    for kind, metal_name, colour, size in (
+        ("dome", "black", "black", (0.40, 0.40, 0.90)),
+        ("dome", "white", "white", (0.38, 0.38, 0.85)),
+        ("cone", "brass", "golden", (0.30, 0.30, 0.90)),
+        ("globe", "brass", "white", (0.28, 0.28, 0.80)),
+        ("drum", "white", "white", (0.50, 0.50, 0.75)),
+        ("drum", "black", "grey", (0.45, 0.45, 0.80)),
+    ):
+        made.append(
+            maker(
+                f"pendant_{kind}_{metal_name}",
+                "pendant lamp",
+                f"{colour} {kind} pendant lamp",
+                size,
+                pendant,
+                support="ceiling",
+                rooms=living,
+                synonyms=("hanging lamp", "lamp"),
+                colours=(colour,),
+                materials=("metal",) if kind != "drum" else ("fabric",),
+                emits=BULB,
+                look={"kind": kind, "metal": metal_name, "shade": "linen/2" if colour == "grey" else "linen/1"},
+            )
+        )
+    for kind, size in (("bowl", (0.36, 0.36, 0.11)), ("drum", (0.48, 0.48, 0.16))):
+        made.append(
+            maker(
+                f"ceiling_lamp_{kind}",
+                "ceiling lamp",
+                "glass ceiling lamp" if kind == "bowl" else "fabric ceiling lamp",
+                size,
+                flush,
+                support="ceiling",
+                rooms=anywhere,
+                synonyms=("ceiling light", "lamp"),
+                colours=("white",),
+                materials=("glass",) if kind == "bowl" else ("fabric",),
+                emits=SHADE,
+                look={"kind": kind},
+            )
+        )
+    made.append(
+        maker(
+            "ceiling_panel",
+            "ceiling lamp",
+            "square ceiling lamp",
+            (0.42, 0.42, 0.04),
+            panel,
+            support="ceiling",
+            rooms={**anywhere, "garage": 0.6, "gym": 1.0, "workshop": 0.6},
+            synonyms=("ceiling light",),
+            colours=("white",),
+            materials=("plastic",),
+            emits=(6.0, 5.6, 5.0),
+        )
+    )
+    made.append(
+        maker(
+            "downlight",
+            "downlight",
+            "recessed spotlight",
+            (0.09, 0.09, 0.03),
+            downlight,
+            support="ceiling",
+            rooms={"bathroom": 0.6, "kitchen": 0.6, "corridor": 0.4},
+            synonyms=("spotlight",),
+            colours=("white",),
+            materials=("metal",),
+            emits=(26.0, 22.5, 18.0),
+        )
+    )
+    for kind, rim, size in (("shade", "brass", (0.18, 0.22, 0.28)), ("globe", "black", (0.16, 0.20, 0.26))):
+        made.append(
+            maker(
+                f"wall_lamp_{kind}",
+                "wall lamp",
+                f"{kind} wall lamp",
+                size,
+                sconce,
+                support="wall",
+                elevation=1.65,
+                rooms={"hall": 1.0, "corridor": 1.0, "living_room": 0.6, "main_bedroom": 0.5},
+                synonyms=("sconce",),
+                colours=("white",),
+                materials=("metal",),
+                emits=SHADE,
+                look={"kind": kind, "metal": rim},
+            )
+        )
+    for name, kind, extra, colour in (
+        ("brass", "stem", {"metal": "brass"}, "golden"),
+        ("black", "stem", {"metal": "black", "shade": "linen/0"}, "black"),
+        ("tripod", "tripod", {"body": "oak/0"}, "brown"),
+    ):
+        made.append(
+            maker(
+                f"floor_lamp_{name}",
+                "floor lamp",
+                f"{colour} floor lamp with a fabric shade",
+                (0.46, 0.46, 1.55),
+                standing,
+                support="floor",
+                rooms={"living_room": 1.0, "study": 0.6, "main_bedroom": 0.4, "library": 0.8, "family_room": 0.8},
+                synonyms=("standing lamp", "lamp"),
+                colours=(colour,),
+                materials=("metal" if name != "tripod" else "wood", "fabric"),
+                tags=("floor_lamp",),
+                emits=SHADE,
+                look={"kind": kind, **extra},
+            )
+        )
+    tables = ("bedside table", "side table", "sideboard", "dresser", "console", "desk")
+    for name, extra, colour in (
+        ("ceramic", {"kind": "ceramic", "body": "paint_dusty_blue/0"}, "blue"),
+        ("ceramic_white", {"kind": "ceramic", "body": "lacquer_white/0"}, "white"),
+        ("brass", {"metal": "brass", "shade": "linen/0"}, "golden"),
+        ("black", {"metal": "black"}, "black"),
+        ("tripod", {"kind": "tripod", "body": "oak/0"}, "brown"),
+    ):
+        made.append(
+            maker(
+                f"table_lamp_{name}",
+                "table lamp",
+                f"{colour} table lamp with a fabric shade",
+                (0.27, 0.27, 0.44),
+                standing,
+                on=tables,
+                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "living_room": 0.8, "guest_room": 1.0},
+                synonyms=("bedside lamp", "lamp"),
+                colours=(colour,),
+                materials=("ceramic" if "ceramic" in name else "metal", "fabric"),
+                emits=SHADE,
+                look=extra,
+            )
+        )
+    for colour in ("black", "white", "brass"):
+        made.append(
+            maker(
+                f"desk_lamp_{colour}",
+                "desk lamp",
+                f"{colour} desk lamp",
+                (0.42, 0.2, 0.46),
+                desk_lamp,
+                on=("desk", "office table", "workbench"),
+                rooms={"study": 1.0, "kids_room": 0.6},
+                synonyms=("lamp",),
+                colours=(colour,),
+                materials=("metal",),
+                emits=BULB,
+                look={"metal": colour},
+            )
+        )
+    return made
