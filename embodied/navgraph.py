@@ -115,8 +115,8 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
     space = walkable(house, storey)
     shapely.prepare(space)
     rooms = [r for r in house.rooms if r.storey == storey]
-    grid = _Grid(space)
-    room_of_cell = _rooms_of_cells(grid, rooms)
+    grid = Grid(space)
+    room_of_cell = rooms_of_cells(grid, rooms)
     reach = _largest_reach(grid, room_of_cell)
     for k, r in enumerate(rooms):
         if not (room_of_cell[reach] == k).any():
@@ -138,14 +138,14 @@ def unreachable_rooms(house: House) -> tuple[str, ...]:
         space = walkable(house, storey)
         shapely.prepare(space)
         rooms = [r for r in house.rooms if r.storey == storey]
-        grid = _Grid(space)
-        room_of_cell = _rooms_of_cells(grid, rooms)
+        grid = Grid(space)
+        room_of_cell = rooms_of_cells(grid, rooms)
         reach = _largest_reach(grid, room_of_cell)
         found += [r.id for k, r in enumerate(rooms) if not (room_of_cell[reach] == k).any()]
     return tuple(found)
 
 
-def _rooms_of_cells(grid: _Grid, rooms) -> np.ndarray:
+def rooms_of_cells(grid: Grid, rooms) -> np.ndarray:
     """(n,) index of the room each cell lies in; cells inside a wall's doorway belong to the nearest room."""
     room_of_cell = np.full(len(grid.xy), -1)
     for k, r in enumerate(rooms):
@@ -155,7 +155,7 @@ def _rooms_of_cells(grid: _Grid, rooms) -> np.ndarray:
     return room_of_cell
 
 
-def _largest_reach(grid: _Grid, room_of_cell: np.ndarray) -> np.ndarray:
+def _largest_reach(grid: Grid, room_of_cell: np.ndarray) -> np.ndarray:
     """(n,) bool: the connected cells that enter the most rooms."""
     if len(grid.xy) == 0:
         raise HouseError("the house has no free floor at all; remove furniture")
@@ -165,7 +165,7 @@ def _largest_reach(grid: _Grid, room_of_cell: np.ndarray) -> np.ndarray:
     return label == best
 
 
-class _Grid:
+class Grid:
     """Cell centres inside the free space and how far each is from its border."""
 
     def __init__(self, space: shapely.Polygon) -> None:
@@ -202,7 +202,7 @@ class _Grid:
         return csr_matrix((np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
 
 
-def _spread(space, grid: _Grid, room_of_cell: np.ndarray, rooms, spacing: float) -> list[int]:
+def _spread(space, grid: Grid, room_of_cell: np.ndarray, rooms, spacing: float) -> list[int]:
     """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see others."""
     chosen: list[int] = []
     apart = APART * spacing
@@ -226,7 +226,7 @@ def _spread(space, grid: _Grid, room_of_cell: np.ndarray, rooms, spacing: float)
     return chosen
 
 
-def _seen(space, grid: _Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
+def _seen(space, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
     """(n,) how many chosen viewpoints, not too near, each cell sees."""
     if not chosen:
         return np.zeros(len(cells))
@@ -237,7 +237,7 @@ def _seen(space, grid: _Grid, cells: np.ndarray, chosen: list[int], spacing: flo
     return np.bincount(i[ok], minlength=len(cells)).astype(float)
 
 
-def _thinned(space, grid: _Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
+def _thinned(space, grid: Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
     """The nodes without those that crowd another one and that neither their room nor the graph needs."""
     xy = grid.xy[nodes]
     pairs = _visible_pairs(space, xy, LONGEST * spacing)
@@ -283,7 +283,7 @@ def _pruned(xy: np.ndarray, pairs: np.ndarray) -> list[tuple[int, int]]:
     return sorted(kept)
 
 
-def _join(house: House, storey: int, space, grid: _Grid, reach: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
+def _join(house: House, storey: int, space, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
     """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
     ids = {r.id for r in house.rooms if r.storey == storey}
     cells = np.flatnonzero(reach)
@@ -319,7 +319,7 @@ def _components(space, xy: np.ndarray, longest: float) -> np.ndarray:
     return connected_components(csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(xy), len(xy))), directed=False)[1]
 
 
-def _bridge(space, grid: _Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
+def _bridge(space, grid: Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
     """New cells along the cheapest way from the smallest component to the nearest other node."""
     sizes = np.bincount(label)
     small = int(np.argmin(sizes))

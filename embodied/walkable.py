@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from embodied.geometry import rectangle
-from embodied.house import DOORS, House, Opening, Room
+from embodied.house import DOORS, House, Opening, Placement, Room
 
 EYE = 1.5
 """Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""
@@ -43,11 +43,16 @@ def obstacles(house: House, storey: int, low: float, high: float) -> list[shapel
     found = []
     for p in house.placements:
         if p.room in rooms and p.position[2] - floor < high and p.position[2] + p.size[2] - floor > low:
-            found.append(shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)))
+            found.append(footprint(p))
     for o in house.openings:
         if o.kind == "door" and o.rooms[0] in rooms:
             found += leaves(house, o)
     return found
+
+
+def footprint(placement: Placement) -> shapely.Polygon:
+    """The rotated rectangle it covers; for a table that includes the air between the legs."""
+    return shapely.Polygon(rectangle(*placement.position[:2], *placement.size[:2], placement.yaw))
 
 
 def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:

@@ -12,6 +12,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from embodied.generate.clearing import cleared
 from embodied.generate.config import HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
@@ -19,6 +22,7 @@ from embodied.generate.layout import Plan, draw_plan, turned, with_short_corrido
 from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
 from embodied.house import House, HouseError, Room, Sky, Storey, check
+from embodied.navgraph import unreachable_rooms
 from embodied.seeds import stream
 
 __all__ = ["STAGES", "Draft", "HouseConfig", "generate_house"]
@@ -61,9 +65,9 @@ def program(draft: Draft) -> Draft:
         draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program")))
 
 
-def rooms(draft: Draft) -> Draft:
-    """The best of many plans."""
-    for attempt in range(ATTEMPTS):
+def rooms(draft: Draft, first: int = 0) -> Draft:
+    """The best of many plans; `first` skips attempts that turned out badly."""
+    for attempt in range(first, ATTEMPTS):
         rng = stream(draft.seed, "house", "rooms", attempt)
         footprints, spaces = draft.footprints, draft.spaces
         if attempt:
@@ -77,9 +81,19 @@ def rooms(draft: Draft) -> Draft:
 
 
 def openings(draft: Draft) -> Draft:
-    """The bare house: rooms with ids, doors and windows."""
-    rng = stream(draft.seed, "house", "openings")
+    """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
     palette = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette"))
+    for attempt in range(2 * ATTEMPTS):
+        rng = stream(draft.seed, "house", "openings", attempt)
+        house = _bare_house(draft, palette, rng)
+        if not unreachable_rooms(house):
+            return dataclasses.replace(draft, palette=palette, house=house)
+        if attempt % 4 == 3:
+            draft = rooms(draft, first=1 + attempt // 4)
+    raise HouseError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
+
+
+def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> House:
     disorder = draft.config.disorder
     if disorder is None:
         disorder = round(float(stream(draft.seed, "house", "disorder").beta(1.6, 2.2)), 3)
@@ -99,9 +113,8 @@ def openings(draft: Draft) -> Draft:
                          palette.ceiling, palette.skirting))
     doors = draw_openings(draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height,
                           open_plan, rng=rng)
-    house = House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), (),
-                  style=palette.style, disorder=disorder)
-    return dataclasses.replace(draft, palette=palette, house=house)
+    return House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), (),
+                 style=palette.style, disorder=disorder)
 
 
 def finishes(draft: Draft) -> Draft:
@@ -130,6 +143,11 @@ def furnishing(draft: Draft) -> Draft:
     return dataclasses.replace(draft, house=house)
 
 
+def clearing(draft: Draft) -> Draft:
+    """Every room can be entered on foot; whatever stood in the way is gone."""
+    return dataclasses.replace(draft, house=cleared(draft.house))
+
+
 def checking(draft: Draft) -> Draft:
     """Refuse what cannot be."""
     check(draft.house)
@@ -138,7 +156,7 @@ def checking(draft: Draft) -> Draft:
 
 STAGES: Mapping[str, Callable[[Draft], Draft]] = {
     "footprint": footprint, "program": program, "rooms": rooms, "openings": openings, "finishes": finishes,
-    "furnish": furnishing, "check": checking,
+    "furnish": furnishing, "clear": clearing, "check": checking,
 }
 
 

@@ -49,6 +49,10 @@ class _Draft:
 
     openings: list[Opening]
     swings: list[tuple[float, float, float, float]]
+    leaves: list[tuple[float, float, float, float]]
+    """Where leaves stand open."""
+    zones: list[tuple[float, float, float, float]]
+    """Floor before and behind every way through, which no leaf should stand in."""
     counts: dict[str, int]
     names: tuple[str, ...]
     leaf: str
@@ -72,14 +76,15 @@ def draw_openings(plan: Plan, names: tuple[str, ...], leaves: tuple[str, str, st
     """
     walls = walls_between(list(plan.cells))
     outside = outer_walls(plan.cells, walls)
-    draft = _Draft([], [], {}, names, *leaves)
+    draft = _Draft([], [], [], [], {}, names, *leaves)
     free = {(i, k): [(w.low, w.high)] for i, ws in enumerate(outside) for k, w in enumerate(ws)}
     _front_door(plan, outside, free, draft, rng)
     wide = [k for k in plan.links if _is_wide(plan, k)]
     for link in wide:
         _passage(plan, link, draft, height, open_plan, rng)
-    for link in plan.links:
-        if link not in wide:
+    doors = sorted((k for k in plan.links if k not in wide), key=lambda k: _is_tiny(plan.cells[k.child]))
+    for link in doors:
+        if not (_is_tiny(plan.cells[link.child]) and _folded_door(plan, link, draft, rng)):
             _door(plan, link, draft, rng)
     _outer_doors(plan, outside, free, draft, rng)
     for i in range(len(plan.cells)):
@@ -119,6 +124,7 @@ def _passage(plan: Plan, link, draft: _Draft, height: float, open_plan: bool, rn
     start = low + NIB + (slack / 2 if kinds <= {"hall", "corridor"} or open_plan else slack * float(rng.choice([0, 0.5, 1])))
     p, q = _jambs(a, axis, across, start, start + width)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
+    draft.zones += _fronts(axis, across, start, start + width)
     draft.openings.append(Opening(draft.name("passage"), "passage", (draft.names[link.child], draft.names[link.parent]),
                                   rounded(p), rounded(q), 0.0, head, None))
 
@@ -127,6 +133,20 @@ def _swing(axis: str, across: float, low: float, high: float, side: int) -> tupl
     """x0, y0, x1, y1 of the square a leaf sweeps on `side` of its wall."""
     c, d = sorted((across, across + side * (high - low)))
     return (low, c, high, d) if axis == "x" else (c, low, d, high)
+
+
+def _fronts(axis: str, across: float, low: float, high: float) -> list[tuple[float, float, float, float]]:
+    """The floor half a metre before and behind a way through."""
+    low, high = low + 0.12, high - 0.12
+    c, d = across - 0.55, across + 0.55
+    return [(low, c, high, d) if axis == "x" else (c, low, d, high)]
+
+
+def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_low: bool) -> tuple:
+    """Where the leaf stands when open at a right angle, with a little air."""
+    a, b = (low - 0.05, low + 0.1) if at_low else (high - 0.1, high + 0.05)
+    c, d = sorted((across + side * 0.06, across + side * (high - low + 0.3)))
+    return (a, c, b, d) if axis == "x" else (c, a, d, b)
 
 
 def _overlap(a: tuple, b: tuple) -> float:
@@ -142,27 +162,70 @@ def _door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> None:
     middle = (y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2
     side = 1 if middle > across else -1
     ends = (draft.names[link.child], draft.names[link.parent])
-    if cell.kind == "toilet" and (x1 - x0) * (y1 - y0) < 3.0:  # too small for a leaf inside
-        side, ends = -side, ends[::-1]
     width = min(DOOR.get(cell.kind, 0.85), high - low - 2 * NIB)
     best = None
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
         corner = min(start - own[0], own[1] - start - width)
         swing = _swing(axis, across, start, start + width, side)
-        front = _swing(axis, across, start, start + width, -side)
-        crowd = sum(_overlap(swing, s) + 0.5 * _overlap(front, s) for s in draft.swings)
-        cost = 6.0 * crowd + 0.8 * max(0.0, corner - 0.2) + float(rng.uniform(0, 0.15))
-        if best is None or cost < best[0]:
-            best = (cost, start, swing, front)
-    _, start, swing, front = best
-    draft.swings += [swing, front]
+        fronts = _fronts(axis, across, start, start + width)
+        crowd = sum(_overlap(swing, s) for s in draft.swings)
+        shut = sum(_overlap(f, s) for f in fronts for s in draft.leaves)
+        near_low = start - own[0] <= own[1] - start - width
+        for at_low in (True, False):
+            leaf = _open_leaf(axis, across, start, start + width, side, at_low)
+            block = shut + sum(_overlap(leaf, z) for z in draft.zones)
+            cost = 60.0 * block + 2.0 * crowd + 0.8 * max(0.0, corner - 0.2) + 0.5 * (at_low != near_low)
+            cost += float(rng.uniform(0, 0.15))
+            if best is None or cost < best[0]:
+                best = (cost, start, at_low, swing, leaf, fronts)
+    _, start, at_low, swing, leaf, fronts = best
+    draft.swings.append(swing)
+    draft.leaves.append(leaf)
+    draft.zones += fronts
     p, q = _jambs(cell, axis, across, start, start + width)
-    near_low = start - own[0] <= own[1] - start - width
-    hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == near_low else "b"
+    hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
     draft.openings.append(Opening(
         draft.name("door"), "door", ends, rounded(p), rounded(q), 0.0,
         2.05, draft.leaf, hinge, rounded(open_by)))
+
+
+def _is_tiny(cell: Cell) -> bool:
+    """Whether a leaf inside would leave no room to stand."""
+    x0, y0, x1, y1 = cell.rect
+    return cell.kind == "toilet" and (x1 - x0) * (y1 - y0) < 300
+
+
+def _folded_door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> bool:
+    """A leaf that opens outwards and folds back on the wall beside it; False where other doors leave no place."""
+    axis, across, low, high = link.wall[0], *(v / 10 for v in link.wall[1:])
+    outer = plan.cells[link.parent]
+    x0, y0, x1, y1 = (v / 10 for v in outer.rect)
+    own = (x0, x1) if axis == "x" else (y0, y1)
+    side = 1 if ((y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2) > across else -1
+    width = min(DOOR[plan.cells[link.child].kind], high - low - 2 * NIB)
+    k = 0 if axis == "x" else 1
+    taken = [sorted((o.a[k], o.b[k])) for o in draft.openings
+             if abs(o.a[1 - k] - across) < 0.01 and abs(o.b[1 - k] - across) < 0.01]
+    spots = []
+    for start in (low + NIB, high - NIB - width):
+        for at_low in (True, False):
+            a, b = (start - width - 0.05, start) if at_low else (start + width, start + 2 * width + 0.05)
+            if a < own[0] + 0.08 or b > own[1] - 0.08 or any(a < q and p < b for p, q in taken):
+                continue
+            swept = _swing(axis, across, a, b, side)
+            spots.append((sum(_overlap(swept, s) for s in draft.swings), float(rng.uniform(0, 0.1)), start, at_low))
+    if not spots:
+        return False
+    _, _, start, at_low = min(spots)
+    p, q = _jambs(outer, axis, across, start, start + width)
+    hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
+    draft.swings.append(_swing(axis, across, start, start + width, side))
+    draft.zones += _fronts(axis, across, start, start + width)
+    draft.openings.append(Opening(
+        draft.name("door"), "door", (draft.names[link.parent], draft.names[link.child]), rounded(p), rounded(q), 0.0, 2.05,
+        draft.leaf, hinge, rounded(math.radians(float(rng.uniform(164, 174))))))
+    return True
 
 
 def _take(free: list[tuple[float, float]], low: float, high: float, margin: float = 0.25) -> list[tuple[float, float]]:
