@@ -13,7 +13,10 @@ from assets.built.decor import decor_makers
 from assets.built.kitchen import kitchen_makers
 from assets.built.lamps import lamps_makers
 from assets.built.maker import Maker
+from assets.built.papers import papers_makers
+from assets.built.plants import plants_makers
 from assets.built.soft import soft_makers
+from assets.built.tableware import tableware_makers
 
 __all__ = ["MAKERS", "Maker"]
 
@@ -25,6 +28,9 @@ def _all() -> Mapping[str, Maker]:
         *soft_makers(),
         *lamps_makers(),
         *bath_makers(),
+        *papers_makers(),
+        *tableware_makers(),
+        *plants_makers(),
     ]
     keys = [m.asset.key for m in made]
     assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)

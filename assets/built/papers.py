@@ -1,0 +1,502 @@
+"""Books, papers, frames and gadgets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assets.built.maker import (
+    BLACK,
+    BRASS,
+    CHROME,
+    PAPER,
+    PORCELAIN,
+    STEEL,
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    material,
+    parts_of,
+    plain,
+    whole_image,
+)
+from assets.built.primitives import (
+    Shape,
+    ball,
+    bar,
+    box,
+    cylinder,
+    joined,
+    lathe,
+    moved,
+    quads,
+    scaled,
+    sheet,
+    tube,
+    turned,
+    two_sided,
+)
+from assets.records import MeshPart
+
+CLOTH = (
+    (0.55, 0.16, 0.14),
+    (0.14, 0.22, 0.34),
+    (0.20, 0.32, 0.26),
+    (0.75, 0.62, 0.38),
+    (0.85, 0.83, 0.77),
+    (0.12, 0.12, 0.13),
+    (0.42, 0.30, 0.22),
+    (0.66, 0.36, 0.24),
+    (0.36, 0.44, 0.50),
+    (0.58, 0.56, 0.50),
+    (0.35, 0.16, 0.22),
+    (0.80, 0.78, 0.74),
+)
+SHELVES = (
+    "bookcase",
+    "shelving unit",
+    "desk",
+    "sideboard",
+    "bedside table",
+    "coffee table",
+    "side table",
+    "open wall shelf",
+    "wall unit",
+)
+
+
+def _book(w: float, d: float, h: float, *, rng: np.random.Generator) -> tuple[Shape, Shape, Shape | None]:
+    """A standing book, spine to -y: cover, pages, a band on its spine."""
+    c = 0.0022
+    cover = joined(
+        box([-w / 2, -d / 2, 0], [-w / 2 + c, d / 2, h], 0.0008),
+        box([w / 2 - c, -d / 2, 0], [w / 2, d / 2, h], 0.0008),
+        box([-w / 2 + c * 0.5, -d / 2, 0], [w / 2 - c * 0.5, -d / 2 + c, h], 0.0008),
+    )
+    pages = box([-w / 2 + c, -d / 2 + c, 0.003], [w / 2 - c, d / 2 - 0.004, h - 0.003])
+    band = None
+    if rng.random() < 0.7:
+        z = h * rng.uniform(0.55, 0.8)
+        t = h * rng.uniform(0.03, 0.14)
+        band = box([-w / 2 + 0.001, -d / 2 - 0.0003, z], [w / 2 - 0.001, -d / 2 + 0.001, z + t])
+    return cover, pages, band
+
+
+def book_row(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Books side by side, of many heights and colours; the last ones may lean."""
+    w, d, h = size
+    by_color: dict[int, list[Shape]] = {}
+    pages, bands = [], []
+    x = -w / 2
+    palette = rng.permutation(len(CLOTH))[: int(rng.integers(5, 10))]
+    first = True
+    while True:
+        t = float(np.clip(rng.lognormal(-3.6, 0.45), 0.012, 0.06))
+        if x + t > w / 2 - 0.004:
+            t = w / 2 - x
+        tall, deep = (1.0, 1.0) if first else (rng.uniform(0.72, 1.0), rng.uniform(0.75, 1.0))
+        cover, leaves, band = _book(t - 0.0008, d * deep, h * tall, rng=rng)
+        shift = {"x": x + t / 2, "y": -d / 2 + d * deep / 2 + (0 if first else rng.uniform(0, 0.01))}
+        by_color.setdefault(int(palette[rng.integers(len(palette))]), []).append(moved(cover, **shift))
+        pages.append(moved(leaves, **shift))
+        if band is not None:
+            bands.append(moved(band, **shift))
+        x, first = x + t, False
+        if x > w / 2 - 0.012:
+            break
+    return parts_of(
+        *((plain(CLOTH[k], 0.75, specular=0.25), s) for k, s in sorted(by_color.items())),
+        (PAPER, pages),
+        (plain((0.80, 0.70, 0.45), 0.45), bands),
+    )
+
+
+def book_stack(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Books lying on one another, each turned a little; one book where look['count'] is 1."""
+    w, d, h = size
+    count = int(look.get("count", 3))
+    heights = rng.uniform(0.7, 1.3, count)
+    z, made, pages = 0.0, [], []
+    colours = rng.permutation(len(CLOTH))
+    for k, t in enumerate(heights / heights.sum() * h):
+        shrink = 1.0 - 0.06 * k
+        cover, leaves, _ = _book(t, d * 0.94 * shrink, w * 0.94 * shrink, rng=rng)
+        angle = 0.0 if count == 1 else rng.normal(0, 0.12)
+        place = [
+            moved(turned(moved(turned(s, np.pi / 2, "y"), -w * 0.47 * shrink, 0, t / 2), angle), 0, 0, z)
+            for s in (cover, leaves)
+        ]
+        made.append((plain(CLOTH[colours[k % len(CLOTH)]], 0.6, specular=0.3), place[0]))
+        pages.append(place[1])
+        z += t
+    return parts_of(*made, (PAPER, pages))
+
+
+def magazine(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A magazine lying flat, its leaves rising a little at the open side."""
+    w, d, h = size
+    x, y = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(-d / 2, d / 2, 5))
+    z = h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)
+    cover = material(look, "cover", finish, "magazine_cover/0")
+    top = whole_image(sheet(np.stack([x, y, z], -1)), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
+    rim = np.concatenate(
+        [
+            np.stack([x[0], y[0], z[0]], 1),
+            np.stack([x[:, -1], y[:, -1], z[:, -1]], 1)[1:],
+            np.stack([x[-1], y[-1], z[-1]], 1)[::-1][1:],
+            np.stack([x[:, 0], y[:, 0], z[:, 0]], 1)[::-1][1:-1],
+        ]
+    )
+    low = rim * [1, 1, 0]
+    edge = quads(np.stack([low, np.roll(low, -1, 0), np.roll(rim, -1, 0), rim], 1))
+    base = quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
+    return parts_of((cover, top), (PAPER, [edge, base]))
+
+
+def papers(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Sheets of paper in a loose pile."""
+    w, d, h = size
+    leaves = []
+    for k, z in enumerate(np.linspace(0, h * 0.92, 6)):
+        leaves.append(
+            moved(
+                turned(
+                    box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16]), rng.normal(0, 0.05) if k else 0.0
+                ),
+                rng.normal(0, 0.004),
+                rng.normal(0, 0.004),
+                z,
+            )
+        )
+    return parts_of((PAPER, leaves))
+
+
+def photo_frame(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A small standing frame with a photograph."""
+    w, _, h = size
+    f, tilt = 0.016, 0.22
+    boards = [
+        box([-w / 2, 0, 0], [-w / 2 + f, 0.012, h], 0.002),
+        box([w / 2 - f, 0, 0], [w / 2, 0.012, h], 0.002),
+        box([-w / 2 + f, 0, h - f], [w / 2 - f, 0.012, h], 0.002),
+        box([-w / 2 + f, 0, 0], [w / 2 - f, 0.012, f], 0.002),
+    ]
+    art = material(look, "art", finish, "art_sea/0")
+    image = whole_image(
+        quads([[(-w / 2 + f, 0.004, f), (w / 2 - f, 0.004, f), (w / 2 - f, 0.004, h - f), (-w / 2 + f, 0.004, h - f)]]),
+        art,
+        -w / 2 + f,
+        w / 2 - f,
+        f,
+        h - f,
+    )
+    back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
+    leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
+    frame = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak")), None) or finish(
+        "oak/0"
+    )
+    lean = [turned(s, -tilt, "x") for s in (joined(*boards), image, back)]
+    return parts_of((frame, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
+
+
+def alarm_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A round bedside clock on two feet, with bells."""
+    w, d, h = size
+    r = w * 0.46
+    zc = h * 0.45
+    case = moved(
+        turned(lathe([(0, 0), (r, 0), (r, d * 0.7), (r * 0.93, d * 0.8), (r * 0.88, d * 0.72)], 32), np.pi / 2, "x"),
+        0,
+        d * 0.4,
+        zc,
+    )
+    face = finish("clock_face/0")
+    disc = moved(turned(cylinder(r * 0.9, 0, 0.001, 0, 32), np.pi / 2, "x"), 0, d * 0.4 - d * 0.71, zc)
+    disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
+    bells = [
+        moved(turned(scaled(ball(r * 0.34, 14, 9), 1, 1, 0.75), s * 0.5, "y"), s * r * 0.55, 0, h - r * 0.28)
+        for s in (-1, 1)
+    ]
+    feet = [tube([(s * r * 0.5, 0, zc - r * 0.7), (s * r * 0.75, 0, 0)], [0.004, 0.006], 7) for s in (-1, 1)]
+    skin = {"brass": BRASS, "black": BLACK, "chrome": CHROME}[str(look.get("metal", "brass"))]
+    return parts_of((skin, [case, *bells, *feet]), (face, disc))
+
+
+def remote(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, d, h = size
+    body = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.88], h * 0.25)
+    keys = [
+        box([x - 0.004, y - 0.003, h * 0.85], [x + 0.004, y + 0.003, h], 0.0008)
+        for x in np.linspace(-0.3, 0.3, 3) * w
+        for y in np.linspace(-0.34, 0.28, 7) * d
+    ]
+    power = box([-0.32 * w, 0.38 * d, h * 0.85], [-0.18 * w, 0.42 * d, h], 0.0008)
+    return parts_of(
+        (plain((0.06, 0.06, 0.065), 0.45), body),
+        (plain((0.35, 0.35, 0.36), 0.6), keys),
+        (plain((0.7, 0.12, 0.10), 0.5), power),
+    )
+
+
+def keys(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A ring with three keys fanned out and a leather tag."""
+    _, d, h = size
+    ring = moved(
+        tube(
+            [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]], 0.0011, 6, closed=True
+        ),
+        0,
+        d * 0.3,
+        h * 0.5,
+    )
+    made = []
+    for k, a in enumerate((-2.1, -1.5, -1.0)):
+        bow = moved(lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16), 0.013)
+        blade = joined(
+            box([0.022, -0.0035, 0], [0.052, 0.0035, 0.002]),
+            *[box([x, -0.0055, 0], [x + 0.003, -0.003, 0.002]) for x in (0.036, 0.042, 0.047)],
+        )
+        made.append(moved(turned(joined(bow, blade), a), 0, d * 0.3, 0.001 + 0.0022 * k))
+    tag = moved(turned(box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001), 0.3), 0, d * 0.3, 0.001)
+    return parts_of((STEEL, [ring, made[0], made[2]]), (BRASS, made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
+
+
+def tissue_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, d, h = size
+    top = h * 0.62
+    x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    rise = (1 - np.maximum(np.abs(x), np.abs(y)) ** 2) * (0.75 + 0.25 * np.sin(4 * x + 3 * y)) * (h - top)
+    tissue = sheet(np.stack([x * 0.05 + 0.01 * np.sin(5 * y), y * 0.022, top - 0.004 + np.clip(rise, 0, None)], -1))
+    slot = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
+    return parts_of(
+        (material(look, "skin", finish, "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
+        (BLACK, moved(scaled(slot, w * 0.32, d * 0.2, 1), 0, 0, top - 0.0004)),
+        (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), two_sided(tissue)),
+    )
+
+
+def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, _, h = size
+    r, cup = w / 2, h * 0.55
+    tints = ((0.80, 0.60, 0.16), (0.18, 0.32, 0.55), (0.68, 0.17, 0.15), (0.10, 0.10, 0.11), (0.22, 0.45, 0.28))
+    pens = []
+    for k in range(6):
+        a = k * 2.4 + rng.uniform(0, 0.6)
+        tip = np.array([0.85 * r * np.cos(a), 0.85 * r * np.sin(a), h * rng.uniform(0.82, 1.0)])
+        foot = np.array([-0.5 * r * np.cos(a), -0.5 * r * np.sin(a), 0.006])
+        pens.append((plain(tints[k % 5], 0.4), tube([foot, tip], 0.0037, 6)))
+        pens.append((plain((0.82, 0.68, 0.48), 0.7), tube([tip, tip + (tip - foot) * 0.07], [0.0037, 0.0006], 6)))
+    return parts_of(
+        (
+            material(look, "skin", finish, "leather/2") if "skin" in look else plain((0.10, 0.10, 0.105), 0.5),
+            cup(r, cup, 0.98, 0.003),
+        ),
+        *pens,
+    )
+
+
+def papers_makers() -> list[Maker]:
+    study = {
+        "study": 1.0,
+        "library": 1.0,
+        "living_room": 0.8,
+        "family_room": 0.7,
+        "bedroom": 0.6,
+        "kids_room": 0.5,
+        "main_bedroom": 0.4,
+    }
+    living = {
+        "living_room": 1.0,
+        "dining_room": 0.7,
+        "hall": 0.5,
+        "study": 0.6,
+        "bedroom": 0.5,
+        "main_bedroom": 0.5,
+        "family_room": 0.8,
+        "kitchen": 0.5,
+        "sun_room": 1.0,
+    }
+    made = []
+    for k in range(6):
+        made.append(
+            maker(
+                f"book_row_{k}",
+                "row of books",
+                "row of books",
+                ((0.30, 0.22, 0.45, 0.36, 0.18, 0.55)[k], 0.18, 0.25),
+                book_row,
+                on=SHELVES,
+                rooms=study,
+                synonyms=("books",),
+                colours=("coloured",),
+                materials=("paper",),
+                look={"seed": k},
+            )
+        )
+    for k in range(4):
+        made.append(
+            maker(
+                f"book_stack_{k}",
+                "stack of books",
+                "stack of books",
+                (0.20, 0.26, (0.09, 0.12, 0.07, 0.15)[k]),
+                book_stack,
+                on=SHELVES,
+                rooms=study,
+                synonyms=("books", "pile of books"),
+                colours=("coloured",),
+                materials=("paper",),
+                look={"seed": k, "count": (3, 4, 2, 5)[k]},
+            )
+        )
+        made.append(
+            maker(
+                f"book_{k}",
+                "book",
+                "book",
+                (0.15, 0.22, (0.025, 0.035, 0.018, 0.03)[k]),
+                book_stack,
+                on=SHELVES,
+                rooms={**study, "main_bedroom": 1.0, "bedroom": 1.0},
+                colours=(("green", "red", "blue", "brown")[k],),
+                materials=("paper",),
+                look={"seed": k, "count": 1},
+            )
+        )
+    for k, colour in enumerate(("blue", "red", "green")):
+        made.append(
+            maker(
+                f"magazine_{colour}",
+                "magazine",
+                f"{colour} magazine",
+                (0.21, 0.28, 0.008),
+                magazine,
+                on=("coffee table", "side table", "sofa", "desk", "bedside table", "toilet"),
+                rooms=living,
+                colours=(colour,),
+                materials=("paper",),
+                look={"cover": f"magazine_cover/{k}"},
+            )
+        )
+    made.append(
+        maker(
+            "paper_stack",
+            "stack of paper",
+            "stack of paper",
+            (0.23, 0.31, 0.02),
+            papers,
+            on=("desk", "office table", "printer", "filing cabinet"),
+            rooms={"study": 1.0},
+            synonyms=("papers",),
+            colours=("white",),
+            materials=("paper",),
+        )
+    )
+    for k, (frame, art) in enumerate(
+        (("oak", "art_sea/0"), ("black", "art_hills/3"), ("brass", "art_hills/1"), ("white", "art_botanical/1"))
+    ):
+        made.append(
+            maker(
+                f"photo_frame_{frame}",
+                "photo frame",
+                f"photograph in a {frame} frame",
+                ((0.15, 0.13)[k % 2], 0.09, (0.20, 0.18)[k % 2]),
+                photo_frame,
+                on=("sideboard", "dresser", "bedside table", "bookcase", "desk", "console", "fireplace"),
+                rooms=living,
+                synonyms=("framed photo", "photograph"),
+                colours=(frame.replace("oak", "brown").replace("brass", "gold"),),
+                materials=("wood",),
+                look={"frame": frame, "art": art},
+            )
+        )
+    for name in ("brass", "black", "chrome"):
+        made.append(
+            maker(
+                f"alarm_clock_{name}",
+                "alarm clock",
+                f"{name} alarm clock",
+                (0.11, 0.06, 0.14),
+                alarm_clock,
+                on=("bedside table", "dresser"),
+                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "kids_room": 0.7, "guest_room": 1.0},
+                synonyms=("clock",),
+                colours=(name,),
+                materials=("metal",),
+                look={"metal": name},
+            )
+        )
+    made.append(
+        maker(
+            "remote_control",
+            "remote control",
+            "black remote control",
+            (0.045, 0.17, 0.02),
+            remote,
+            on=("coffee table", "sofa", "tv stand", "side table", "bed"),
+            rooms={"living_room": 1.0, "family_room": 1.0, "main_bedroom": 0.3},
+            synonyms=("remote",),
+            colours=("black",),
+            materials=("plastic",),
+        )
+    )
+    made.append(
+        maker(
+            "keys",
+            "keys",
+            "bunch of keys",
+            (0.09, 0.09, 0.012),
+            keys,
+            on=("console", "sideboard", "dresser", "coffee table", "desk", "base cabinet"),
+            rooms={"hall": 1.0, "living_room": 0.4, "kitchen": 0.4},
+            synonyms=("key",),
+            colours=("silver",),
+            materials=("metal",),
+        )
+    )
+    for k, colour in ((3, "blue"), (4, "pink"), (5, "green")):
+        made.append(
+            maker(
+                f"tissue_box_{colour}",
+                "tissue box",
+                f"{colour} box of tissues",
+                (0.23, 0.12, 0.14),
+                tissue_box,
+                on=("bedside table", "desk", "coffee table", "bathroom vanity", "side table"),
+                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "bathroom": 0.5, "study": 0.5, "living_room": 0.4},
+                synonyms=("tissues",),
+                colours=(colour,),
+                materials=("paper",),
+                look={"skin": f"cotton/{k}"},
+            )
+        )
+    made.append(
+        maker(
+            "pencil_cup_black",
+            "pencil holder",
+            "black cup of pencils",
+            (0.085, 0.085, 0.19),
+            pencil_cup,
+            on=("desk", "office table", "child table"),
+            rooms={"study": 1.0, "kids_room": 0.8},
+            synonyms=("pencil cup", "pencils"),
+            colours=("black",),
+            materials=("metal",),
+        )
+    )
+    made.append(
+        maker(
+            "pencil_cup_leather",
+            "pencil holder",
+            "leather cup of pencils",
+            (0.09, 0.09, 0.19),
+            pencil_cup,
+            on=("desk", "office table"),
+            rooms={"study": 1.0},
+            synonyms=("pencil cup", "pencils"),
+            colours=("brown",),
+            materials=("leather",),
+            look={"skin": "leather/2"},
+        )
+    )
+    return made

@@ -1,0 +1,184 @@
+"""House plants in pots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assets.built.maker import (
+    SOIL,
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    parts_of,
+    plain,
+)
+from assets.built.primitives import (
+    Shape,
+    lathe,
+    sheet,
+    tube,
+    turned,
+    two_sided,
+)
+from assets.records import MeshPart
+
+
+def plant(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A pot with leaves: 'broad', 'grass', 'trailing' or 'rubber'."""
+    w, _, h = size
+    kind = str(look.get("kind", "broad"))
+    pr, ph = (0.26 * w, 0.30 * h) if kind != "rubber" else (0.24 * w, 0.22 * h)
+    pot = lathe([(0, 0), (pr * 0.78, 0), (pr, ph), (pr * 0.92, ph), (pr * 0.9, ph * 0.86), (0, ph * 0.86)], 28, 0.6)
+    soil = lathe([(0, ph * 0.87), (pr * 0.9, ph * 0.87)][::-1], 20)
+    soil = Shape(soil.vertices, soil.faces, np.tile([0.0, 0, 1.0], (len(soil.vertices), 1)), soil.uv)
+    f = soil.vertices[soil.faces[0]]
+    if np.cross(f[1] - f[0], f[2] - f[0])[2] < 0:
+        soil = Shape(soil.vertices, soil.faces[:, ::-1], soil.normals, soil.uv)
+    count = {"broad": 16, "grass": 44, "trailing": 26, "rubber": 18}[kind]
+    leaves, stems = [], []
+    for k in range(count):
+        a = k * 2.39996 + rng.normal(0, 0.25)
+        q = (k + 0.5) / count
+        if kind == "grass":
+            leaves.append(
+                _blade(
+                    a,
+                    rng.uniform(0.2, 0.48) * w,
+                    ph,
+                    ph + (h - ph) * rng.uniform(0.6, 1.0),
+                    0.012 * w / 0.3,
+                    rng.uniform(0.1, 0.5),
+                )
+            )
+        elif kind == "trailing":
+            leaves.append(
+                _leaf(
+                    a,
+                    0.15 * w + 0.33 * w * q,
+                    ph + (h - ph) * (1 - q * 0.9) * rng.uniform(0.8, 1.0),
+                    0.20 * w,
+                    0.10 * w,
+                    -0.4 - 0.8 * q,
+                )
+            )
+        elif kind == "rubber":
+            z = ph + (h - ph) * (0.22 + 0.70 * q)
+            leaves.append(_leaf(a, 0.07 * w, z, 0.40 * w * (1.05 - 0.5 * q), 0.16 * w, 0.55 - 0.2 * q))
+        else:
+            reach, z = (0.14 + 0.22 * rng.random()) * w, ph + (h - ph) * rng.uniform(0.35, 0.85)
+            tip = np.array([reach * np.cos(a), reach * np.sin(a), z])
+            stems.append(tube([(0, 0, ph * 0.8), tip * [0.5, 0.5, 0.75], tip], 0.0035 * w / 0.3, 5))
+            leaves.append(_leaf(a, reach, z, 0.26 * w, 0.17 * w, rng.uniform(-0.35, 0.25)))
+    if kind == "rubber":
+        stems.append(tube([(0, 0, ph * 0.8), (0.01 * w, 0, (h + ph) / 2), (0, 0, h * 0.93)], 0.012 * w / 0.4, 7))
+    dark, light = {
+        "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),
+        "grass": ((0.24, 0.40, 0.18), (0.42, 0.55, 0.28)),
+        "trailing": ((0.20, 0.36, 0.16), (0.40, 0.54, 0.26)),
+        "rubber": ((0.09, 0.19, 0.10), (0.14, 0.27, 0.13)),
+    }[kind]
+    clay = {
+        "white": plain((0.88, 0.87, 0.84), 0.4),
+        "terracotta": plain((0.66, 0.40, 0.28), 0.8),
+        "grey": plain((0.45, 0.45, 0.45), 0.7),
+        "black": plain((0.09, 0.09, 0.10), 0.5),
+    }[str(look.get("pot", "white"))]
+    return parts_of(
+        (clay, pot),
+        (SOIL, soil),
+        (plain((0.28, 0.30, 0.16), 0.8), stems),
+        (plain(dark, 0.4), leaves[::2]),
+        (plain(light, 0.45), leaves[1::2]),
+    )
+
+
+def _leaf(angle: float, reach: float, z: float, length: float, width: float, rise: float) -> Shape:
+    """A pointed leaf that starts `reach` from the stem and arches over, seen from both sides."""
+    s, t = np.linspace(0, 1, 7), np.linspace(-1, 1, 5)
+    half = width / 2 * np.sin(np.pi * s**0.75) ** 0.8
+    out = reach + length * s
+    up = z + length * (rise * s - 0.55 * s**2)
+    x = out[:, None] + 0 * t
+    y = half[:, None] * t
+    zz = up[:, None] + 0.25 * half[:, None] * np.abs(t)
+    return two_sided(turned(sheet(np.stack([x, y, zz], -1).transpose(1, 0, 2)), angle))
+
+
+def _blade(angle: float, reach: float, z0: float, z1: float, width: float, droop: float) -> Shape:
+    s = np.linspace(0, 1, 6)
+    out, up = reach * s**1.8, z0 * 0.85 + (z1 - z0 * 0.85) * (s - droop * s**3) / (1 - droop * 0.6)
+    half = width / 2 * (1 - s**2.5) + 0.0005
+    p = np.stack([np.stack([out, half, up], 1), np.stack([out, -half, up], 1)])
+    return two_sided(turned(sheet(p), angle))
+
+
+def plants_makers() -> list[Maker]:
+    living = {
+        "living_room": 1.0,
+        "dining_room": 0.7,
+        "hall": 0.5,
+        "study": 0.6,
+        "bedroom": 0.5,
+        "main_bedroom": 0.5,
+        "family_room": 0.8,
+        "kitchen": 0.5,
+        "sun_room": 1.0,
+    }
+    made = []
+    windowsill = (
+        "sideboard",
+        "desk",
+        "bookcase",
+        "side table",
+        "console",
+        "dresser",
+        "coffee table",
+        "shelving unit",
+        "plant stand",
+        "base cabinet",
+        "bathroom vanity",
+    )
+    for kind, pot, size in (
+        ("broad", "white", (0.30, 0.30, 0.38)),
+        ("grass", "grey", (0.28, 0.28, 0.36)),
+        ("trailing", "terracotta", (0.32, 0.32, 0.26)),
+        ("broad", "terracotta", (0.24, 0.24, 0.30)),
+    ):
+        made.append(
+            maker(
+                f"small_plant_{kind}_{pot}",
+                "small plant",
+                f"small plant in a {pot} pot",
+                size,
+                plant,
+                on=windowsill,
+                rooms=living,
+                synonyms=("plant", "pot plant", "houseplant"),
+                colours=("green",),
+                materials=("plant",),
+                look={"kind": kind, "pot": pot},
+            )
+        )
+    for kind, pot, size in (
+        ("rubber", "white", (0.60, 0.60, 1.35)),
+        ("rubber", "black", (0.55, 0.55, 1.1)),
+        ("broad", "grey", (0.75, 0.75, 1.0)),
+        ("grass", "terracotta", (0.6, 0.6, 0.9)),
+    ):
+        made.append(
+            maker(
+                f"potted_plant_{kind}_{pot}",
+                "potted plant",
+                f"tall plant in a {pot} pot",
+                size,
+                plant,
+                support="floor",
+                rooms={**living, "sun_room": 2.0},
+                synonyms=("plant", "houseplant"),
+                colours=("green",),
+                materials=("plant",),
+                look={"kind": kind, "pot": pot},
+            )
+        )
+    return made

@@ -1,0 +1,491 @@
+"""Crockery, bottles, candles and kitchen things."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from assets.built.maker import (
+    BLACK,
+    BRASS,
+    GLASS,
+    STEEL,
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    material,
+    parts_of,
+    plain,
+)
+from assets.built.primitives import (
+    Shape,
+    ball,
+    box,
+    cylinder,
+    extruded,
+    lathe,
+    moved,
+    scaled,
+    tube,
+    turned,
+)
+from assets.records import MeshPart
+
+KITCHEN_TOPS = ("base cabinet", "drawer cabinet", "kitchen island", "corner base cabinet", "dining table")
+TABLES = ("dining table", "coffee table", "kitchen island", "sideboard", "bistro table")
+
+
+def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
+    return lathe(
+        [
+            (0, 0),
+            (r * taper * 0.95, 0),
+            (r * taper, 0.004),
+            (r, h - 0.002),
+            (r - wall * 0.5, h),
+            (r - wall, h - 0.002),
+            (r * taper - wall, 0.008),
+            (0, 0.007),
+        ],
+        28,
+        0.6,
+    )
+
+
+def mug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A mug with a handle, coffee inside where look['coffee'] is 1."""
+    w, d, h = size
+    r = d / 2
+    cx = -(w - d) / 2
+    t = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 10)
+    ear = tube(
+        np.stack([cx + r * 0.94 + (w / 2 - cx - r - 0.005) * np.cos(t), 0 * t, h * 0.5 + h * 0.30 * np.sin(t)], 1),
+        0.0055,
+        8,
+    )
+    color = plain(
+        {
+            "white": (0.91, 0.90, 0.88),
+            "blue": (0.22, 0.34, 0.48),
+            "green": (0.40, 0.50, 0.42),
+            "red": (0.62, 0.18, 0.15),
+            "yellow": (0.86, 0.68, 0.28),
+            "black": (0.09, 0.09, 0.10),
+        }[str(look.get("colour", "white"))],
+        0.18,
+    )
+    drink = [moved(lathe([(r * 0.9, 0), (0, 0.0001)], 24), cx, 0, h * 0.8)] if look.get("coffee") else []
+    drink = [s if s.normals[:, 2].mean() > 0 else Shape(s.vertices, s.faces[:, ::-1], -s.normals, s.uv) for s in drink]
+    return parts_of((color, [moved(cup(r, h), cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink))
+
+
+def tumbler(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A drinking glass, with water where look['water'] is 1."""
+    w, _, h = size
+    r = w / 2
+    drink = [lathe([(0, 0.01), (r * 0.78, 0.01), (r * 0.88, h * 0.6), (0, h * 0.6)], 24)] if look.get("water") else []
+    return parts_of((GLASS, cup(r, h, 0.84, 0.0025)), (plain((0.75, 0.85, 0.88), 0.03), drink))
+
+
+def plates(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Plates piled up (look['count'])."""
+    w, _, h = size
+    r, count = w / 2, int(look.get("count", 5))
+    step = (h - 0.022) / max(count - 1, 1)
+    one = lathe(
+        [
+            (0, 0),
+            (r * 0.58, 0),
+            (r * 0.62, 0.004),
+            (r * 0.98, 0.018),
+            (r, 0.021),
+            (r * 0.985, 0.022),
+            (r * 0.64, 0.008),
+            (r * 0.56, 0.005),
+            (0, 0.005),
+        ],
+        36,
+        0.6,
+    )
+    color = plain(
+        {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}[
+            str(look.get("colour", "white"))
+        ],
+        0.15,
+    )
+    return parts_of((color, [moved(one, 0, 0, k * step) for k in range(count)]))
+
+
+def bowl(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A bowl, with fruit where look['fruit'] is 1."""
+    w, _, h = size
+    r = w / 2
+    fruit = bool(look.get("fruit"))
+    rise = h * 0.72 if fruit else h
+    t = np.linspace(0.15, 1, 9)
+    outer = np.stack([r * np.sin(t * np.pi / 2) ** 0.9, rise * (1 - np.cos(t * np.pi / 2)) + 0.003], 1)
+    inner = outer[::-1] * [0.955, 1.0] + [0, 0.004]
+    inner[0] = outer[-1] * [0.965, 1.0]
+    shell = lathe([(0, 0), (r * 0.3, 0), *outer, *inner, (0, inner[-1, 1])], 36, 0.8)
+    skin = material(look, "skin", finish, "walnut/0") if "skin" in look else plain((0.88, 0.86, 0.82), 0.2)
+    heap = []
+    if fruit:
+        tints = ((0.72, 0.20, 0.12), (0.82, 0.48, 0.12), (0.58, 0.62, 0.18), (0.85, 0.70, 0.22))
+        fr = r * 0.34
+        for k in range(7):
+            a = 2 * np.pi * k / 6
+            q = 0.0 if k == 6 else r * 0.50
+            z = h - fr if k == 6 else rise * 0.55 + fr * 0.55 + rng.uniform(-0.004, 0.004)
+            apple = scaled(ball(fr * rng.uniform(0.9, 1.0), 14, 10), 1, 1, 0.93)
+            heap.append((plain(tints[int(rng.integers(4))], 0.3), moved(apple, q * np.cos(a), q * np.sin(a), z)))
+    return parts_of((skin, shell), *heap)
+
+
+def bottle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A bottle with a label and a cap."""
+    w, _, h = size
+    r = w / 2
+    glass = {
+        "green": plain((0.10, 0.22, 0.12), 0.05),
+        "brown": plain((0.22, 0.11, 0.05), 0.06),
+        "clear": GLASS,
+        "white": plain((0.90, 0.90, 0.89), 0.3),
+        "blue": plain((0.24, 0.42, 0.60), 0.3),
+    }[str(look.get("colour", "green"))]
+    neck = float(look.get("neck", 0.36))
+    body = lathe(
+        [
+            (0, 0),
+            (r * 0.94, 0),
+            (r, 0.006),
+            (r, h * 0.58),
+            (r * 0.86, h * 0.66),
+            (r * neck, h * 0.78),
+            (r * neck, h * 0.95),
+            (0, h * 0.95),
+        ],
+        26,
+        0.75,
+    )
+    label = lathe([(r * 1.004, h * 0.2), (r * 1.004, h * 0.48)], 26)
+    cap = lathe([(0, h * 0.90), (r * (neck + 0.06), h * 0.90), (r * (neck + 0.06), h), (0, h)], 18)
+    tint = ((0.88, 0.84, 0.74), (0.72, 0.22, 0.18), (0.93, 0.92, 0.90), (0.22, 0.30, 0.40))[int(rng.integers(4))]
+    return parts_of(
+        (glass, body),
+        (plain(tint, 0.7), label),
+        (plain((0.14, 0.13, 0.13) if rng.random() < 0.5 else (0.60, 0.16, 0.14), 0.4), cap),
+    )
+
+
+def candle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A pillar candle on a saucer, its rim melted."""
+    w, _, h = size
+    r, top = w / 2, h * 0.93
+    wax = lathe(
+        [
+            (0, 0.006),
+            (r * 0.72, 0.006),
+            (r * 0.72, top - 0.004),
+            (r * 0.68, top),
+            (r * 0.58, top - 0.005),
+            (0, top - 0.008),
+        ],
+        24,
+        0.8,
+    )
+    dish = lathe([(0, 0), (r * 0.7, 0), (r, 0.008), (r * 0.96, 0.010), (r * 0.7, 0.005), (0, 0.005)], 28, 0.8)
+    wick = tube([(0, 0, top - 0.01), (0.001, 0, h)], 0.0012, 5)
+    return parts_of(
+        (plain((0.91, 0.87, 0.77), 0.55), wax), (BLACK if look.get("dish") == "black" else BRASS, dish), (BLACK, wick)
+    )
+
+
+def paper_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, _, h = size
+    r = w / 2
+    foot, rod = (
+        cylinder(r, 0, 0.014, 0.003, 32),
+        lathe([(0, 0.01), (0.007, 0.01), (0.007, h - 0.012), (0.012, h - 0.008), (0.010, h), (0, h)], 12, 0.8),
+    )
+    roll = lathe([(0.02, 0.015), (r * 0.78, 0.015), (r * 0.78, h * 0.84), (0.02, h * 0.84), (0.02, 0.015)], 32)
+    return parts_of(
+        (finish("oak/0") if look.get("wood") else STEEL, [foot, rod]),
+        (plain((0.94, 0.94, 0.93), 0.95, specular=0.05), roll),
+    )
+
+
+def board(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A chopping board with a grip hole, lying flat."""
+
+    w, d, h = size
+    plate = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.02).buffer(0.02, quad_segs=4)
+    hole = shapely.Point(w / 2 - 0.035, 0).buffer(0.012, quad_segs=4)
+    return parts_of((material(look, "wood", finish, "beech/0"), extruded(plate.difference(hole), 0, h)))
+
+
+def knife_block(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A leaning block of wood with knife handles standing out."""
+    w, d, h = size
+    lean = 0.32
+    body = turned(box([-w / 2, -d * 0.35, 0.0], [w / 2, d * 0.30, h * 0.70], 0.004), -lean, "x")
+    handles, bolsters = [], []
+    for x in np.linspace(-0.3, 0.3, 3) * w:
+        for y, s in ((-0.18 * d, 1.0), (0.1 * d, 0.85)):
+            handles.append(
+                turned(
+                    box([x - 0.007, y - 0.011, h * 0.73], [x + 0.007, y + 0.011, h * 0.73 + 0.10 * s], 0.004),
+                    -lean,
+                    "x",
+                )
+            )
+            bolsters.append(
+                turned(box([x - 0.005, y - 0.010, h * 0.69], [x + 0.005, y + 0.010, h * 0.735]), -lean, "x")
+            )
+    foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
+    return parts_of((material(look, "wood", finish, "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))
+
+
+def tableware_makers() -> list[Maker]:
+    kitchen = {"kitchen": 1.0, "dining_room": 0.6}
+    living = {
+        "living_room": 1.0,
+        "dining_room": 0.7,
+        "hall": 0.5,
+        "study": 0.6,
+        "bedroom": 0.5,
+        "main_bedroom": 0.5,
+        "family_room": 0.8,
+        "kitchen": 0.5,
+        "sun_room": 1.0,
+    }
+    made = []
+    for colour in ("white", "blue", "green", "red", "yellow", "black"):
+        made.append(
+            maker(
+                f"mug_{colour}",
+                "mug",
+                f"{colour} mug",
+                (0.12, 0.085, 0.095),
+                mug,
+                on=(*KITCHEN_TOPS, "desk", "coffee table", "side table", "bedside table", "workbench"),
+                rooms={**kitchen, "study": 0.6, "living_room": 0.5},
+                synonyms=("cup",),
+                colours=(colour,),
+                materials=("ceramic",),
+                look={"colour": colour, "coffee": float(colour in ("white", "blue", "black"))},
+            )
+        )
+    made.append(
+        maker(
+            "glass",
+            "glass",
+            "drinking glass",
+            (0.075, 0.075, 0.115),
+            tumbler,
+            on=(*TABLES, *KITCHEN_TOPS, "bedside table"),
+            rooms={**kitchen, "bedroom": 0.3},
+            synonyms=("tumbler",),
+            colours=("transparent",),
+            materials=("glass",),
+        )
+    )
+    made.append(
+        maker(
+            "glass_water",
+            "glass",
+            "glass of water",
+            (0.072, 0.072, 0.13),
+            tumbler,
+            on=(*TABLES, "bedside table", "desk"),
+            rooms={**kitchen, "bedroom": 0.5, "study": 0.4},
+            synonyms=("tumbler",),
+            colours=("transparent",),
+            materials=("glass",),
+            look={"water": 1.0},
+        )
+    )
+    for colour in ("white", "blue", "sand"):
+        made.append(
+            maker(
+                f"plates_{colour}",
+                "stack of plates",
+                f"stack of {colour} plates",
+                (0.26, 0.26, 0.07),
+                plates,
+                on=(*KITCHEN_TOPS, "sideboard"),
+                rooms=kitchen,
+                synonyms=("plates",),
+                colours=(colour,),
+                materials=("ceramic",),
+                look={"colour": colour},
+            )
+        )
+        made.append(
+            maker(
+                f"plate_{colour}",
+                "plate",
+                f"{colour} plate",
+                (0.26, 0.26, 0.022),
+                plates,
+                on=TABLES,
+                rooms=kitchen,
+                colours=(colour,),
+                materials=("ceramic",),
+                look={"colour": colour, "count": 1},
+            )
+        )
+    made.append(
+        maker(
+            "bowl_wood",
+            "bowl",
+            "wooden bowl",
+            (0.26, 0.26, 0.09),
+            bowl,
+            on=(*TABLES, *KITCHEN_TOPS),
+            rooms=kitchen,
+            colours=("brown",),
+            materials=("wood",),
+            look={"skin": "walnut/0"},
+        )
+    )
+    made.append(
+        maker(
+            "bowl_white",
+            "bowl",
+            "white bowl",
+            (0.20, 0.20, 0.08),
+            bowl,
+            on=(*TABLES, *KITCHEN_TOPS),
+            rooms=kitchen,
+            colours=("white",),
+            materials=("ceramic",),
+        )
+    )
+    made.append(
+        maker(
+            "fruit_bowl_wood",
+            "fruit bowl",
+            "wooden bowl of fruit",
+            (0.28, 0.28, 0.14),
+            bowl,
+            on=(*TABLES, *KITCHEN_TOPS),
+            rooms=kitchen,
+            colours=("brown", "red"),
+            materials=("wood",),
+            look={"skin": "oak/0", "fruit": 1.0},
+        )
+    )
+    made.append(
+        maker(
+            "fruit_bowl_white",
+            "fruit bowl",
+            "white bowl of fruit",
+            (0.27, 0.27, 0.15),
+            bowl,
+            on=(*TABLES, *KITCHEN_TOPS),
+            rooms=kitchen,
+            colours=("white", "orange"),
+            materials=("ceramic",),
+            look={"fruit": 1.0, "seed": 3},
+        )
+    )
+    for name, cls, colour, size, spots, rooms in (
+        ("wine", "wine bottle", "green", (0.076, 0.076, 0.31), (*KITCHEN_TOPS, "sideboard"), kitchen),
+        ("oil", "oil bottle", "brown", (0.065, 0.065, 0.27), KITCHEN_TOPS, {"kitchen": 1.0}),
+        (
+            "water",
+            "water bottle",
+            "blue",
+            (0.075, 0.075, 0.24),
+            ("desk", "bedside table", "dining table", "treadmill"),
+            {"study": 0.7, "gym": 1.0, "bedroom": 0.4},
+        ),
+        (
+            "shampoo",
+            "shampoo bottle",
+            "white",
+            (0.07, 0.07, 0.20),
+            ("bathtub", "bathroom vanity", "washbasin", "shelving unit"),
+            {"bathroom": 1.0},
+        ),
+    ):
+        made.append(
+            maker(
+                f"bottle_{name}",
+                cls,
+                f"{colour} {cls}",
+                size,
+                bottle,
+                on=spots,
+                rooms=rooms,
+                synonyms=("bottle",),
+                colours=(colour,),
+                materials=("glass" if name in ("wine", "oil") else "plastic",),
+                look={"colour": colour, "neck": 0.36 if name in ("wine", "oil") else 0.55},
+            )
+        )
+    for dish, size in (("brass", (0.11, 0.11, 0.13)), ("black", (0.10, 0.10, 0.18))):
+        made.append(
+            maker(
+                f"candle_{dish}",
+                "candle",
+                "candle on a saucer",
+                size,
+                candle,
+                on=(*TABLES, "bathtub", "console", "fireplace", "bookcase", "side table"),
+                rooms=living,
+                colours=("white",),
+                materials=("wax",),
+                look={"dish": dish},
+            )
+        )
+    for name, wood in (("steel", 0.0), ("wood", 1.0)):
+        made.append(
+            maker(
+                f"paper_towel_{name}",
+                "paper towel holder",
+                f"kitchen roll on a {name} stand",
+                (0.15, 0.15, 0.31),
+                paper_towel,
+                on=KITCHEN_TOPS,
+                rooms={"kitchen": 1.0},
+                synonyms=("kitchen roll", "paper towels"),
+                colours=("white",),
+                materials=("paper", name),
+                look={"wood": wood},
+            )
+        )
+    for wood in ("beech", "walnut", "oak"):
+        made.append(
+            maker(
+                f"chopping_board_{wood}",
+                "chopping board",
+                f"{wood} chopping board",
+                (0.38, 0.25, 0.022),
+                board,
+                on=KITCHEN_TOPS,
+                rooms={"kitchen": 1.0},
+                synonyms=("cutting board",),
+                colours=("brown",),
+                materials=("wood", wood),
+                look={"wood": f"{wood}/0"},
+            )
+        )
+    for wood in ("beech", "walnut"):
+        made.append(
+            maker(
+                f"knife_block_{wood}",
+                "knife block",
+                f"{wood} knife block",
+                (0.11, 0.17, 0.30),
+                knife_block,
+                on=KITCHEN_TOPS,
+                rooms={"kitchen": 1.0},
+                synonyms=("knives",),
+                colours=("brown",),
+                materials=("wood",),
+                look={"wood": f"{wood}/0"},
+            )
+        )
+    return made
