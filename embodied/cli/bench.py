@@ -1,6 +1,7 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
-houses, pictures, steps and memory make the table of the main line; light compares the ways of
+houses, pictures, steps and memory make the table of the main line; plays counts environment
+steps with help; light compares the ways of
 drawing with a path tracer. Close other programs first: the numbers are only as good as the quiet.
 """
 
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 
-PARTS = ("houses", "pictures", "steps", "memory", "light")
+PARTS = ("houses", "pictures", "steps", "plays", "memory", "light")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +30,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied import gl
-    from embodied.bench import timing, world
+    from embodied.bench import episodes, timing, world
 
     catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -40,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality),
         "steps": lambda: world.steps(catalogue, args.cache, args.seed),
+        "plays": lambda: episodes.plays(catalogue, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
     measures = []

@@ -1,0 +1,62 @@
+"""Benchmarks of play: environment steps with help, on one core, and Lemma 2."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from assets.catalogue import Catalogue
+from embodied.assistants.routes import benchmark_lemma2, build_routes
+from embodied.bench.timing import Measure, from_values, measure
+from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.parts import part_tasks
+from embodied.datasets.store import Place
+from embodied.env import HelpEnv
+from embodied.environments import environment_maker
+from embodied.interface import Ask, Intention, Move, Task
+from embodied.language.plain import PlainLanguage
+from embodied.seeds import stream
+
+AIMS = {"find": 20_000.0, "hanna": 10_000.0, "vnla": None, "hari": None}
+"""Steps per second that the project promises; HANNA's include the assistant's replies."""
+TASKS = 60
+
+
+def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
+    """Environment steps per second of every kind of task, with caches warm, no pixels."""
+    language = PlainLanguage()
+    for kind, aim in AIMS.items():
+        house, graph = make_dataset_house(seed, "bench", DatasetConfig(kind, "tiny", seed), catalogue)
+        place = Place(house, graph)
+        routes = build_routes(place, seed=seed, language=language, house_split="test") if kind == "hanna" else ()
+        part = "main_unseen" if kind == "hari" else "main"
+        tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language)[part]
+        env = environment_maker(kind, {"bench": place}, routes={"bench": routes})()
+        counts = walk(env, tasks)
+        asked = counts[1] / counts[0]
+        yield measure(
+            f"{kind} steps, {100 * asked:.0f} % requests", lambda env=env, tasks=tasks: walk(env, tasks), "1/s",
+            repeats=7, per=counts[0], aim=aim,
+        )
+        if kind == "hanna":
+            result = benchmark_lemma2(graph, rng=stream(seed, "lemma 2"), pairs=2_000)
+            yield from_values(f"Lemma 2: instructions of 2 N log2 N, N = {result.nodes}", [result.instructions / result.bound], "x")
+            yield from_values("Lemma 2: most instructions between two nodes", [float(result.most)], "")
+
+
+def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:
+    """Play tasks by a fixed rule that asks at every fifth step where it can; (steps, requests) taken."""
+    steps = requests = 0
+    for task in tasks:
+        o = env.reset(task)
+        while o is not None:
+            help_wanted = o.can_ask and o.time % 5 == 4 and o.time_on_task
+            action = Ask(o.can_ask[0] if o.can_ask[0] is Intention.HELP else o.can_ask[-1]) if help_wanted else _move(o)
+            requests += isinstance(action, Ask)
+            o = env.step(action)
+            steps += 1
+    return steps, requests
+
+
+def _move(o) -> Move:
+    choice = o.time % len(o.candidates)
+    return Move(choice if o.candidates.allowed[choice] else 1)
