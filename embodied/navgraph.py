@@ -112,12 +112,9 @@ def walkable(house: House, storey: int = 0) -> shapely.Geometry:
 
 
 def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list[str], list[tuple[int, int]]]:
-    space = walkable(house, storey)
-    shapely.prepare(space)
     rooms = [r for r in house.rooms if r.storey == storey]
-    grid = Grid(space)
-    room_of_cell = rooms_of_cells(grid, rooms)
-    reach = _largest_reach(grid, room_of_cell)
+    grid, room_of_cell, reach = reachable(house, storey)
+    space = grid.space
     for k, r in enumerate(rooms):
         if not (room_of_cell[reach] == k).any():
             raise HouseError(f"room {r.id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
@@ -135,17 +132,22 @@ def unreachable_rooms(house: House) -> tuple[str, ...]:
     """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey."""
     found = []
     for storey in range(len(house.storeys)):
-        space = walkable(house, storey)
-        shapely.prepare(space)
         rooms = [r for r in house.rooms if r.storey == storey]
-        grid = Grid(space)
-        room_of_cell = rooms_of_cells(grid, rooms)
-        reach = _largest_reach(grid, room_of_cell)
+        _, room_of_cell, reach = reachable(house, storey)
         found += [r.id for k, r in enumerate(rooms) if not (room_of_cell[reach] == k).any()]
     return tuple(found)
 
 
-def rooms_of_cells(grid: Grid, rooms) -> np.ndarray:
+def reachable(house: House, storey: int) -> tuple[Grid, np.ndarray, np.ndarray]:
+    """The storey's grid, the room index of each cell (-1 for none), and which cells are joined to the most rooms."""
+    space = walkable(house, storey)
+    shapely.prepare(space)
+    grid = Grid(space)
+    room_of_cell = _rooms_of_cells(grid, [r for r in house.rooms if r.storey == storey])
+    return grid, room_of_cell, _largest_reach(grid, room_of_cell)
+
+
+def _rooms_of_cells(grid: Grid, rooms) -> np.ndarray:
     """(n,) index of the room each cell lies in; cells inside a wall's doorway belong to the nearest room."""
     room_of_cell = np.full(len(grid.xy), -1)
     for k, r in enumerate(rooms):
@@ -168,7 +170,8 @@ def _largest_reach(grid: Grid, room_of_cell: np.ndarray) -> np.ndarray:
 class Grid:
     """Cell centres inside the free space and how far each is from its border."""
 
-    def __init__(self, space: shapely.Polygon) -> None:
+    def __init__(self, space: shapely.Geometry) -> None:
+        self.space = space
         x0, y0, x1, y1 = space.bounds
         self.x0, self.y0 = np.floor(x0 / CELL) * CELL, np.floor(y0 / CELL) * CELL
         nx, ny = int(np.ceil((x1 - self.x0) / CELL)) + 1, int(np.ceil((y1 - self.y0) / CELL)) + 1

@@ -27,8 +27,8 @@ from embodied.seeds import stream
 
 __all__ = ["STAGES", "Draft", "HouseConfig", "generate_house"]
 
-TRIES = 1200
-"""Candidate plans per attempt."""
+TRIES = 14000
+"""Candidate plans per attempt, times rooms wanted: large houses get fewer."""
 ATTEMPTS = 12
 DEFAULT = HouseConfig()
 
@@ -73,7 +73,7 @@ def rooms(draft: Draft, first: int = 0) -> Draft:
         if attempt:
             footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
             spaces = draw_program(draft.area, draft.config, rng=rng)
-        plan = draw_plan(footprints, spaces, TRIES, rng=rng)
+        plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
         if plan is not None:
             return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
     raise HouseError(f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from embodied.house import House, HouseError
-from embodied.navgraph import RADIUS, Grid, rooms_of_cells, unreachable_rooms, walkable
+from embodied.navgraph import CELL, RADIUS, reachable
 from embodied.walkable import HEAD, STEP, footprint
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
@@ -24,17 +24,22 @@ def cleared(house: House) -> House:
     Raises:
       HouseError: a room stays closed although nothing stands in the way.
     """
-    for _ in range(ROUNDS):
-        closed = unreachable_rooms(house)
-        if not closed:
-            return house
-        room = house.room_by_id[closed[0]]
-        blocking = _blocking(house, room.storey)
-        if not blocking:
-            raise HouseError(f"room {room.id!r} cannot be entered on foot although no object is in the way; "
-                             "its door or corridor is too narrow")
-        house = without(house, blocking)
-    raise HouseError(f"rooms {unreachable_rooms(house)} stay closed after {ROUNDS} rounds of clearing")
+    for storey in range(len(house.storeys)):
+        for _ in range(ROUNDS):
+            grid, room_of_cell, reach = reachable(house, storey)
+            rooms = [r for r in house.rooms if r.storey == storey]
+            entered = set(room_of_cell[reach].tolist())
+            closed = [k for k in range(len(rooms)) if k not in entered]
+            if not closed:
+                break
+            blocking = _blocking(house, storey, closed, grid.xy[reach])
+            if not blocking:
+                raise HouseError(f"room {rooms[closed[0]].id!r} cannot be entered on foot although no object is in the "
+                                 "way; its door or corridor is too narrow")
+            house = without(house, blocking)
+        else:
+            raise HouseError(f"rooms {[rooms[k].id for k in closed]} stay closed after {ROUNDS} rounds of clearing")
+    return house
 
 
 def without(house: House, names: tuple[str, ...]) -> House:
@@ -47,42 +52,41 @@ def without(house: House, names: tuple[str, ...]) -> House:
         lights=tuple(x for x in house.lights if x.placement not in gone))
 
 
-def _blocking(house: House, storey: int) -> tuple[str, ...]:
-    """The placements that the cheapest way from the first closed room to the open part runs through."""
-    bare = dataclasses.replace(house, placements=())
-    space = walkable(bare, storey)
-    shapely.prepare(space)
-    grid = Grid(space)
-    rooms = [r for r in house.rooms if r.storey == storey]
-    room_of_cell = rooms_of_cells(grid, rooms)
-    closed = set(unreachable_rooms(house))
+def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarray) -> tuple[str, ...]:
+    """The placements that the cheapest ways from the open part into the closed rooms run through.
+
+    Args:
+      closed: indices of rooms among those of the storey.
+      open_cells: (n, 2) metres, the cells that can be reached among the furniture.
+    """
+    grid, room_of_cell, _ = reachable(dataclasses.replace(house, placements=()), storey)
     floor = house.storeys[storey].elevation
-    ids = {r.id for r in rooms}
+    ids = {r.id for r in house.rooms if r.storey == storey}
     things = [p for p in house.placements if p.room in ids and p.position[2] - floor < HEAD
               and p.position[2] + p.size[2] - floor > STEP]
     toll = np.zeros(len(grid.xy))
-    reach = []
-    points = shapely.points(grid.xy)
+    covered = []
     for p in things:
         shape = footprint(p).buffer(RADIUS + 0.06)
-        shapely.prepare(shape)
-        near = np.flatnonzero(shapely.contains(shape, points))
-        reach.append(near)
+        x0, y0, x1, y1 = shape.bounds
+        box = np.flatnonzero((grid.xy >= (x0, y0)).all(1) & (grid.xy <= (x1, y1)).all(1))
+        near = box[shapely.contains_xy(shape, grid.xy[box, 0], grid.xy[box, 1])]
+        covered.append(set(near.tolist()))
         toll[near] += 60.0 if any(w in p.object_class for w in NEEDED) else 6.0
     matrix = grid.matrix.tocoo()
     dear = csr_matrix((matrix.data + toll[matrix.row] + toll[matrix.col], (matrix.row, matrix.col)), shape=matrix.shape)
-    is_closed = np.array([r.id in closed for r in rooms])
-    start = np.flatnonzero((room_of_cell >= 0) & ~is_closed[room_of_cell] & (toll == 0))
-    first = next(k for k, r in enumerate(rooms) if r.id in closed)
-    goal = np.flatnonzero(room_of_cell == first)
-    if len(start) == 0 or len(goal) == 0:
+    keys = {tuple(k) for k in np.round(open_cells / CELL).astype(int).tolist()}
+    start = [n for n, k in enumerate(np.round(grid.xy / CELL).astype(int).tolist()) if tuple(k) in keys]
+    if not start:
         return ()
     cost, before, _ = dijkstra(dear, directed=False, indices=start, min_only=True, return_predecessors=True)
-    # a cell well inside the room, not merely its doorstep
-    deep = goal[grid.clearance[goal] >= min(0.3, float(grid.clearance[goal].max()))]
-    at = int(deep[np.argmin(cost[deep])])
-    way = set()
-    while at >= 0:
-        way.add(at)
-        at = int(before[at])
-    return tuple(p.id for p, near in zip(things, reach) if way.intersection(near.tolist()))
+    way: set[int] = set()
+    for k in closed:
+        goal = np.flatnonzero(room_of_cell == k)
+        # a cell well inside the room, not merely its doorstep
+        deep = goal[grid.clearance[goal] >= min(0.3, float(grid.clearance[goal].max()))] if len(goal) else goal
+        at = int(deep[np.argmin(cost[deep])]) if len(deep) else -1
+        while at >= 0:
+            way.add(at)
+            at = int(before[at])
+    return tuple(p.id for p, cells in zip(things, covered) if way & cells)

@@ -12,7 +12,7 @@ DAYLIT = (*BEDROOMS, "living_room", "dining_room", "kitchen", "family_room", "st
           "gym", "workshop")
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
 NEAR = {
-    ("dining_room", "kitchen"): 1.6, ("dining_room", "living_room"): 1.3, ("kitchen", "living_room"): 0.7,
+    ("dining_room", "kitchen"): 2.6, ("dining_room", "living_room"): 1.8, ("kitchen", "living_room"): 0.8,
     ("hall", "living_room"): 1.8, ("garage", "hall"): 0.6, ("garage", "laundry_room"): 0.8, ("garage", "kitchen"): 0.5,
     ("kitchen", "laundry_room"): 0.4, ("family_room", "kitchen"): 0.7, ("garage", "workshop"): 0.8,
     ("living_room", "sun_room"): 0.8, ("hall", "toilet"): 0.6, ("library", "living_room"): 0.3,
