@@ -10,12 +10,15 @@ from types import MappingProxyType
 
 from assets.built.bath import bath_makers
 from assets.built.decor import decor_makers
+from assets.built.entry import entry_makers
+from assets.built.fittings import fittings_makers
 from assets.built.kitchen import kitchen_makers
 from assets.built.lamps import lamps_makers
 from assets.built.maker import Maker
 from assets.built.papers import papers_makers
 from assets.built.plants import plants_makers
 from assets.built.soft import soft_makers
+from assets.built.storage import storage_makers
 from assets.built.tableware import tableware_makers
 
 __all__ = ["MAKERS", "Maker"]
@@ -31,6 +34,9 @@ def _all() -> Mapping[str, Maker]:
         *papers_makers(),
         *tableware_makers(),
         *plants_makers(),
+        *storage_makers(),
+        *entry_makers(),
+        *fittings_makers(),
     ]
     keys = [m.asset.key for m in made]
     assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)

@@ -1,0 +1,277 @@
+"""What hangs and stands by the door: coats, shoes, umbrellas, mats."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from assets.built.maker import (
+    FinishOf,
+    Look,
+    Maker,
+    maker,
+    material,
+    metal,
+    parts_of,
+    plain,
+)
+from assets.built.primitives import (
+    Shape,
+    ball,
+    bar,
+    box,
+    extruded,
+    joined,
+    lathe,
+    moved,
+    scaled,
+    sheet,
+    tube,
+    turned,
+)
+from assets.records import MeshPart
+
+
+def shoes(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A pair of low shoes, one a little askew."""
+    w, d, h = size
+    colour = {
+        "black": (0.07, 0.065, 0.06),
+        "brown": (0.32, 0.19, 0.11),
+        "white": (0.86, 0.85, 0.82),
+        "blue": (0.16, 0.22, 0.34),
+    }[str(look.get("colour", "brown"))]
+    length, width = d * 0.97, w * 0.44
+    uppers, soles, laces = [], [], []
+    for side in (-1, 1):
+        s, t = np.linspace(0, 1, 22), np.linspace(0, np.pi, 13)
+        outline = (
+            width
+            / 2
+            * (
+                0.62
+                + 0.50 * np.sin(np.pi * np.clip(s, 0, 1) ** 0.75) ** 0.7
+                - 0.22 * np.exp(-(((s - 0.38) / 0.16) ** 2))
+            )
+            * np.clip(np.sin(np.pi * np.clip(s * 0.94 + 0.03, 0, 1)) * 3.2, 0, 1) ** 0.5
+        )
+        height = h * np.interp(
+            s, [0, 0.08, 0.22, 0.42, 0.60, 0.80, 0.94, 1], [0.55, 0.98, 0.92, 0.86, 0.72, 0.50, 0.36, 0.16]
+        )
+        y = length * (0.5 - s)
+        x = outline[:, None] * np.cos(t)[None]
+        z = 0.024 + (height[:, None] - 0.024) * np.sin(t)[None] ** 0.55
+        open_ = ((s > 0.08) & (s < 0.40))[:, None] * np.exp(-((np.cos(t)[None] / 0.55) ** 4))
+        dent = z - open_ * h * 0.42
+        upper = sheet(np.stack([-x, y[:, None] + 0 * x, dent], -1)[::-1])
+        lay = [(upper, uppers), (_sole(outline, y), soles)]
+        for k, q in enumerate((0.46, 0.53, 0.60)):
+            i = int(q * 21)
+            lay.append(
+                (
+                    bar(
+                        [-outline[i] * 0.45, y[i], height[i] * 0.97],
+                        [outline[i] * 0.45, y[i] - 0.004 * k, height[i] * 0.97],
+                        0.007,
+                        0.005,
+                    ),
+                    laces,
+                )
+            )
+        turn, at = side * 0.04 + rng.normal(0, 0.05), side * w * 0.25
+        for shape, group in lay:
+            group.append(moved(turned(scaled(shape, side, 1, 1), turn), at, rng.normal(0, 0.003)))
+    pale = (0.88, 0.87, 0.84) if look.get("colour") in ("white", "blue") else (0.09, 0.08, 0.075)
+    return parts_of(
+        (plain(colour, 0.45), uppers), (plain(pale, 0.7), soles), (plain(tuple(0.7 * c for c in colour), 0.8), laces)
+    )
+
+
+def _sole(outline: np.ndarray, y: np.ndarray) -> Shape:
+    ring = np.concatenate([np.stack([outline * 1.06, y], 1), np.stack([-outline * 1.06, y], 1)[::-1]])
+    return extruded(shapely.Polygon(ring).buffer(0), 0, 0.026)
+
+
+def coat_hooks(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A board with hooks, some of them with coats, a bag or a scarf."""
+    w, d, h = size
+    top = h - 0.10
+    plank = box([-w / 2, d / 2 - 0.02, top], [w / 2, d / 2, h], 0.004)
+    count = max(3, round(w / 0.17))
+    hooks, clothes = [], []
+    cloths = ("tweed/0", "linen/4", "denim/0", "linen/3", "velvet/3", "linen/6", "tweed/1")
+    order = rng.permutation(len(cloths))
+    full = {int(k) for k in rng.choice(count, min(int(look.get("coats", 3)), count), replace=False)}
+    for k, x in enumerate(np.linspace(-w / 2 + 0.07, w / 2 - 0.07, count)):
+        y = d / 2 - 0.02
+        hooks.append(tube([(x, y, h - 0.03), (x, y - 0.045, h - 0.035), (x, y - 0.06, h - 0.012)], 0.006, 8))
+        hooks.append(tube([(x, y, h - 0.065), (x, y - 0.025, h - 0.075), (x, y - 0.035, h - 0.06)], 0.005, 8))
+        if k in full:
+            drop = (h - 0.04) * (1.0 if k == min(full) else rng.uniform(0.72, 0.98))
+            clothes.append(
+                (
+                    finish(cloths[order[k % len(cloths)]]),
+                    moved(
+                        _coat(min(0.40, w / count * 2.0), d * 0.62, drop, rng=rng),
+                        x,
+                        d / 2 - 0.02 - d * 0.40,
+                        h - 0.035 - drop,
+                    ),
+                )
+            )
+    return parts_of((material(look, "wood", finish, "oak/0"), plank), (metal(look, finish, "black"), hooks), *clothes)
+
+
+def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
+    """A coat on a hook: a closed tube of cloth, narrow at the collar, wide and folded at the hem, and sleeves."""
+    rows, cols = 12, 30
+    t = np.linspace(0, 1, rows + 1)[:, None]
+    a = np.linspace(0, 2 * np.pi, cols + 1)[None]
+    half = w / 2 * np.interp(t, [0, 0.6, 0.82, 0.93, 1.0], [1.0, 0.86, 0.80, 0.42, 0.12])
+    deep = d / 2 * np.interp(t, [0, 0.6, 0.9, 1.0], [0.8, 0.9, 0.7, 0.2])
+    fold = 1 + 0.13 * (1 - t) * np.sin(7 * a + rng.uniform(0, 6) + 1.5 * t) + 0.05 * np.sin(3 * a + 4 * t)
+    x, y, z = half * np.cos(a) * fold, deep * np.sin(a) * fold, h * t + 0 * a - 0.012 * (1 - t) * np.sin(7 * a)
+    body = sheet(np.stack([x, y, z], -1))
+    sleeves = []
+    for s in (-1, 1):
+        q = np.linspace(0, 1, 8)
+        path = np.stack(
+            [s * (w * 0.34 + 0.10 * w * np.sin(np.pi * q * 0.7)), -d * 0.20 - 0.10 * d * q, h * (0.88 - 0.52 * q)], 1
+        )
+        sleeves.append(tube(path, np.interp(q, [0, 0.15, 1], [0.02, 0.047, 0.04]) * w / 0.36, 10))
+    collar = moved(scaled(ball(0.045, 12, 8), 1.3, 0.8, 0.7), 0, 0, h - 0.035)
+    return joined(body, *sleeves, collar)
+
+
+def umbrella_stand(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A tall pot with two umbrellas."""
+    w, _, h = size
+    r, pot = w / 2, h * 0.58
+    stand = lathe([(0, 0), (r * 0.92, 0), (r * 0.96, pot), (r * 0.9, pot), (r * 0.86, 0.012), (0, 0.012)], 28)
+    shafts, cloths = [], []
+    for k, lean in enumerate((0.10, -0.12)):
+        t = np.linspace(0, 1, 7)
+        foot, crook = (
+            np.array([-lean * r * 3, 0.02 * k, 0.02]),
+            np.array([lean * r * 5, 0.03 * k, h * (0.90 - 0.05 * k)]),
+        )
+        shafts.append(tube([foot, crook], 0.005, 7))
+        hook = crook + np.stack(
+            [0.032 * (1 - np.cos(np.pi * t)), 0 * t, 0.032 * np.sin(np.pi * t) + 0.01 * (t < 0.1)], 1
+        )
+        shafts.append(tube(hook, 0.008, 8))
+        along = foot + (crook - foot) * np.array([0.12, 0.3, 0.55, 0.75])[:, None]
+        cloths.append(tube(along, [0.008, 0.026, 0.032, 0.012], 10))
+    return parts_of(
+        (metal(look, finish, "black"), stand),
+        (plain((0.30, 0.20, 0.12), 0.4), shafts),
+        (plain((0.10, 0.12, 0.18), 0.7), cloths[0]),
+        (plain((0.45, 0.12, 0.12), 0.7), cloths[1]),
+    )
+
+
+def doormat(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    w, d, h = size
+    edge = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.6], 0.002)
+    mat = box([-w / 2 + 0.02, -d / 2 + 0.02, 0], [w / 2 - 0.02, d / 2 - 0.02, h], 0.004)
+    return parts_of((plain((0.06, 0.06, 0.06), 0.8), edge), (material(look, "skin", finish, "sisal/0"), mat))
+
+
+def entry_makers() -> list[Maker]:
+    made = []
+    for colour in ("black", "brown", "white", "blue"):
+        made.append(
+            maker(
+                f"shoes_{colour}",
+                "shoes",
+                f"pair of {colour} shoes",
+                (0.22, 0.29, 0.11),
+                shoes,
+                support="floor",
+                rooms={"hall": 1.0, "closet": 1.0, "bedroom": 0.2, "main_bedroom": 0.2},
+                synonyms=("pair of shoes",),
+                colours=(colour,),
+                materials=("leather",),
+                look={"colour": colour},
+            )
+        )
+    for k, wood in enumerate(("oak/0", "lacquer_white/0", "walnut/0")):
+        made.append(
+            maker(
+                f"coat_hooks_{k}",
+                "coat hooks",
+                "coat hooks with coats",
+                (0.9, 0.28, 1.1),
+                coat_hooks,
+                support="wall",
+                elevation=0.68,
+                rooms={"hall": 1.0, "closet": 0.4},
+                synonyms=("coat rack", "coats"),
+                colours=("brown", "white", "dark brown")[k : k + 1],
+                materials=("wood", "fabric"),
+                look={"wood": wood, "coats": 3 - k % 2, "seed": k, "metal": "black" if k else "brass"},
+            )
+        )
+    made.append(
+        maker(
+            "umbrella_stand",
+            "umbrella stand",
+            "stand with two umbrellas",
+            (0.24, 0.24, 0.85),
+            umbrella_stand,
+            support="floor",
+            rooms={"hall": 1.0},
+            synonyms=("umbrellas",),
+            colours=("black",),
+            materials=("metal",),
+        )
+    )
+    made.append(
+        maker(
+            "doormat",
+            "doormat",
+            "brown doormat",
+            (0.75, 0.45, 0.016),
+            doormat,
+            support="floor",
+            rooms={"hall": 1.0},
+            synonyms=("mat",),
+            colours=("brown",),
+            materials=("coir",),
+            tags=("flat",),
+        )
+    )
+    made.append(
+        maker(
+            "doormat_grey",
+            "doormat",
+            "grey doormat",
+            (0.80, 0.50, 0.016),
+            doormat,
+            support="floor",
+            rooms={"hall": 1.0},
+            synonyms=("mat",),
+            colours=("grey",),
+            materials=("coir",),
+            tags=("flat",),
+            look={"skin": "sisal/1"},
+        )
+    )
+    dict.fromkeys(
+        (
+            "living_room",
+            "kitchen",
+            "dining_room",
+            "main_bedroom",
+            "bedroom",
+            "kids_room",
+            "bathroom",
+            "hall",
+            "corridor",
+            "study",
+            "guest_room",
+            "toilet",
+        ),
+        1.0,
+    )
+    return made

@@ -1,0 +1,276 @@
+"""Shelves, bookcases, wardrobes, boxes and floor cushions."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from assets.built.maker import (
+    BLACK,
+    MIRROR,
+    STEEL,
+    FinishOf,
+    Look,
+    Maker,
+    carcass,
+    front,
+    handle,
+    maker,
+    material,
+    metal,
+    parts_of,
+    surface,
+)
+from assets.built.primitives import (
+    bar,
+    box,
+    moved,
+    pillow,
+)
+from assets.records import MeshPart, SupportSurface
+
+BOARD = 0.022
+
+
+def shelf(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A board on two brackets."""
+    w, d, h = size
+    plank = box([-w / 2, -d / 2, h - 0.028], [w / 2, d / 2, h], 0.003)
+    irons = []
+    for x in (-w / 2 + 0.12, w / 2 - 0.12):
+        irons += [
+            box([x - 0.012, d / 2 - 0.005, 0], [x + 0.012, d / 2, h - 0.028], 0.001),
+            box([x - 0.012, -d * 0.3, h - 0.034], [x + 0.012, d / 2, h - 0.028]),
+            bar([x, d / 2 - 0.004, 0.02], [x, -d * 0.25, h - 0.034], 0.010, 0.008),
+        ]
+    return parts_of((material(look, "wood", finish, "oak/0"), plank), (metal(look, finish, "black"), irons))
+
+
+def _levels(h: float, count: int) -> np.ndarray:
+    """Undersides of the boards of a bookcase with `count` shelves, and its top."""
+    return np.linspace(0.06, h - BOARD, count + 1)
+
+
+def bookcase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Sides, boards, a plinth and a thin back."""
+    w, d, h = size
+    z = _levels(h, int(look.get("shelves", 5)))
+    sides = [
+        box([-w / 2, -d / 2, 0], [-w / 2 + BOARD, d / 2, h], 0.002),
+        box([w / 2 - BOARD, -d / 2, 0], [w / 2, d / 2, h], 0.002),
+    ]
+    boards = [box([-w / 2 + BOARD, -d / 2 + 0.002, a], [w / 2 - BOARD, d / 2 - 0.006, a + BOARD], 0.0015) for a in z]
+    back = box([-w / 2 + BOARD, d / 2 - 0.006, 0.06], [w / 2 - BOARD, d / 2, h])
+    plinth = box([-w / 2 + BOARD, -d / 2 + 0.02, 0], [w / 2 - BOARD, -d / 2 + 0.038, 0.06])
+    return parts_of((material(look, "wood", finish, "oak/0"), [*sides, *boards, plinth, back]))
+
+
+def shelf_surfaces(w: float, d: float, h: float, count: int) -> tuple[SupportSurface, ...]:
+    """Support surfaces of `bookcase`, from below, and its top."""
+    z = _levels(h, count)
+    inner = [
+        surface(f"shelf_{k + 1}", float(a + BOARD), w - 2 * BOARD, d - 0.008, float(b - a - BOARD), 0.008)
+        for k, (a, b) in enumerate(itertools.pairwise(z))
+    ]
+    return (*inner, surface("top", h, w, d, 9.0 if h < 1.9 else 0.5))
+
+
+def wardrobe(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Hinged doors over a plinth, with long handles; one leaf a mirror where look['mirror'] is 1."""
+    w, d, h = size
+    y, low = -d / 2 + 0.002, 0.07
+    leaves = max(2, round(w / 0.5))
+    edges = np.linspace(-w / 2, w / 2, leaves + 1)
+    style = str(look.get("style", "flat"))
+    doors, grips, glass = [], [], []
+    for k, (a, b) in enumerate(itertools.pairwise(edges)):
+        doors.append(front(a, b, low, h - 0.02, y, style))
+        grips.append(
+            handle(b - 0.035 if k % 2 == 0 else a + 0.035, h * 0.5, y, str(look.get("handle", "bar")), True, 0.22)
+        )
+        if look.get("mirror") and k == leaves // 2:
+            glass.append(box([a + 0.02, y - 0.004, low + 0.03], [b - 0.02, y + 0.001, h - 0.05], 0.001))
+    body = carcass(-w / 2, w / 2, y + 0.02, d / 2, low, h)
+    plinth = box([-w / 2 + 0.01, -d / 2 + 0.05, 0], [w / 2 - 0.01, d / 2 - 0.02, low])
+    top = box([-w / 2, -d / 2, h - 0.018], [w / 2, d / 2, h], 0.002)
+    return parts_of(
+        (material(look, "front", finish, "lacquer_white/0"), [*doors, body, top]),
+        (BLACK, plinth),
+        (metal(look, finish, "steel"), grips),
+        (MIRROR, glass),
+    )
+
+
+def storage_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A box with a lid and a label holder."""
+    w, d, h = size
+    body = box([-w / 2 + 0.004, -d / 2 + 0.004, 0], [w / 2 - 0.004, d / 2 - 0.004, h * 0.85], 0.004)
+    lid = box([-w / 2, -d / 2, h * 0.72], [w / 2, d / 2, h], 0.005)
+    label = box([-0.035, -d / 2 + 0.002, h * 0.36], [0.035, -d / 2 + 0.005, h * 0.52], 0.001)
+    return parts_of((material(look, "skin", finish, "linen/2"), [body, lid]), (STEEL, label))
+
+
+def bean_bag(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A floor cushion, thick and round."""
+    w, d, h = size
+    return parts_of((material(look, "cloth", finish, "linen/9"), moved(pillow(w, d, h, 16, 0.28), 0, 0, h / 2)))
+
+
+def storage_makers() -> list[Maker]:
+    made = []
+    living = {
+        "living_room": 1.0,
+        "study": 1.0,
+        "library": 2.0,
+        "family_room": 0.8,
+        "kids_room": 0.7,
+        "bedroom": 0.6,
+        "guest_room": 0.4,
+    }
+    for wood, colour in (
+        ("oak/0", "brown"),
+        ("walnut/0", "dark brown"),
+        ("lacquer_white/0", "white"),
+        ("lacquer_black/0", "black"),
+        ("pine/0", "yellow"),
+    ):
+        stem = wood.split("/")[0].replace("lacquer_", "")
+        look = {"wood": wood}
+        words = {"colours": (colour,), "materials": ("wood",)}
+        made.append(
+            maker(
+                f"shelf_{stem}",
+                "open wall shelf",
+                f"{stem} wall shelf",
+                (0.9, 0.22, 0.18),
+                shelf,
+                support="wall",
+                elevation=1.4,
+                rooms={**living, "kitchen": 0.6, "bathroom": 0.4},
+                synonyms=("shelf",),
+                surfaces=(surface("top", 0.18, 0.9, 0.22, 0.8),),
+                look=look,
+                **words,
+            )
+        )
+        for name, size, count in (
+            ("tall", (0.8, 0.30, 2.02), 6),
+            ("low", (1.0, 0.32, 0.90), 2),
+            ("wide", (1.4, 0.32, 1.90), 5),
+            ("slim", (0.42, 0.28, 1.95), 6),
+        ):
+            made.append(
+                maker(
+                    f"bookcase_{name}_{stem}",
+                    "bookcase",
+                    f"{name} {stem} bookcase",
+                    size,
+                    bookcase,
+                    support="against_wall",
+                    rooms=living,
+                    clearance=0.6,
+                    synonyms=("bookshelf", "shelves"),
+                    surfaces=shelf_surfaces(*size, count),
+                    tags=(name,),
+                    look={**look, "shelves": count},
+                    **words,
+                )
+            )
+    beds = {"bedroom": 1.0, "main_bedroom": 1.0, "guest_room": 1.0, "closet": 1.0, "kids_room": 0.6}
+    for name, fronts, colour, style, grip, metal_name in (
+        ("white", "lacquer_white/0", "white", "flat", "bar", "steel"),
+        ("oak", "oak/0", "brown", "flat", "bar", "black"),
+        ("sage", "lacquer_sage_green/0", "green", "shaker", "knob", "brass"),
+        ("walnut", "walnut/0", "dark brown", "flat", "knob", "brass"),
+        ("cream", "lacquer_cream/0", "cream", "shaker", "knob", "steel"),
+    ):
+        for width in (1.0, 1.5, 2.0):
+            made.append(
+                maker(
+                    f"wardrobe_{name}_{round(width * 100)}",
+                    "wardrobe",
+                    f"{name} wardrobe",
+                    (width, 0.6, 2.1),
+                    wardrobe,
+                    support="against_wall",
+                    rooms=beds,
+                    clearance=0.8,
+                    synonyms=("closet", "cupboard"),
+                    colours=(colour,),
+                    materials=("wood",),
+                    tags=("wide",) if width > 1.6 else (),
+                    look={
+                        "front": fronts,
+                        "style": style,
+                        "handle": grip,
+                        "metal": metal_name,
+                        "mirror": float(width == 2.0 and style == "flat"),
+                    },
+                )
+            )
+    for name, skin, colour in (
+        ("grey", "linen/2", "grey"),
+        ("natural", "wicker/0", "beige"),
+        ("white", "lacquer_white/0", "white"),
+        ("blue", "cotton/3", "blue"),
+        ("leather", "leather/2", "brown"),
+    ):
+        made.append(
+            maker(
+                f"storage_box_{name}",
+                "storage box",
+                f"{name} storage box",
+                (0.32, 0.36, 0.20),
+                storage_box,
+                on=("bookcase", "shelving unit", "wardrobe", "storage shelf", "cupboard", "open wall shelf"),
+                rooms={
+                    "closet": 1.0,
+                    "study": 0.7,
+                    "kids_room": 1.0,
+                    "laundry_room": 0.8,
+                    "pantry": 0.6,
+                    "garage": 0.4,
+                    "bedroom": 0.4,
+                    "playroom": 1.0,
+                },
+                synonyms=("box",),
+                colours=(colour,),
+                materials=("fabric",),
+                look={"skin": skin},
+            )
+        )
+    dict.fromkeys(
+        (
+            "living_room",
+            "kitchen",
+            "dining_room",
+            "main_bedroom",
+            "bedroom",
+            "kids_room",
+            "bathroom",
+            "hall",
+            "corridor",
+            "study",
+            "guest_room",
+            "toilet",
+        ),
+        1.0,
+    )
+    for name, cloth in (("teal", "linen/9"), ("mustard", "linen/7"), ("grey", "tweed/0")):
+        made.append(
+            maker(
+                f"floor_cushion_{name}",
+                "floor cushion",
+                f"{name} floor cushion",
+                (0.65, 0.65, 0.22),
+                bean_bag,
+                support="floor",
+                rooms={"kids_room": 1.0, "playroom": 1.0, "living_room": 0.3, "library": 0.4},
+                synonyms=("cushion", "pouffe"),
+                colours=(name,),
+                materials=("fabric",),
+                look={"cloth": cloth},
+            )
+        )
+    return made
