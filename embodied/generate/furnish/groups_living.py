@@ -25,12 +25,12 @@ RUG_HEIGHT = 0.012
 def seating(ctx: Context) -> list[Thing] | None:
     """Sofa before a television or a fireplace, over a coffee table on a rug."""
     fire = ctx.kind in ("living_room", "library") and ctx.chance(0.25)
-    heart = ctx.pick("fireplace") if fire else None
+    heart = ctx.pick("fire") if fire else None
     stand = heart or ctx.pick("media unit", most=(2.2, 0.75, 1.7)) or ctx.pick("tv bench", most=(2.2, 0.7, 1.0))
     if stand is None:
         return None
     screen = None
-    if heart is None and stand.size[2] < 1.0:
+    if heart is None and stand.size[2] < 1.0 and ctx.chance(0.75):
         fits = (max(stand.size[0] - 0.05, 0.6), 0.5, 1.2)
         screen = ctx.pick("television", least=(0.7, 0, 0), most=fits) or ctx.pick("television", most=fits)
     for rich in (2, 1, 0):
@@ -78,7 +78,7 @@ def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance,
     rng = ctx.rng
     width, depth = sofa.size[:2]
     front = -(distance - depth)
-    role = "fireplace" if stand.object_class == "fireplace" else "tv stand"
+    role = "fireplace" if stand.object_class in ("fireplace", "wood stove") else "tv stand"
     items = [
         Item(stand, 0.0, -stand.size[1] / 2, role=role),
         Item(sofa, 0.0, -(distance - depth / 2), math.pi, role="sofa"),
@@ -245,7 +245,7 @@ def table_items(ctx: Context, table: Asset, chair: Asset, wall: bool = False) ->
     y0 = -d / 2 if wall else 0.0
     items = [Item(table, 0.0, y0, role="dining table")]
     cw, cd = chair.size[:2]
-    tuck = 0.0 if "arms" in chair.tags else min(0.18, cd * 0.3)
+    tuck = 0.0 if "arms" in chair.tags or cw > 0.495 else min(0.18, cd * 0.3)  # wide chairs have arms
     rug = ctx.pick("carpet")
     if rug is not None and not wall and ctx.kind in ("dining_room", "living_room") and ctx.chance(0.55):
         items.append(Item(rug, 0.0, 0.0, size=(w + 1.3, d + 1.3, RUG_HEIGHT), optional=True, role="rug"))

@@ -45,7 +45,11 @@ def living_room(ctx: Context) -> None:
         work.corner_thing(ctx, "bean bag")
     if ctx.chance(0.25):
         work.corner_thing(ctx, "floor vase")
-    if ctx.stock.style.name == "classic" and area > 28 and ctx.chance(0.4):
+    if ctx.chance(0.12):
+        work.corner_thing(ctx, "pet", most=(0.5, 1.0, 0.9))
+    if ctx.chance(0.35):
+        work.beside(ctx, "basket", ("sofa", "fireplace", "armchair"), most=(0.6, 0.6, 0.7))
+    if area > 30 and ctx.chance(0.3):
         work.in_the_open(ctx, "grand piano")
 
 
@@ -88,8 +92,10 @@ def bedroom(ctx: Context) -> None:
     area = ctx.space.area
     if ctx.attempt >= 2:
         sleep.wardrobe(ctx)
-    if ctx.kind == "main_bedroom" or (area > 10.5 and ctx.chance(0.6)) or ctx.kind == "guest_room":
+    if ctx.kind == "main_bedroom" or (area > 10.5 and ctx.chance(0.6)):
         sleep.double_bed(ctx) or sleep.single_bed(ctx)
+    elif ctx.kind == "guest_room" and ctx.chance(0.35):
+        sleep.single_bed(ctx, "sofa to sleep on") or sleep.single_bed(ctx)
     else:
         sleep.single_bed(ctx) or sleep.double_bed(ctx)
     if not ctx.roles("bed"):
@@ -115,6 +121,10 @@ def bedroom(ctx: Context) -> None:
         work.beside(ctx, "bin", ("desk",), most=(0.35, 0.35, 0.45))
     if ctx.chance(0.3):
         work.corner_thing(ctx, "laundry basket")
+    if ctx.chance(0.5):
+        work.beside(ctx, "slippers", ("bed",))
+    if area > 16 and ctx.chance(0.15):
+        work.storage(ctx, "folding screen", clear=0.0)
     if ctx.kind == "guest_room" and ctx.chance(0.5):
         work.corner_thing(ctx, "suitcase")
     if ctx.kind == "bedroom" and ctx.chance(0.2):
@@ -159,8 +169,8 @@ def bathroom(ctx: Context) -> None:
     done = done or wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
     if done and area > 6.5 and first == "bathtub":
         wet.bathing(ctx, "shower")
-    if area > 7.5 and ctx.chance(0.3):
-        work.storage(ctx, "bidet", clear=0.5)
+    if area > 5.5 and ctx.chance(0.3):
+        work.storage(ctx, "bidet", clear=0.45)
     if area > 5 and "laundry_room" not in ctx.kinds and ctx.chance(0.7):
         work.machines(ctx)
     work.corner_thing(ctx, "laundry basket", most=(0.6, 0.6, 0.8))
@@ -219,7 +229,9 @@ def study(ctx: Context) -> None:
     work.desk(ctx)
     for _ in range(1 + (area > 8) + (area > 12)):
         work.bookshelf(ctx)
-    work.storage(ctx, "office storage")
+    work.storage(ctx, "office storage", most=(3.1, 0.7, 2.2))
+    if area > 9 and ctx.chance(0.5):
+        work.corner_thing(ctx, "side chair", most=(0.7, 0.7, 1.2))
     if area > 8:
         living.reading_corner(ctx)
     if area > 10 and ctx.chance(0.4):

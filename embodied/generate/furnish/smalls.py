@@ -17,6 +17,14 @@ from embodied.generate.furnish.space import box, overlap
 
 EDGE = 0.012
 """Free strip at the edge of a surface, metres."""
+SEATS = {
+    "sofa": (0.16, 0.36), "corner sofa": (0.3, 0.3), "armchair": (0.14, 0.34), "rattan sofa": (0.1, 0.3),
+    "bed": (0.05, 0.24), "child bed": (0.05, 0.24), "day bed": (0.05, 0.24), "bunk bed": (0.1, 0.24),
+    "lounge chair": (0.14, 0.4), "sofa bed": (0.16, 0.36),
+}
+"""Object class to the width of its arms in metres and the share of its depth that back or pillows take."""
+BOWLS = ("bathtub", "corner bathtub", "washbasin", "wall washbasin", "shower", "kitchen sink")
+"""Object classes whose middle is hollow: only their rims carry things."""
 
 
 @dataclass
@@ -53,6 +61,10 @@ class Tops:
         ctx, rng = self.ctx, self.ctx.rng
         kx, ky, kz = (a / b for a, b in zip(parent.size, parent.asset.size))
         x0, x1, y0, y1 = surface.x0 * kx, surface.x1 * kx, surface.y0 * ky, surface.y1 * ky
+        if parent.asset.object_class in SEATS:  # keep off arms, back and pillows
+            arm, back = SEATS[parent.asset.object_class]
+            x0, x1 = max(x0, arm - parent.size[0] / 2), min(x1, parent.size[0] / 2 - arm)
+            y1 = min(y1, (0.5 - back) * parent.size[1])
         w, d, h = size or asset.size
         if h > surface.headroom * kz - 0.01:
             return None
@@ -119,7 +131,7 @@ def clutter(ctx: Context) -> None:
     tops = Tops(ctx)
     tops.start()
     density = 1.3 - 0.75 * ctx.stock.style.tidiness
-    carriers = [t for t in ctx.things if t.asset.surfaces]
+    carriers = [t for t in ctx.things if t.asset.surfaces and not _hollow(t.asset)]
     for thing in carriers:
         if thing.role == "dining table":
             _set_table(tops, thing)
@@ -141,6 +153,12 @@ def clutter(ctx: Context) -> None:
         _shelves(tops, thing, density)
     for thing in carriers:
         _more(tops, thing, density)
+
+
+def _hollow(asset: Asset) -> bool:
+    """Whether its one surface is the opening of a bowl rather than a rim."""
+    return asset.object_class in BOWLS and max(
+        (s.x1 - s.x0) * (s.y1 - s.y0) for s in asset.surfaces) > 0.5 * asset.size[0] * asset.size[1]
 
 
 def _main(thing: Thing) -> SupportSurface:
@@ -207,12 +225,12 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
     )
     if not boards or thing.asset.object_class not in SHELVES:
         return
-    books = ctx.stock.of_role("books") or ctx.stock.of_role("row of books")
+    books = ctx.pick("row of books", avoid=())
     bookish = ctx.kind not in ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
     kx, ky, kz = (a / b for a, b in zip(thing.size, thing.asset.size))
     for board in boards:
-        if books and bookish and ctx.chance(0.8):
-            _book_row(tops, thing, board, books[0], (kx, ky, kz))
+        if books is not None and bookish and ctx.chance(0.8):
+            _book_row(tops, thing, board, ctx.pick("row of books", avoid=()), (kx, ky, kz))
         for _ in range(int(ctx.rng.integers(1, 4))):
             if not ctx.chance(0.75 * density):
                 continue
@@ -246,9 +264,16 @@ def _book_row(tops: Tops, thing: Thing, board: SupportSurface, books: Asset, sca
 def _resident(tops: Tops, thing: Thing, board: SupportSurface) -> Asset | None:
     """Something that is kept on such a board in such a room."""
     ctx = tops.ctx
+    most = ((board.x1 - board.x0) * 0.8, board.y1 - board.y0, board.headroom - 0.01)
+    fitting = [(a, w) for a, w in resting_on(ctx, thing.asset.object_class)
+               if a.object_class != "row of books" and all(s <= m for s, m in zip(a.size, most))]
+    if fitting and ctx.chance(0.45):
+        weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in fitting])
+        asset = fitting[int(ctx.rng.choice(len(fitting), p=weights / weights.sum()))][0]
+        return asset if tops.allows(asset) else None
     roles = CLUTTER.get(ctx.kind) or CLUTTER["any"]
     role = roles[int(ctx.rng.integers(len(roles)))]
-    asset = ctx.pick(role, most=((board.x1 - board.x0) * 0.8, board.y1 - board.y0, board.headroom - 0.01))
+    asset = ctx.pick(role, most=most)
     return asset if asset is not None and tops.allows(asset) else None
 
 

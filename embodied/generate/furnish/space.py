@@ -271,6 +271,16 @@ def room_space(house: House, room: Room) -> RoomSpace:
     space = RoomSpace(
         room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin,
     )
+    for wall in walls:
+        for s0, s1, o in wall.openings:
+            if o.rooms[0] == room.id and o.angle > 0.5 and o.kind in ("door", "front_door", "back_door"):
+                shut = walk.copy()
+                cv2.fillConvexPoly(shut, space._cells(_leaf(wall, s0, s1, o).corners(radius - 0.05)), 0)
+                if space.walkable((), ()) is not None:
+                    space.walk, before = shut, space.walk
+                    if space.walkable((), ()) is None:
+                        space.walk = before
+    walk = space.walk
     for b in flights:
         if b.top - storey.elevation > 2.3:
             cv2.fillConvexPoly(walk, space._cells(b.corners(radius - 0.02)), 0)
@@ -326,6 +336,17 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     if swings_here:
         depth = max(depth, width + 0.05)
     return [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
+
+
+def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
+    """The open leaf of a door that swings into the room."""
+    hinge = o.a if o.hinge == "a" else o.b
+    at = (hinge[0] - wall.start[0]) * wall.along[0] + (hinge[1] - wall.start[1]) * wall.along[1]
+    width, sign = s1 - s0, 1.0 if abs(at - s0) < abs(at - s1) else -1.0
+    u, v = sign * math.cos(o.angle), math.sin(o.angle)
+    dx, dy = u * wall.along[0] + v * wall.inward[0], u * wall.along[1] + v * wall.inward[1]
+    x, y = wall.point(s0 if sign > 0 else s1)
+    return box(x + dx * width / 2, y + dy * width / 2, width, 0.05, math.atan2(dy, dx), 0.0, 2.0)
 
 
 def _stair_keepouts(stair, z: float, height: float) -> list[Box]:

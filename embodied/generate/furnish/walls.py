@@ -19,6 +19,7 @@ PLAIN = ("garage", "workshop", "pantry", "closet", "laundry_room", "stairwell")
 def hang_all(ctx: Context) -> None:
     """Everything on walls and ceiling, after the furniture stands."""
     ceiling_lamps(ctx)
+    detectors(ctx)
     switches(ctx)
     if ctx.chance(0.5):
         radiators(ctx)
@@ -86,7 +87,7 @@ def ceiling_lamps(ctx: Context) -> None:
         nx, ny = max(1, round(wx / 3.0)), max(1, round(wy / 3.0))
     spots = []
     for table in tables:
-        pendant = ctx.pick("fine pendant", most=(1.2, 1.2, 1.4)) or lamp
+        pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
         if _ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
             spots.append((table.x, table.y))
     centre = space.polygon.representative_point() if not space.polygon.contains(space.polygon.centroid) else \
@@ -106,11 +107,27 @@ def ceiling_lamps(ctx: Context) -> None:
                 return
 
 
+def detectors(ctx: Context) -> None:
+    """A smoke detector on the ceiling of halls, corridors and bedrooms."""
+    if ctx.kind not in ("hall", "corridor", "main_bedroom", "kids_room") or not ctx.chance(0.6):
+        return
+    asset = ctx.pick("smoke detector")
+    c = ctx.space.polygon.representative_point()
+    if asset is not None:
+        for dx, dy in ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0)):
+            if _ceiling(ctx, asset, c.x + dx, c.y + dy, None):
+                return
+
+
 def _ceiling_lamp(ctx: Context) -> Asset | None:
     """One model for the whole room; flat ones where people walk close beneath."""
     height = ctx.space.height
     if ctx.kind in ("garage", "workshop"):
         found = ctx.pick("fluorescent lamp", avoid=())
+        if found is not None:
+            return found
+    if ctx.kind in ("living_room", "study", "kitchen", "gym") and ctx.chance(0.12):
+        found = ctx.pick("track light" if ctx.chance(0.6) else "ceiling fan", most=(1.3, 1.3, 0.45), avoid=())
         if found is not None:
             return found
     low = ctx.kind in (*WET, "corridor", "pantry", "closet", "laundry_room", "toilet", "gym", "stairwell")
@@ -301,12 +318,13 @@ def mirrors(ctx: Context) -> None:
     if mirror is None:
         return
     sizes = [(2.4, 1.6), (1.6, 1.6)] if ctx.kind == "gym" else []
+    low = 1.2 if "round" in mirror.tags else 0.25
     for w, h in (*sizes, (0.6, 1.6), (0.5, 1.3)):
         size = _mirror_size(ctx, mirror, w, h)
         for wall in sorted(ctx.space.walls, key=lambda w: -w.length):
             for a, b in _stretches(wall):
                 for share in (0.5, 0.25, 0.75):
-                    if mount(ctx, mirror, wall, a + share * (b - a), 0.25, "mirror", size=size, margin=0.03):
+                    if mount(ctx, mirror, wall, a + share * (b - a), low, "mirror", size=size, margin=0.03):
                         return
 
 
@@ -341,13 +359,18 @@ def switches(ctx: Context) -> None:
     asset = ctx.stock.pick("switch", rng=ctx.rng)
     if asset is None:
         return
+    double = ctx.stock.pick("dimmer switch" if ctx.chance(0.3) else "double light switch", rng=ctx.rng)
+    if double is not None and ctx.chance(0.25) and ctx.space.area > 12:
+        asset = double
+    left = 2 if ctx.kind not in ("hall", "corridor") else 3
     for wall in ctx.space.walls:
         for s0, s1, o in wall.openings:
-            if o.kind in ("window", "french_window"):
+            if o.kind in ("window", "french_window", "passage") or not left:
                 continue
             hinge_at_s0 = abs(_along(wall, o.a if o.hinge == "a" else o.b) - s0) < 1e-6
             for at in ((s1 + 0.2, s0 - 0.2) if hinge_at_s0 else (s0 - 0.2, s1 + 0.2)):
                 if mount(ctx, asset, wall, at, 1.06, "electric", role="light switch"):
+                    left -= 1
                     break
 
 
@@ -361,7 +384,9 @@ def sockets(ctx: Context) -> None:
     if asset is None or ctx.kind in (*WET, "closet"):
         return
     z = 1.1 if ctx.kind == "kitchen" else 0.26
-    left = 2 + (ctx.space.area > 14)
+    if ctx.kind == "kitchen" and ctx.chance(0.5):
+        asset = ctx.stock.pick("double socket", rng=ctx.rng) or asset
+    left = 1 + (ctx.space.area > 9) + (ctx.space.area > 20)
     for wall in sorted(ctx.space.walls, key=lambda w: -w.length):
         for share in (0.12, 0.88):
             if left and wall.length > 1.2 and mount(ctx, asset, wall, wall.length * share, z, "electric",
@@ -444,10 +469,14 @@ def oddities(ctx: Context) -> None:
         wanted += [("hanging clothes", 0.8, 0.55, 0.02), ("suit", 0.5, 1.2, 0.02), ("hanging clothes", 0.5, 0.55, 0.02)]
     if ctx.kind == "garage":
         wanted.append(("security camera", 0.2, height - 0.4, 0.1))
+    if ctx.kind in ("study", "living_room"):
+        wanted.append(("network socket" if ctx.kind == "study" else "aerial socket", 0.7, 0.26, 0.0))
+    if ctx.kind in ("dining_room", "living_room", "study"):
+        wanted.append(("thermometer", 0.05, 1.4, 0.1))
     for role, chance, z, margin in wanted:
         if not ctx.chance(chance):
             continue
-        asset = ctx.pick(role, most=(3.0, 0.8, height - z - 0.02))
+        asset = ctx.pick(role, most=(3.0, 0.8, height - z - 0.02), where=lambda a: a.support == "wall")
         for wall in sorted(ctx.space.walls, key=lambda w: (has_window(w), -w.length)):
             if mount(ctx, asset, wall, wall.length * ctx.rng.uniform(0.3, 0.7), z, "wall", margin=margin, role=role):
                 break
