@@ -1,0 +1,176 @@
+"""The stages from a seed to a House, each a function from Draft to Draft that can be replaced."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from assets.catalogue import Catalogue, load_catalogue
+from embodied.generate.clearing import cleared
+from embodied.generate.config import HouseConfig
+from embodied.generate.finishes import Palette, draw_palette, dressed
+from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
+from embodied.generate.furnish import furnish
+from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
+from embodied.generate.openings import draw_openings
+from embodied.generate.program import Space, draw_area, draw_program
+from embodied.house import House, HouseError, Room, Sky, Storey, check
+from embodied.navgraph import unreachable_rooms
+from embodied.seeds import stream
+
+TRIES = 14000
+"""Candidate plans per attempt, times rooms wanted: large houses get fewer."""
+ATTEMPTS = 12
+DEFAULT = HouseConfig()
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A house in the making; each stage fills in its field."""
+
+    seed: int
+    config: HouseConfig
+    catalogue: Catalogue | None
+    area: float = 0.0
+    shape: str = "rectangle"
+    footprints: tuple[Footprint, ...] = ()
+    """Alternatives of one shape and area, among which the rooms stage chooses."""
+    spaces: tuple[Space, ...] = ()
+    plan: Plan | None = None
+    palette: Palette | None = None
+    house: House | None = None
+
+
+def footprint(draft: Draft) -> Draft:
+    """Total area, shape and thirty footprints of it."""
+    area = draw_area(draft.config, rng=stream(draft.seed, "house", "area"))
+    rng = stream(draft.seed, "house", "footprint")
+    shape = draw_shape(area, draft.config, rng=rng)
+    return dataclasses.replace(
+        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(30)))
+
+
+def program(draft: Draft) -> Draft:
+    """The rooms wanted."""
+    return dataclasses.replace(
+        draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program")))
+
+
+def rooms(draft: Draft, first: int = 0) -> Draft:
+    """The best of many plans; `first` skips attempts that turned out badly."""
+    for attempt in range(first, ATTEMPTS):
+        rng = stream(draft.seed, "house", "rooms", attempt)
+        footprints, spaces = draft.footprints, draft.spaces
+        if attempt:
+            footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
+            spaces = draw_program(draft.area, draft.config, rng=rng)
+        plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
+        if plan is not None:
+            return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
+    raise HouseError(f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
+                     f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms")
+
+
+def openings(draft: Draft) -> Draft:
+    """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
+    palette = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette"))
+    for attempt in range(2 * ATTEMPTS):
+        rng = stream(draft.seed, "house", "openings", attempt)
+        house = _bare_house(draft, palette, rng)
+        if not unreachable_rooms(house):
+            return dataclasses.replace(draft, palette=palette, house=house)
+        if attempt % 4 == 3:
+            draft = rooms(draft, first=1 + attempt // 4)
+    raise HouseError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
+
+
+def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> House:
+    disorder = draft.config.disorder
+    if disorder is None:
+        disorder = round(float(stream(draft.seed, "house", "disorder").beta(1.6, 2.2)), 3)
+    counts: dict[str, int] = {}
+    names = []
+    for c in draft.plan.cells:
+        counts[c.kind] = counts.get(c.kind, 0) + 1
+        names.append(f"{c.kind}_{counts[c.kind]}")
+    height = round(float(rng.choice([2.45, 2.5, 2.6, 2.7, 2.9, 3.0], p=[0.15, 0.25, 0.3, 0.17, 0.08, 0.05])), 2)
+    open_plan = draft.config.open_plan
+    if open_plan is None:
+        open_plan = bool(rng.random() < 0.6)
+    made = []
+    for c, name in zip(draft.plan.cells, names):
+        x0, y0, x1, y1 = (v / 10 for v in c.rect)
+        made.append(Room(name, c.kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), palette.floor, palette.walls[0],
+                         palette.ceiling, palette.skirting))
+    doors = draw_openings(draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height,
+                          open_plan, rng=rng)
+    return House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), (),
+                 style=palette.style, disorder=disorder)
+
+
+def finishes(draft: Draft) -> Draft:
+    """What every room wears, and the weather outside."""
+    sky = draw_sky(draft.config, stream(draft.seed, "house", "sky"))
+    house = dressed(draft.house, draft.palette, rng=stream(draft.seed, "house", "finishes"))
+    return dataclasses.replace(draft, house=dataclasses.replace(house, sky=sky))
+
+
+def draw_sky(config: HouseConfig, rng) -> Sky:
+    """Daytime mostly; `config` may fix hour and weather."""
+    hour = config.hour if config.hour is not None else round(float(rng.triangular(8.0, 12.0, 18.0)), 2)
+    weather = config.weather or str(rng.choice(["clear", "hazy", "overcast"], p=[0.55, 0.25, 0.2]))
+    return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4))
+
+
+def furnishing(draft: Draft) -> Draft:
+    """Furniture, wall and ceiling things, small things and lights."""
+    catalogue = draft.catalogue if draft.catalogue is not None else load_catalogue()
+    house = furnish(draft.house, catalogue, seed=draft.seed)
+    return dataclasses.replace(draft, house=house)
+
+
+def clearing(draft: Draft) -> Draft:
+    """Every room can be entered on foot; whatever stood in the way is gone."""
+    return dataclasses.replace(draft, house=cleared(draft.house))
+
+
+def checking(draft: Draft) -> Draft:
+    """Refuse what cannot be."""
+    check(draft.house)
+    return draft
+
+
+STAGES: Mapping[str, Callable[[Draft], Draft]] = {
+    "footprint": footprint, "program": program, "rooms": rooms, "openings": openings, "finishes": finishes,
+    "furnish": furnishing, "clear": clearing, "check": checking,
+}
+
+
+def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None,
+                   stages: Mapping[str, Callable[[Draft], Draft]] = STAGES) -> House:
+    """The house that belongs to `seed`: the same in every process and on every machine.
+
+    Args:
+      seed: any integer.
+      config: what to fix; the rest is drawn.
+      catalogue: assets to furnish with; the reviewed one by default.
+      stages: name to stage, run in order; replace one with {**STAGES, "rooms": mine}.
+
+    Raises:
+      HouseError: the configuration cannot be built.
+    """
+    draft = Draft(seed, config, catalogue)
+    for stage in stages.values():
+        draft = stage(draft)
+    return draft.house
+
+
+def _title(draft: Draft) -> str:
+    beds = sum(s.kind in ("main_bedroom", "bedroom", "kids_room", "guest_room") for s in draft.spaces)
+    shape = "" if draft.shape == "rectangle" else f"{draft.shape}-shaped "
+    what = "flat" if draft.area < 75 else "house"
+    return f"{shape}{what} with {beds} bedroom{'s' if beds > 1 else ''}, {draft.area:.0f} m2"
