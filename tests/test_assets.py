@@ -1,0 +1,295 @@
+"""Truths about packs, import and the reviewed catalogue."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from assets.attribution import attribution
+from assets.catalogue import DATA, load_catalogue
+from assets.importer import Recipe, bounds, finish_parts, read_obj
+from assets.obj import MeshError, parse_obj
+from assets.packs import find_packs
+from assets.records import ROOM_KINDS, SUPPORTS
+from assets.rows import CatalogueError
+from assets.sh3f import MAX_ENTRY, PackError, open_pack
+from assets.surfaces import contact, find_surfaces
+
+SOME = (
+    "scopia/bed1", "blendswap-cc-0/oakTable", "blendswap-cc-by/bookcase", "scopia/tubular_chair", "scopia/toaster",
+    "katorlegaz/office-chair", "blendswap-cc-by/beer_bottle", "scopia/saloon_lamp",
+)
+"""A handful of models to import; every one would take minutes."""
+
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    + ["f 1 3 4 2", "f 5 6 8 7", "f 1 2 6 5", "f 3 7 8 4", "f 1 5 7 3", "f 2 4 8 6"]
+)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def catalogue(cache):
+    assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
+    return load_catalogue(cache)
+
+
+def write_pack(path: Path, entries: dict[str, str | bytes], model: str = "mine/box/box.obj") -> Path:
+    rows = f"license=CC0-1.0\nid#1=box\nname#1=Box\nmodel#1=/{model}\nwidth#1=40\ndepth#1=30\nheight#1=20\ncreator#1=Me\n"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as z:
+        z.writestr("PluginFurnitureCatalog.properties", rows)
+        for name, data in entries.items():
+            z.writestr(name, data)
+    return path
+
+
+def write_own(folder: Path, models: dict, classes: dict | None = None) -> Path:
+    folder.mkdir(exist_ok=True)
+    body = {"pack": "mine", "creator": "Me", "licence": "CC0-1.0", "classes": classes or {}, "models": models}
+    (folder / "catalogue.json").write_text(json.dumps(body))
+    return folder
+
+
+# the reviewed catalogue
+
+def test_catalogue_has_enough_classes_and_models():
+    pack = [a for a in load_catalogue().assets.values() if not a.key.startswith("built/")]
+    assert len(pack) >= 400
+    assert len(load_catalogue().classes) >= 289
+
+
+def test_every_word_of_the_catalogue_is_legal():
+    catalogue = load_catalogue()
+    classes = set(catalogue.classes) | set(json.loads((DATA / "classes.json").read_text()))
+    for a in catalogue.assets.values():
+        assert a.support in SUPPORTS and set(a.rooms) <= set(ROOM_KINDS), a.key
+        assert a.name and a.object_class == a.object_class.lower().strip(), a.key
+        assert all(0.0003 < s < 4 for s in a.size), a.key
+        assert len(set(a.tags)) == len(a.tags), a.key
+        if not a.key.startswith("built/"):
+            assert a.creator and a.licence, a.key
+            assert (a.support == "surface") == bool(a.on), f"{a.key} needs `on` exactly if it rests on surfaces"
+            assert a.rooms or {"person", "built_in"} & set(a.tags), a.key
+    assert {o for a in catalogue.assets.values() if not a.key.startswith("built/") for o in a.on} & classes
+
+
+def test_surfaces_lie_within_their_model():
+    for a in load_catalogue().assets.values():
+        assert len({s.name for s in a.surfaces}) == len(a.surfaces), a.key
+        for s in a.surfaces:
+            assert -a.size[0] / 2 - 0.005 <= s.x0 < s.x1 <= a.size[0] / 2 + 0.005, (a.key, s)
+            assert -a.size[1] / 2 - 0.005 <= s.y0 < s.y1 <= a.size[1] / 2 + 0.005, (a.key, s)
+            assert 0 < s.z <= a.size[2] + 0.002 and s.headroom > 0, (a.key, s)
+
+
+def test_every_model_of_the_packs_is_used_or_excluded_for_a_reason(catalogue):
+    excluded = json.loads((DATA / "excluded.json").read_text())
+    known = {key for path in find_packs() for key in open_pack(path).entries}
+    used = {k for k in catalogue.assets if not k.startswith("built/")}
+    assert not used & set(excluded)
+    assert used | set(excluded) == known
+    assert all(reason for reason in excluded.values())
+
+
+def test_attribution_names_every_maker(catalogue):
+    text = attribution(catalogue)
+    for a in catalogue.assets.values():
+        if not a.key.startswith("built/"):
+            assert a.creator in text and a.key.split("/", 1)[1] in text
+
+
+# import
+
+@pytest.mark.parametrize("key", SOME)
+def test_imported_models_have_the_size_of_the_catalogue(catalogue, key):
+    low, high = bounds(catalogue.mesh(key))
+    np.testing.assert_allclose(high - low, catalogue.assets[key].size, atol=0.01)
+    np.testing.assert_allclose([*(low + high)[:2] / 2, low[2]], 0.0, atol=0.005)
+
+
+@pytest.mark.parametrize("key", SOME)
+def test_imported_meshes_are_sound(catalogue, key):
+    for p in catalogue.mesh(key):
+        assert len(p.vertices) == len(p.normals) == len(p.uv)
+        assert p.faces.min() >= 0 and p.faces.max() < len(p.vertices)
+        assert all(np.isfinite(a).all() for a in (p.vertices, p.normals, p.uv))
+        np.testing.assert_allclose(np.linalg.norm(p.normals, axis=1), 1.0, atol=1e-3)
+        corners = p.vertices[p.faces]
+        flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert (np.einsum("ij,ij->i", flat, p.normals[p.faces].sum(axis=1)) > 0).mean() > 0.99
+        assert p.finish.texture is None or Path(p.finish.texture).is_file()
+
+
+@pytest.mark.parametrize("key", SOME)
+def test_things_put_on_a_surface_touch_the_mesh(catalogue, key):
+    for s in catalogue.assets[key].surfaces:
+        assert contact(catalogue.mesh(key), s) >= 0.95, (key, s)
+
+
+def test_mesh_is_stretched_to_the_size_asked_for(catalogue):
+    low, high = bounds(catalogue.mesh("scopia/toaster", (0.5, 0.2, 0.4)))
+    np.testing.assert_allclose(high - low, (0.5, 0.2, 0.4), atol=0.01)
+
+
+def test_import_is_the_same_every_time(catalogue, tmp_path):
+    for a, b in zip(catalogue.mesh(SOME[0]), load_catalogue(tmp_path).mesh(SOME[0]), strict=True):
+        for field in ("vertices", "faces", "normals", "uv"):
+            np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
+
+
+@pytest.mark.parametrize("damage", [lambda p: p.write_bytes(p.read_bytes()[:-100]), lambda p: p.unlink(),
+                                    lambda p: p.write_bytes(b"x" * 50)])
+@pytest.mark.parametrize("suffix", ["npz", "json", "png"])
+def test_a_damaged_cache_is_repaired(tmp_path, damage, suffix):
+    key = "scopia/toaster"
+    before = load_catalogue(tmp_path).mesh(key)
+    file = next((tmp_path / "assets").rglob(f"*.{suffix}"))
+    whole = file.read_bytes()
+    damage(file)
+    after = load_catalogue(tmp_path).mesh(key)
+    assert all((a.vertices == b.vertices).all() for a, b in zip(before, after, strict=True))
+    assert suffix == "npz" or file.read_bytes() == whole
+
+
+def test_a_missing_pack_is_named_with_the_remedy(tmp_path):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(PackError, match="sweethome3d-furniture"):
+        load_catalogue(tmp_path, packs=[tmp_path / "empty"]).mesh("scopia/bed1")
+    with pytest.raises(PackError, match="does not exist"):
+        find_packs([tmp_path / "none.sh3f"])
+
+
+def test_an_unknown_asset_is_named(catalogue):
+    with pytest.raises(CatalogueError, match="no asset 'scopia/unicorn'"):
+        catalogue.mesh("scopia/unicorn")
+
+
+# polygons
+
+def test_a_concave_polygon_is_filled_exactly():
+    u = "v 0 0 0\nv 3 0 0\nv 3 0 3\nv 2 0 3\nv 2 0 1\nv 1 0 1\nv 1 0 3\nv 0 0 3\nf 8 7 6 5 4 3 2 1"
+    obj = parse_obj(u, "u")
+    corners = obj.vertices[obj.groups[0].corners]
+    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.abs(areas).sum() == pytest.approx(7.0)
+    assert (areas[:, 1] > 0).all()
+
+
+def test_front_and_up_follow_sweet_home_3d():
+    """+z of the file becomes the front, -y; +y becomes up."""
+    marker = "v 0 0 1\nv 1 0 1\nv 0 2 1\nv 0 0 0\nf 1 2 3\nf 1 3 4\nf 4 2 1"
+    parts = [p for p, _ in finish_parts(read_obj({"m.obj": marker.encode()}.__getitem__, "m.obj", "m"), Recipe("m", (1, 1, 2)))]
+    low, high = bounds(parts)
+    top = parts[0].vertices[parts[0].vertices[:, 2].argmax()]
+    np.testing.assert_allclose(top, [-0.5, -0.5, 2.0], atol=1e-5)
+    np.testing.assert_allclose(high - low, [1, 1, 2], atol=1e-5)
+
+
+def test_surfaces_of_a_cube_are_its_top(tmp_path):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.obj", "class": "cardboard box", "size": [0.4, 0.3, 0.2]}})
+    (own / "box.obj").write_text(CUBE)
+    parts = load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    (top,) = find_surfaces(parts)
+    assert top.name == "top" and top.z == pytest.approx(0.2, abs=1e-4) and top.headroom == 9.0
+    assert (top.x1 - top.x0) * (top.y1 - top.y0) == pytest.approx(0.12, rel=0.05)
+
+
+# hostile and broken packs
+
+@pytest.mark.parametrize("name", ["../evil.obj", "/etc/evil.obj", "mine\\..\\evil.obj", "a/../../evil.obj", "C:evil.obj"])
+def test_a_pack_whose_names_climb_out_is_refused(tmp_path, name):
+    path = write_pack(tmp_path / "evil.sh3f", {"mine/box/box.obj": CUBE})
+    with zipfile.ZipFile(path, "a") as z:
+        info = zipfile.ZipInfo("x")
+        info.filename = name
+        z.writestr(info, "boo")
+    with pytest.raises(PackError, match="outside the library"):
+        open_pack(path)
+
+
+def test_a_zip_bomb_is_refused(tmp_path):
+    with pytest.raises(PackError, match="bomb"):
+        open_pack(write_pack(tmp_path / "bomb.sh3f", {"mine/box/box.obj": b"\0" * (MAX_ENTRY // 2)}))
+
+
+def test_an_entry_that_lies_about_its_size_is_cut_off(tmp_path):
+    path = write_pack(tmp_path / "liar.sh3f", {"mine/box/box.obj": np.random.default_rng(0).bytes(4096)})
+    data = bytearray(path.read_bytes())
+    at = data.rindex(b"PK\x01\x02")
+    data[at + 24:at + 28] = struct.pack("<I", 100)
+    path.write_bytes(data)
+    with pytest.raises(PackError, match="cannot be read"):
+        open_pack(path).read("mine/box/box.obj")
+
+
+@pytest.mark.parametrize("obj", [CUBE.replace("v 1 1 1", "v nan 1 1"), CUBE.replace("v 1 1 1", "v 1e999 1 1"),
+                                 CUBE.replace("f 1 3 4 2", "f 1 3 99 2"), "v 0 0 0\n", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3"])
+def test_a_broken_mesh_is_refused(tmp_path, obj):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.sh3f", "model": "mine/box", "class": "cardboard box"}})
+    write_pack(own / "box.sh3f", {"mine/box/box.obj": obj})
+    with pytest.raises(MeshError):
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    assert not list((tmp_path / "assets").rglob("*.npz"))
+
+
+def test_a_file_that_is_no_pack_is_refused(tmp_path):
+    (tmp_path / "a.sh3f").write_text("hello")
+    with pytest.raises(PackError, match="not a .sh3f library"):
+        open_pack(tmp_path / "a.sh3f")
+    with zipfile.ZipFile(tmp_path / "b.sh3f", "w") as z:
+        z.writestr("readme.txt", "hello")
+    with pytest.raises(PackError, match="PluginFurnitureCatalog"):
+        open_pack(tmp_path / "b.sh3f")
+
+
+# a user's own models
+
+def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
+    row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
+    own = write_own(
+        tmp_path / "own",
+        {"a": {"file": "a.obj", **row}, "b": {"file": "b.glb", **row}, "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"}},
+        {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}},
+    )
+    (own / "a.obj").write_text(CUBE)
+    trimesh.creation.box((2, 2, 2)).export(own / "b.glb")
+    write_pack(own / "c.sh3f", {"mine/box/box.obj": CUBE})
+    catalogue = load_catalogue(tmp_path, own=[own])
+    assert len(catalogue.of_class("garden gnome")) == 3
+    for name in "abc":
+        low, high = bounds(catalogue.mesh(f"mine/{name}"))
+        np.testing.assert_allclose(high - low, (0.4, 0.3, 0.2), atol=1e-4)
+    assert catalogue.assets["mine/a"].creator == "Me" and catalogue.assets["mine/a"].licence == "CC0-1.0"
+
+
+@pytest.mark.parametrize(("row", "match"), [
+    ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
+    ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
+    ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
+    ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
+    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
+    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "unknown support"),
+    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
+])
+def test_a_wrong_own_catalogue_says_what_is_wrong(tmp_path, row, match):
+    own = write_own(tmp_path / "own", {"box": row})
+    (own / "box.obj").write_text(CUBE)
+    with pytest.raises(CatalogueError, match=match):
+        load_catalogue(tmp_path, own=[own])
+
+
+def test_a_broken_glb_is_refused(tmp_path):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.glb", "class": "mug", "size": [1, 1, 1]}})
+    (own / "box.glb").write_bytes(b"glTF" + b"\1" * 40)
+    with pytest.raises(MeshError, match="cannot be read"):
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
