@@ -99,6 +99,8 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         if self._shaping:
             reward += before - (0.0 if ended is not None and hari else self._potential())
         self._o = o if o is not None else self._o
+        if hasattr(self._env, "drives"):
+            info["bumps"] = sum(len(d.bumps) for d in self._env.drives)
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
@@ -158,7 +160,7 @@ def _wrapped(text: str, width: int) -> str:
 
 def make(
     kind: str, *, data: str | Path | None = None, split: str = "train", seed: int = 0, cache: str | Path | None = None,
-    source: FeatureSource | None = None, worlds: Mapping[str, World] | None = None, **options: Any,
+    source: FeatureSource | None = None, worlds: Mapping[str, World] | None = None, wheels: bool = False, **options: Any,
 ) -> HelpGymEnv:
     """The environment of a kind of task over a data set, or over one generated house without `data`.
 
@@ -166,14 +168,36 @@ def make(
       data: folder that `embodied dataset` built.
       source: features; semantic ones of what is visible where not given.
       worlds: worlds with pictures, for render(); otherwise opened from `data`.
+      wheels: edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"].
       options: of HelpGymEnv.
+
+    Raises:
+      ValueError: wheels for a kind of task that cannot have them.
     """
     play = make_playground(
         kind, Path(data) if data else None, split, seed=seed, cache=Path(cache) if cache else default_cache(),
         worlds=worlds, with_features=source is None,
     )
     layout = options.pop("layout", Layout(descriptions=kind == "hari"))
-    return HelpGymEnv(play.make_env, play.tasks, source or FeatureTable(play.features), layout=layout, **options)
+    make_env = _on_wheels(kind, play.make_env, Path(cache) if cache else default_cache()) if wheels else play.make_env
+    return HelpGymEnv(make_env, play.tasks, source or FeatureTable(play.features), layout=layout, **options)
+
+
+def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:
+    """The same rule of play with a body."""
+    from assets.catalogue import load_catalogue
+    from embodied.body import DrivenEnv, DrivenHannaEnv, driven  # physics, only where wanted
+
+    kinds = {"find": DrivenEnv, "vln": DrivenEnv, "hanna": DrivenHannaEnv}
+    if kind not in kinds:
+        raise ValueError(f"{kind!r} cannot be played on wheels, only {sorted(kinds)}")
+    catalogue = load_catalogue(cache)
+
+    def make_driven() -> HelpEnv:
+        env = make_env()
+        return driven(kinds[kind], catalogue, env.worlds, env.assistant, env.moves)
+
+    return make_driven
 
 
 def register() -> None:

@@ -1,0 +1,243 @@
+"""A body with wheels that drives the edges of the graph physically (dm_control's composer).
+
+The house is its arena (the collision boxes of embodied.scene), and the same tasks are played: a
+Move is driven by a simple controller, bumps are counted, and a way that turns out to be blocked
+leaves the agent where it came from.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from dm_control import composer, mjcf
+
+from embodied.env import HannaEnv, HelpEnv
+from embodied.geometry import wrap
+from embodied.interface import Reply
+from embodied.scene import build_spec, owner_of_name
+
+if TYPE_CHECKING:
+    from embodied.house import House
+
+RADIUS, HEIGHT = 0.19, 1.4
+"""Of the body, metres: the graph keeps 0.2 m free around every edge."""
+WHEEL, TRACK = 0.08, 0.28
+"""Wheel radius and distance between the wheels, metres."""
+FASTEST, TURNING = 1.0, 2.5
+"""Metres per second and radians per second."""
+CONTROL = 0.02
+"""Seconds between two commands."""
+NEAR = 0.06
+"""A node is reached within this many metres."""
+PATIENCE = 4.0
+"""Seconds allowed beyond four times what the way takes at full speed."""
+
+
+SLIPPERY = {"friction": [0.02, 0.001, 0.0001], "priority": 1}
+"""Priority makes the friction of casters and hull count, not the floor's."""
+
+
+class RollingBody(composer.Entity):
+    """A slim cylinder on two driven wheels and two casters, with a camera at eye height."""
+
+    def _build(self) -> None:
+        root = mjcf.RootElement(model="robot")
+        root.default.geom.friction = [1.0, 0.005, 0.0001]
+        body = root.worldbody.add("body", name="chassis", pos=[0, 0, WHEEL])
+        body.add("geom", name="base", type="cylinder", size=[RADIUS, 0.04], pos=[0, 0, 0.04], mass=18, **SLIPPERY)
+        half = (HEIGHT - 0.3) / 2
+        body.add("geom", name="mast", type="cylinder", size=[RADIUS * 0.8, half], pos=[0, 0, 0.2 + half], mass=2, **SLIPPERY)
+        body.add("camera", name="eye", pos=[0, 0, 1.5 - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
+        for side, y in (("left", TRACK / 2), ("right", -TRACK / 2)):
+            wheel = body.add("body", name=f"{side}_wheel", pos=[0, y, 0])
+            wheel.add("joint", name=f"{side}_axle", type="hinge", axis=[0, 1, 0], damping=0.02)
+            wheel.add("geom", name=f"{side}_tyre", type="cylinder", size=[WHEEL, 0.02], euler=[math.pi / 2, 0, 0], mass=0.8,
+                      friction=[1.4, 0.01, 0.0005])
+            root.actuator.add("velocity", name=side, joint=f"{side}_axle", kv=6.0, ctrlrange=[-40, 40], forcerange=[-12, 12])
+        for where, x in (("front", RADIUS * 0.8), ("back", -RADIUS * 0.8)):
+            body.add("geom", name=f"{where}_caster", type="sphere", size=[0.03], pos=[x, 0, 0.032 - WHEEL], mass=0.3, **SLIPPERY)
+        root.compiler.angle = "radian"
+        self._root = root
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        return self._root
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One edge, driven."""
+
+    arrived: bool
+    seconds: float
+    metres: float
+    """Way of the body's centre."""
+    bumps: tuple[str, ...]
+    """What it touched besides floors, in order, once per contact."""
+
+
+class Driver:
+    """Owns the physics of one house with the body in it.
+
+    The model is put together with dm_control and stepped by MuJoCo itself: dm_control's own Physics
+    (1.0.50) asks MuJoCo 4.0 for fields it no longer has.
+    """
+
+    def __init__(self, house: House, catalogue: object) -> None:
+        arena, self._owners = house_arena(house, catalogue)
+        robot = RollingBody()
+        arena.add_free_entity(robot)
+        root = arena.mjcf_model
+        self.model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+        """For pictures through the camera 'robot/eye', together with `data`."""
+        self.data = mujoco.MjData(self.model)
+        joint = next(j for j in range(self.model.njnt) if self.model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE)
+        self._free = slice(self.model.jnt_qposadr[joint], self.model.jnt_qposadr[joint] + 7)
+        self._motors = [self.model.actuator(f"robot/{side}").id for side in ("left", "right")]
+        self._names = [self.model.geom(g).name for g in range(self.model.ngeom)]
+        self._mine = np.array([name.startswith("robot/") for name in self._names])
+        self._substeps = max(1, round(CONTROL / self.model.opt.timestep))
+
+    @property
+    def position(self) -> np.ndarray:
+        """(2,) where the body's centre is, metres, world."""
+        return self.data.qpos[self._free][:2].copy()
+
+    @property
+    def yaw(self) -> float:
+        w, x, y, z = self.data.qpos[self._free][3:]
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+    def place(self, position: np.ndarray, yaw: float) -> None:
+        """Put the body down at (x, y, z of the eye) and let it settle."""
+        mujoco.mj_resetData(self.model, self.data)
+        height = position[2] - 1.5 + 0.005
+        self.data.qpos[self._free] = [position[0], position[1], height, math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)]
+        self._command(0.0, 0.0)
+        mujoco.mj_step(self.model, self.data, 10 * self._substeps)
+
+    def drive(self, target: np.ndarray) -> Drive:
+        """Turn towards (x, y) and go there; give up after a while."""
+        start, way = self.data.time, float(np.linalg.norm(np.asarray(target)[:2] - self.position))
+        limit = 4.0 * (way / FASTEST + math.pi / TURNING) + PATIENCE
+        metres, bumps, touching = 0.0, [], frozenset()
+        while self.data.time - start < limit:
+            before = self.position
+            offset = np.asarray(target)[:2] - before
+            distance = float(np.linalg.norm(offset))
+            if distance < NEAR:
+                self._command(0.0, 0.0)
+                return Drive(True, self.data.time - start, metres, tuple(bumps))
+            error = float(wrap(math.atan2(offset[1], offset[0]) - self.yaw))
+            turn = float(np.clip(5.0 * error, -TURNING, TURNING))
+            speed = 0.0 if abs(error) > 0.25 else min(FASTEST, 2.0 * distance + 0.05)
+            self._command(speed, turn)
+            mujoco.mj_step(self.model, self.data, self._substeps)
+            metres += float(np.linalg.norm(self.position - before))
+            now = self._touched()
+            bumps += sorted(now - touching)
+            touching = now
+        self._command(0.0, 0.0)
+        return Drive(False, self.data.time - start, metres, tuple(bumps))
+
+    def _command(self, speed: float, turn: float) -> None:
+        for motor, side in zip(self._motors, (-1.0, 1.0), strict=True):
+            self.data.ctrl[motor] = (speed + side * turn * TRACK / 2) / WHEEL
+
+    def _touched(self) -> frozenset[str]:
+        """Owners of what the body touches now, floors apart."""
+        contact = self.data.contact
+        touched = set()
+        for a, b in zip(contact.geom1, contact.geom2, strict=True):
+            if self._mine[a] != self._mine[b]:
+                owner = self._owners.get(self._names[b if self._mine[a] else a], "")
+                if not owner.endswith("/floor"):
+                    touched.add(owner)
+        return frozenset(touched)
+
+
+def house_arena(house: House, catalogue: object) -> tuple[composer.Arena, dict[str, str]]:
+    """The house's collision boxes as a composer arena, and the owner of each geom by its name there."""
+    model = build_spec(house, catalogue, parts=()).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    arena = composer.Arena(name="house")
+    root = arena.mjcf_model
+    root.option.timestep, root.option.integrator = 0.004, "implicitfast"
+    root.compiler.angle = "radian"
+    owners = {}
+    for g in range(model.ngeom):
+        if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_BOX:
+            continue
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, data.geom_xmat[g])
+        root.worldbody.add("geom", name=f"box{g}", type="box", size=model.geom_size[g], pos=data.geom_xpos[g], quat=quat)
+        owners[f"box{g}"] = owner_of_name(model.geom(g).name)
+    return arena, owners
+
+
+class _Driven(HelpEnv):
+    """Drives what the agent decides; mixed into a rule of play.
+
+    After a blocked way the agent is where it was, facing as before. `drives` lists the current
+    episode's, one per Move that was not blocked at once.
+    """
+
+    catalogue: object = None
+    """Gives the collision shapes; set by `driven`."""
+
+    def _begin(self) -> None:
+        super()._begin()
+        self.drives: list[Drive] = []
+        name = self.world.house.name
+        if not hasattr(self, "_drivers"):
+            self._drivers: dict[str, Driver] = {}
+        if name not in self._drivers:
+            self._drivers[name] = Driver(self.world.house, self.catalogue)
+        self._driver = self._drivers[name]
+        self._driver.place(self.world.graph.positions[self.pose.node], self.pose.yaw)
+        self._reached = self.pose
+
+    def _moved(self) -> None:
+        self._go()
+        super()._moved()
+
+    def _replied(self, reply: Reply) -> None:
+        super()._replied(reply)
+        if self.pose.node != self._reached.node:
+            self._go()
+        self._reached = self.pose
+
+    def _go(self) -> None:
+        drive = self._driver.drive(self.world.graph.positions[self.pose.node])
+        self.drives.append(drive)
+        if drive.arrived:
+            self._reached = self.pose
+        else:
+            self.pose = self._reached
+            self._driver.place(self.world.graph.positions[self.pose.node], self.pose.yaw)
+
+
+class DrivenEnv(_Driven, HelpEnv):
+    """Plain navigation on wheels."""
+
+
+class DrivenHannaEnv(_Driven, HannaEnv):
+    """HANNA on wheels, with the same tasks."""
+
+
+def driven(kind: type[_Driven], catalogue: object, *arguments: object, **options: object) -> _Driven:
+    """An environment on wheels: driven(DrivenHannaEnv, catalogue, worlds, anna)."""
+    env = kind(*arguments, **options)
+    env.catalogue = catalogue
+    return env
+
+
+def total_bumps(env: _Driven) -> int:
+    """Collisions of the current episode."""
+    return sum(len(d.bumps) for d in env.drives)
+
