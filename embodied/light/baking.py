@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
+from assets.records import Finish
 from embodied.house import House
 from embodied.light import tone
 from embodied.light.atlas import Atlas, albedo, atlas_of, linear, rasterise, read_colours, things_of  # noqa: F401
@@ -30,7 +31,7 @@ from embodied.light.radiosity import space_of
 from embodied.light.settings import VERSION, Settings, settings_of
 from embodied.light.sky import outdoors as outdoors_of
 from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
-from embodied.light.surroundings import surroundings
+from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import Exposure, expose
 from embodied.lit import LitMesh, LitPages
 from embodied.parts import house_parts, owners
@@ -79,10 +80,10 @@ class Bake:
     def ingredients(self, page: int) -> Ingredients:
         """One page before exposure."""
         with np.load(self.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
-            soft = z["soft"]
+            soft, glow = z["soft"], z["glow"]
         sun = cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE)
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
-        return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"))
+        return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
 
 def key_of(house: House, settings: Settings) -> str:
@@ -203,27 +204,38 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
             one = page_of(i, house, s.atlas, s.lux, s.light, space, portals, s.lamps, s.outdoors, s.exposure, settings, read)
             _write_page(folder, i, one, settings.jpeg)
     clock("pages")
-    meshes = _meshes(s.atlas)
-    extra_meshes, extra_pages = surroundings(house, catalogue, s.outdoors, s.exposure, read, first=len(s.atlas.pages))
-    for i, picture in enumerate(extra_pages, len(s.atlas.pages)):
+    outer, outer_pages, dome = surroundings(house, [p for p in house_parts(house, catalogue) if p.kind == "outdoor" and len(p.mesh.faces)],
+                                            s.atlas, s.outdoors, s.exposure, cache / "light", read)
+    first = len(s.atlas.pages)
+    for i, picture in enumerate([*outer_pages, dome], first):
         _write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
+    meshes, gloss = _meshes(s.atlas, 0)
+    if outer is not None:
+        more, more_gloss = _meshes(outer, first)
+        meshes += [dataclasses.replace(m, kind="outdoor") for m in more]
+        gloss += more_gloss
+    meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
-    meshes += extra_meshes
     with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
         np.savez_compressed(f, **{f"{k}{i}": a for i, m in enumerate(meshes)
-                                  for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))})
+                                  for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))},
+                            **{f"g{i}": g for i, g in enumerate(gloss)})
+    with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
+        np.savez_compressed(f, **{f"{k}{i}": np.asarray(getattr(x, k)) for i, x in enumerate(s.lamps)
+                                  for k in ("points", "normals", "radiance", "area")})
     clock("meshes")
     for name in ("direct", "sun", "bounces"):
         (folder / f"stage_{name}.npz").unlink(missing_ok=True)
     files = {p.name: p.stat().st_size for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")}
     manifest = {
         "version": VERSION, "key": folder.name, "house": house.digest, "device": device(),
-        "settings": dataclasses.asdict(settings), "pages": len(s.atlas.pages) + len(extra_pages), "own_pages": len(s.atlas.pages),
+        "settings": dataclasses.asdict(settings), "pages": first + len(outer_pages) + 1, "own_pages": len(s.atlas.pages),
         "owners": list(owners(house)), "seconds": {k: round(v, 2) for k, v in took.items()},
         "total_seconds": round(time.perf_counter() - start, 1), "luxels": len(s.lux.position), "check": error,
         "exposure": {"polygons": s.exposure.polygons, "levels": s.exposure.levels.tolist(), "gains": s.exposure.gains.tolist(),
                      "outdoors": s.exposure.outdoors.tolist()},
         "meshes": [{"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha} for m in meshes],
+        "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
         "probes": _probes(s, space), "files": files,
     }
     write_json(folder / "manifest.json", manifest)
@@ -285,23 +297,39 @@ def _probes(s: Solved, space) -> dict[str, list]:
     return {r.id: ambient_cube(s, space, r).round(4).tolist() for r in s.house.rooms}
 
 
-def _meshes(atlas: Atlas) -> list[LitMesh]:
-    """One mesh per owner and page, corners welded, thin faces listed twice."""
-    out = []
-    for number, page in enumerate(atlas.pages):
+def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
+    """One mesh per owner and page, corners welded, thin faces listed twice, and the gloss of its faces.
+
+    Args:
+      first: number of the atlas's first page.
+
+    Returns:
+      Meshes, and for each (m, 3) uint8: roughness, specular and metallic times 255 (see gloss_of).
+    """
+    out, shine = [], []
+    for number, page in enumerate(atlas.pages, first):
         uv = page.luxels / np.array([page.width, page.height], np.float32)
         for o in np.unique(page.owner):
             mine = np.nonzero(page.owner == o)[0]
             both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
-            _, first, index = np.unique(np.round(both, 5), axis=0, return_index=True, return_inverse=True)
+            _, corner, index = np.unique(np.round(both, 5), axis=0, return_index=True, return_inverse=True)
             faces = index.reshape(-1, 3).astype(np.int32)
             thin = page.thin[mine]
             faces = np.concatenate([faces, faces[thin][:, ::-1]])
             real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
             alpha = min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
-            out.append(LitMesh(atlas.owners[o], atlas.kinds[o], atlas.rooms[o], number, both[first, :3].astype(np.float32),
-                               faces[real], both[first, 3:].astype(np.float32), float(alpha)))
-    return out
+            out.append(LitMesh(atlas.owners[o], atlas.kinds[o], atlas.rooms[o], number, both[corner, :3].astype(np.float32),
+                               faces[real], both[corner, 3:].astype(np.float32), float(alpha)))
+            kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
+            shine.append(np.concatenate([kind, kind[thin]])[real])
+    return out, shine
+
+
+def gloss_of(finish: Finish) -> tuple[int, int, int]:
+    """Roughness, specular and metallic times 255; a mirror is smooth metal."""
+    if finish.mirror:
+        return 4, 255, 255
+    return tuple(round(255 * min(max(x, 0.0), 1.0)) for x in (finish.roughness, finish.specular, finish.metallic))
 
 
 def _page_files(i: int) -> tuple[str, ...]:
@@ -311,7 +339,7 @@ def _page_files(i: int) -> tuple[str, ...]:
 def _write_page(folder: Path, i: int, page: Ingredients, quality: int) -> None:
     light, sun, shown, picture = _page_files(i)
     with atomic_path(folder / light) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, soft=page.soft)
+        np.savez_compressed(f, soft=page.soft, glow=page.glow)
     write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
     _write_jpeg(folder / shown, page.albedo, quality)
     _write_jpeg(folder / picture, page.picture, quality)

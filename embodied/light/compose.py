@@ -32,6 +32,8 @@ class Ingredients:
     """(h, w, 3) uint8 sRGB."""
     picture: np.ndarray
     """(h, w, 3) uint8 sRGB, exposed: what the classic renderer shows."""
+    glow: np.ndarray
+    """(h luxels, w luxels, 3) float16 radiance of what shines itself; (0, 0, 3) where nothing does."""
 
 
 def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosity, space: Space, portals: Sequence[Portal],
@@ -57,7 +59,10 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
     whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
     shown = spread(t.index, (gamma(colour) * 255 + 0.5).astype(np.uint8), t.shape)
-    return Ingredients(np.clip(soft, 0, 6e4).astype(np.float16), whole.reshape(t.shape), shown, picture)
+    glow = lux.glow[mine]
+    glow = spread(coarse.index, glow, coarse.shape) if glow.any() else np.zeros((0, 0, 3))
+    half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)  # noqa: E731
+    return Ingredients(half(soft), whole.reshape(t.shape), shown, picture, half(glow))
 
 
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -36,50 +36,93 @@ def smooth_pages(
     mi = mitsuba()
     import drjit as dr
 
-    sizes = np.array([p.width * p.height for p in atlas.pages])
-    base = np.cumsum(sizes) - sizes
-    number = np.full(int(sizes.sum()), -1, np.int32)
-    flat = np.concatenate([t.index + b for t, b in zip(luxels, base)])
-    number[flat] = np.arange(len(flat))
-    widths = np.concatenate([np.full(len(t.index), p.width) for t, p in zip(luxels, atlas.pages)])
-    last = np.concatenate([np.full(len(t.index), b + s - 1) for t, b, s in zip(luxels, base, sizes)])
-    mine = np.nonzero(chosen)[0]
-    if not len(mine):
+    grid = _Grid(atlas, luxels, chosen)
+    if not len(grid.mine):
         return e
-    i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))
-    page_number, at, width = i32(number), i32(flat[mine]), i32(widths[mine])
-    low, high = i32(base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]), i32(last[mine])
-    column = i32((flat[mine] - base[np.searchsorted(np.cumsum(sizes), flat[mine], side="right")]) % widths[mine])
-    position = np.concatenate([t.position for t in luxels])
-    normal = np.concatenate([t.normal for t in luxels])
-    places, normals = (mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal))
-    p, n = vector(position[mine]), vector(normal[mine])
     trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
     out = np.array(e, np.float32)
     for step in steps:
         values = mi.Float(out.ravel())
-        own = dr.gather(mi.Color3f, values, mi.UInt32(i32(mine)))
+        own = dr.gather(mi.Color3f, values, grid.own)
         shade = dr.log(_brightness(own) + 1e-4)
         total, weight = mi.Color3f(0.0), mi.Float(0.0)
         tight = constant(1.0 / (likeness * (1.0 if step < 4 else 0.7)))
+        for i, j, q, inside in grid.around(step):
+            other = dr.gather(mi.Color3f, values, q, inside)
+            far = (dr.log(_brightness(other) + 1e-4) - shade) * tight
+            w = dr.select(inside, dr.exp(-0.5 * dr.square(far)), 0.0)
+            w *= KERNEL[i + 2] * KERNEL[j + 2] * dr.gather(mi.Float, trust, q, inside)
+            total += other * w
+            weight += w
+        out[grid.mine] = array(dr.select(weight > 1e-12, total / dr.maximum(weight, 1e-12), own))
+    return out
+
+
+def cap_sparks(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
+               most: float = 1.4) -> np.ndarray:
+    """Luxels brighter than `most` times the geometric mean of the good ones around them, cut to that.
+
+    One ray in a hundred that meets a lampshade makes such a luxel; smoothing would spread it into a blob.
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    grid = _Grid(atlas, luxels, chosen)
+    if not len(grid.mine):
+        return e
+    out = np.array(e, np.float32)
+    values, trust = mi.Float(out.ravel()), mi.Float(good.astype(np.float32))
+    total, weight = mi.Float(0.0), mi.Float(0.0)
+    for i, j, q, inside in grid.around(2):
+        if i or j:
+            w = dr.gather(mi.Float, trust, q, inside)
+            total += w * dr.log(_brightness(dr.gather(mi.Color3f, values, q, inside)) + 1e-5)
+            weight += w
+    own = dr.gather(mi.Color3f, values, grid.own)
+    cap = dr.exp(total / dr.maximum(weight, 1.0)) * most
+    scale = dr.select(weight > 3, dr.minimum(1.0, cap / dr.maximum(_brightness(own), 1e-7)), 1.0)
+    out[grid.mine] = array(own * scale)
+    return out
+
+
+class _Grid:
+    """Chosen luxels and, on the device, what lies around them on their page in the same plane."""
+
+    def __init__(self, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> None:
+        mi = mitsuba()
+        sizes = np.array([p.width * p.height for p in atlas.pages])
+        base = np.cumsum(sizes) - sizes
+        number = np.full(int(sizes.sum()), -1, np.int32)
+        flat = np.concatenate([t.index + b for t, b in zip(luxels, base)])
+        number[flat] = np.arange(len(flat))
+        self.mine = np.nonzero(chosen)[0]
+        page = np.searchsorted(np.cumsum(sizes), flat[self.mine], side="right")
+        widths = np.array([p.width for p in atlas.pages])[page]
+        i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))  # noqa: E731
+        self._number, self._at, self._width = i32(number), i32(flat[self.mine]), i32(widths)
+        self._low, self._high = i32(base[page]), i32(base[page] + sizes[page] - 1)
+        self._column = i32((flat[self.mine] - base[page]) % widths)
+        position = np.concatenate([t.position for t in luxels])
+        normal = np.concatenate([t.normal for t in luxels])
+        self._places, self._normals = (mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal))
+        self._p, self._n = vector(position[self.mine]), vector(normal[self.mine])
+        self.own = mi.UInt32(np.ascontiguousarray(self.mine, np.uint32))
+
+    def around(self, step: int):
+        """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
+        mi = mitsuba()
+        import drjit as dr
+
         for j in range(-2, 3):
             for i in range(-2, 3):
-                x = column + i * step
-                spot = at + j * step * width + i * step
-                inside = (x >= 0) & (x < width) & (spot >= low) & (spot <= high)
-                k = dr.gather(mi.Int32, page_number, mi.UInt32(spot), inside)
+                x, spot = self._column + i * step, self._at + j * step * self._width + i * step
+                inside = (x >= 0) & (x < self._width) & (spot >= self._low) & (spot <= self._high)
+                k = dr.gather(mi.Int32, self._number, mi.UInt32(spot), inside)
                 inside &= k >= 0
                 q = mi.UInt32(k)
-                other = dr.gather(mi.Color3f, values, q, inside)
-                off = dr.abs(dr.dot(dr.gather(mi.Vector3f, places, q, inside) - p, n))
-                alike = dr.dot(dr.gather(mi.Vector3f, normals, q, inside), n)
-                far = (dr.log(_brightness(other) + 1e-4) - shade) * tight
-                w = dr.select(inside & (off < 0.004) & (alike > 0.98), dr.exp(-0.5 * dr.square(far)), 0.0)
-                w *= KERNEL[i + 2] * KERNEL[j + 2] * dr.gather(mi.Float, trust, q, inside)
-                total += other * w
-                weight += w
-        out[mine] = array(dr.select(weight > 1e-12, total / dr.maximum(weight, 1e-12), own))
-    return out
+                off = dr.abs(dr.dot(dr.gather(mi.Vector3f, self._places, q, inside) - self._p, self._n))
+                alike = dr.dot(dr.gather(mi.Vector3f, self._normals, q, inside), self._n)
+                yield i, j, q, inside & (off < 0.004) & (alike > 0.98)
 
 
 def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12) -> np.ndarray:
@@ -130,6 +173,17 @@ def smooth_space(
             total += other * w
             weight += w
         out[mine] = array(total / weight)
+    return out
+
+
+def fill(e: np.ndarray, normal: np.ndarray, near: np.ndarray, chosen: np.ndarray, bad: np.ndarray) -> np.ndarray:
+    """Bad luxels among the chosen take the mean of their nearest good neighbours that face their way."""
+    out = np.array(e, np.float32)
+    mine = np.nonzero(chosen)[0]
+    which = np.nonzero(bad[mine])[0]
+    n = near[which, :6]
+    w = np.maximum(np.einsum("mkc,mc->mk", normal[n], normal[mine[which]]), 0.0)[..., None] + 1e-3
+    out[mine[which]] = (out[n] * w).sum(1) / w.sum(1)
     return out
 
 

@@ -142,14 +142,14 @@ def env_lookup(space: Space, d, active=True):
 def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     """e (a Color3f) from the outdoors through one portal, by area sampling.
 
-    One sample is clamped at 4 / samples and the sum at full view of the portal: without it, things
+    One sample is clamped at 10 / samples and the sum at full view of the portal: without it, things
     a few centimetres from the glass turn into fireflies.
     """
     mi = mitsuba()
     import drjit as dr
 
     corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal))
-    area, share = constant(portal.area / np.pi / samples * GLASS), constant(4.0 / samples)
+    area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
     total, seen = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
     for k in range(samples):
         a, b = (constant(x) for x in r2(k))

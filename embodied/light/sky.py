@@ -19,7 +19,7 @@ DECLINATION = np.radians(6.0)
 """A day in early April or September: low enough a sun to reach into rooms."""
 HEIGHT = 1024
 """Rows of the environment picture; twice as many columns."""
-GRASS = np.array([0.072, 0.115, 0.035])
+GRASS = np.array([0.082, 0.108, 0.050])
 TREES = np.array([0.045, 0.075, 0.028])
 """Linear reflectances of lawn and foliage."""
 

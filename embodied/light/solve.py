@@ -219,13 +219,13 @@ def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell
 
 
 def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
-    """Radiosity cut, room by room, at 12 times its 90th percentile: what is smaller than a hand
+    """Radiosity cut, room by room, at 6 times its 90th percentile: what is smaller than a hand
     beside a bulb would show as sparks on far walls, one ray in hundreds."""
     y = seen.mean(1)
     out = np.array(seen, np.float32)
     for unit in np.unique(lux.unit):
         mine = np.nonzero(lux.unit == unit)[0]
-        most = 12 * np.percentile(y[mine], 90)
+        most = 6 * np.percentile(y[mine], 90)
         out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
     return out
 
@@ -251,14 +251,17 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     """Noise taken out of all but the sun; luxels that are not good take their neighbours' light."""
     soft = ~lux.shell
     near = denoise.neighbours(lux.position, lux.normal, light.good, soft)
-    pages = lambda e, steps, like: denoise.smooth_pages(e, atlas, lux.texels, light.good, lux.shell, steps=steps, likeness=like)
-    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
-    indirect = space(pages(light.indirect, (1, 2, 4, 8, 16), 0.35), 3, 0.8)
-    direct = space(pages(light.direct, (1, 2, 4), 0.2), 2, 0.45)
-    total = direct + indirect + light.patches
+    on_page = (atlas, lux.texels, light.good, lux.shell)
+    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)  # noqa: E731
+    mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e  # noqa: E731
+    indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
+    indirect = space(denoise.smooth_pages(indirect, *on_page, steps=(1, 2, 4, 8, 16), likeness=0.35), 3, 0.8)
+    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=0.2), 2, 0.45)
+    patches = mend(light.patches)
+    total = direct + indirect + patches
     if soft.any():
-        indirect = indirect + np.minimum(denoise.lift_specks(total, near, soft) - total, np.inf)
-    return replace(light, direct=direct, indirect=np.maximum(indirect, 0.0))
+        indirect = indirect + denoise.lift_specks(total, near, soft) - total
+    return replace(light, direct=direct, patches=patches, indirect=np.maximum(indirect, 0.0), good=light.good | soft)
 
 
 def subset(lux: Luxels, i: np.ndarray) -> Points:

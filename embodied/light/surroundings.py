@@ -1,12 +1,18 @@
-"""What windows show: a dome with the painted outdoors, and the house's own outer parts, simply lit."""
+"""What windows show: a dome with the painted outdoors, and the house's own outer parts in daylight."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from embodied.house import House
+from embodied.light import radiosity
+from embodied.light.atlas import Atlas, albedo, atlas_of, rasterise, things_of
+from embodied.light.backend import array, constant, mitsuba, r2, scene_of, vector
+from embodied.light.compose import spread
+from embodied.light.radiosity import ENV_ROWS, LIFT, Space, points_of
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
 from embodied.light.unwrap import face_normals
@@ -16,18 +22,74 @@ RADIUS = 70.0
 """Metres to the dome."""
 DOME = "outdoor/sky"
 """Owner of the dome; no instance id belongs to it."""
+LUXELS = 400_000
+"""Luxels for all outer parts together, at most."""
 
 
-def surroundings(house: House, catalogue, outdoors: Outdoors, exposure: Exposure, read: Callable[[str], np.ndarray],
-                 first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
-    """Meshes and pages of everything outdoors.
+def surroundings(house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoors, exposure: Exposure, cache: Path,
+                 read: Callable[[str], np.ndarray]) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
+    """Outer parts in the light of sun and sky, and the picture on the dome.
 
     Args:
-      first: number of the first new page.
+      parts: the house's parts of kind 'outdoor'.
+      indoors: casts shadows.
+
+    Returns:
+      The atlas of the outer parts (None if there are none), their pages, and the dome's page; (h, w, 3) uint8 each.
     """
-    dome = dome_mesh(house, first)
     gain = exposure.outdoors.astype(np.float32)
-    return [dome], [display(outdoors.picture, gain)]
+    dome = display(outdoors.picture, gain)
+    if not parts:
+        return None, [], dome
+    area = sum(float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
+               for c in (p.mesh.vertices[p.mesh.faces] for p in parts))
+    density = float(min(14.0, np.sqrt(LUXELS / max(area, 1.0))))
+    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=4000, cache=cache))
+    blockers = np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass])
+    pages = []
+    for page in atlas.pages:
+        t = rasterise(page, page.fineness)
+        coarse = rasterise(page, 1)
+        e = _daylight(scene_of(blockers), outdoors, coarse, page.thin[coarse.face])
+        field = spread(coarse.index, e, coarse.shape)
+        rows, columns = np.divmod(t.index, t.shape[1])
+        light = field[rows // page.fineness, columns // page.fineness]
+        pages.append(spread(t.index, display(albedo(page, t, read) * light, gain), t.shape))
+    return atlas, pages, dome
+
+
+def _flat(part):
+    """Walls, roofs and lawns of the outdoors unfold like those inside."""
+    import dataclasses
+
+    return dataclasses.replace(part, kind="wall") if len(part.mesh.faces) < 4000 else part
+
+
+def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 32) -> np.ndarray:
+    """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
+    mi = mitsuba()
+    import drjit as dr
+
+    p = points_of(texels.position, texels.normal, texels.face_normal, thin)
+    rows = outdoors.picture.shape[0] // ENV_ROWS
+    small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)
+    space = Space(scene, *([None] * 9), mi.Float(small.ravel()))
+    hidden = mi.Color3f(*(float(x) / 3 for x in small.mean((0, 1))))
+    total = dr.zeros(mi.Color3f, p.n)
+    for k in range(rays):
+        a, b = (constant(x) for x in r2(k))
+        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+        free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
+        total += dr.select(free, radiosity.env_lookup(space, d, free), hidden)
+        dr.eval(total)
+    e = array(total) / rays
+    if outdoors.sun.any():
+        cos, side, active = radiosity.facing(p, vector(np.tile(outdoors.sun_direction, (1, 1))))
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, vector(np.tile(outdoors.sun_direction, (p.n, 1))))
+        lit = dr.select(active & ~scene.ray_test(ray, active), cos, 0.0)
+        e += np.asarray(lit)[:, None] * outdoors.sun.astype(np.float32)
+    return e
 
 
 def dome_mesh(house: House, page: int, rows: int = 24) -> LitMesh:

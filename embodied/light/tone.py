@@ -7,17 +7,19 @@ shown with it and never show a step.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from scipy.ndimage import map_coordinates
 
 from embodied.house import House
 from embodied.light.atlas import gamma
 
 TARGET = 0.8
 """Linear value (before the curve) that a white sheet in a room's middle light is brought to."""
-ADAPT = 0.85
+ADAPT = 0.9
 """How far exposure follows a room's own light rather than the house's."""
 BALANCE = 0.62
 """How far white balance takes out the colour of the light."""
@@ -43,17 +45,31 @@ class Exposure:
 
     def at(self, position: np.ndarray) -> np.ndarray:
         """(n, 3) float32 gains at points (n, 3)."""
-        position = np.asarray(position, float)
-        cells, index = np.unique(np.round(position / [0.1, 0.1, 0.5]).astype(int), axis=0, return_inverse=True)
-        centres = cells * [0.1, 0.1, 0.5]
-        points = shapely.points(centres[:, :2])
-        log, weight = np.zeros((len(cells), 3)), np.zeros((len(cells), 1))
-        for polygon, (low, high), gain in zip(self.polygons, self.levels, self.gains):
-            flat = shapely.distance(shapely.Polygon(polygon), points)
-            z = np.maximum(np.maximum(low - centres[:, 2], centres[:, 2] - high), 0.0)
-            w = np.exp(-0.5 * ((flat**2 + z**2) / BLEND**2))[:, None] + 1e-12
-            log, weight = log + w * np.log(gain), weight + w
-        return np.exp(log / weight)[index.reshape(-1)].astype(np.float32)
+        grid, low = self._grid
+        where = ((np.asarray(position, float) - low) / CELL).T
+        return np.exp(np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)).astype(np.float32)
+
+    @functools.cached_property
+    def _grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Log gains (3, nx, ny, nz) on a grid of `CELL` over the house, and its lowest corner."""
+        corners = np.array([c for p in self.polygons for c in p])
+        low = np.array([*(corners.min(0) - 1.0), self.levels[:, 0].min() - 1.0])
+        high = np.array([*(corners.max(0) + 1.0), self.levels[:, 1].max() + 1.0])
+        n = np.ceil((high - low) / CELL).astype(int) + 1
+        x, y, z = (low[k] + np.arange(n[k]) * CELL[k] for k in range(3))
+        points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
+        log, weight = np.zeros((3, *n)), np.zeros(n)
+        for polygon, (bottom, top), gain in zip(self.polygons, self.levels, self.gains):
+            flat = shapely.distance(shapely.Polygon(polygon), points)[..., None]
+            off = np.maximum(np.maximum(bottom - z, z - top), 0.0)
+            w = np.exp(-0.5 * (flat**2 + off**2) / BLEND**2) + 1e-12
+            log += w * np.log(gain)[:, None, None, None]
+            weight += w
+        return (log / weight).astype(np.float32), low
+
+
+CELL = np.array([0.1, 0.1, 0.4])
+"""Spacing of the gain grid, metres."""
 
 
 def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> Exposure:

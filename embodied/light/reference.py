@@ -1,0 +1,151 @@
+"""Panoramas by ray tracing: 'glossy' reads the bake and adds one reflection, 'reference' path-traces everything.
+
+Both return an embodied.panorama.Panorama with the bake's exposure, so that pictures compare.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from embodied.house import House
+from embodied.light import paths, radiosity
+from embodied.light.backend import array, mitsuba
+from embodied.light.baking import Bake
+from embodied.light.radiosity import Points
+from embodied.light.tone import develop
+from embodied.light.trace import Hit, World, look, picture_at, world_of
+from embodied.panorama import FACES, Panorama
+from embodied.seeds import stream
+
+BRIGHTEST = 12.0
+"""Reflected light is cut at this multiple of the exposure's white."""
+QUALITIES = ("glossy", "reference", "diffuse")
+"""'diffuse' is the reference without gloss, which the classic renderer's pages should equal."""
+RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
+"""Rays per pixel."""
+
+
+class Tracer:
+    """Draws panoramas of one lit house by tracing rays; owns the house on Mitsuba's device."""
+
+    def __init__(self, bake: Bake, house: House, *, quality: str = "glossy", size: int = 256, rays: int | None = None) -> None:
+        """Upload the bake.
+
+        Args:
+          quality: one of QUALITIES.
+          size: side of a cube face, pixels.
+          rays: per pixel; RAYS[quality] if None.
+
+        Raises:
+          ValueError: unknown quality.
+        """
+        if quality not in QUALITIES:
+            raise ValueError(f"quality {quality!r} is unknown to the tracer; use one of {QUALITIES}")
+        self.quality, self.size, self.rays = quality, size, rays or RAYS[quality]
+        self._world, self._seed = world_of(bake, house), house.seed
+
+    def panorama(self, position, size: int | None = None) -> Panorama:
+        """Six cube faces around `position` (x, y, z)."""
+        s = size or self.size
+        rgb = np.empty((6, s, s, 3), np.uint8)
+        depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
+        for k, (forward, up) in enumerate(FACES):
+            rgb[k], depth[k], ids[k] = self.picture(position, forward, up, np.pi / 2, (s, s), name=k)
+        return Panorama(rgb, depth, ids)
+
+    def picture(self, position, forward, up, vfov: float, size: tuple[int, int], *, name: int = 0):
+        """(h, w, 3) uint8, (h, w) float32 depth along the axis, (h, w) int32 ids of a pinhole camera."""
+        rng = stream(self._seed, "light", "trace", self.quality, name)
+        h, w = size
+        total = np.zeros((h * w, 3), np.float32)
+        for start in range(0, self.rays, 4):
+            ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
+            colour = self._colours(ray, rng)
+            total += colour.reshape(-1, h * w, 3).sum(0)
+        rgb = (np.clip(total / self.rays, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
+        centre = _camera_rays(position, forward, up, vfov, size, 1, 0, None)
+        hit = look(self._world, centre)
+        ok, t = np.asarray(hit.ok), np.asarray(hit.distance)
+        ids = np.where(ok, self._world.owner[np.where(ok, np.asarray(hit.face), 0)], 0)
+        along = array(centre.d) @ np.asarray(forward, np.float32)
+        return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
+
+    def _colours(self, ray, rng: np.random.Generator) -> np.ndarray:
+        """(n, 3) shown colours in [0, 1] along rays."""
+        import drjit as dr
+
+        mi, world = mitsuba(), self._world
+        hit = look(world, ray)
+        inside = hit.ok & ~hit.outdoor
+        if self.quality == "glossy":
+            diffuse = hit.albedo * hit.e
+        else:
+            diffuse = hit.albedo * self._traced(hit, ray, rng)
+        if self.quality != "diffuse":
+            diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
+        radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
+        shown_outside = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
+        keep, there, seen, outside = np.asarray(inside), array(hit.position), array(radiance), array(shown_outside)
+        gain = world.exposure.at(np.where(keep[:, None], there, 0.0))
+        return np.where(keep[:, None], develop(np.nan_to_num(seen), gain), outside)
+
+    def _traced(self, hit: Hit, ray, rng: np.random.Generator):
+        """e at first hits by path tracing."""
+        mi, world = mitsuba(), self._world
+        n = len(np.asarray(hit.distance))
+        thin = mi.Bool(np.zeros(n, bool))
+        zero = mi.Float(np.zeros(n, np.float32))
+        points = Points(n, hit.position, hit.normal, hit.normal, thin, zero, zero)
+        return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng)
+
+    def _with_gloss(self, hit: Hit, ray, diffuse, inside, rng: np.random.Generator):
+        """One GGX lobe above the diffuse light, seen by one reflected ray.
+
+        Source: Walter et al. 2007 eq. 35 for the half vector, Schlick 1994 for F; F0 = 0.08 specular.
+        """
+        import drjit as dr
+
+        mi, world = mitsuba(), self._world
+        rough, specular, metal = hit.gloss.x, hit.gloss.y, hit.gloss.z
+        n = len(np.asarray(hit.distance))
+        u = rng.random((2, n), np.float32)
+        a = dr.maximum(dr.square(rough), 1e-3)
+        u0 = mi.Float(u[0]) * 0.98  # the lobe's far tail is left out: one ray in fifty there is noise, not gloss
+        cos = dr.sqrt((1 - u0) / (1 + (dr.square(a) - 1) * u0))
+        sin = dr.sqrt(dr.maximum(1 - dr.square(cos), 0))
+        phi = dr.two_pi * mi.Float(u[1])
+        half = mi.Frame3f(hit.normal).to_world(mi.Vector3f(sin * dr.cos(phi), sin * dr.sin(phi), cos))
+        c = dr.maximum(-dr.dot(ray.d, half), 0)
+        d = ray.d + 2 * c * half
+        f0 = mi.Color3f(0.08 * specular) * (1 - metal) + hit.albedo * metal
+        f = f0 + (1 - f0) * dr.power(1 - c, 5) * (1 - dr.square(rough) * 0.9)
+        active = inside & (dr.max(f0) > 1e-3) & (dr.dot(d, hit.normal) > 0)
+        onward = mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d)
+        second = look(world, onward, active)
+        far = picture_at(world.sky, world.rows, d, active) * radiosity.GLASS
+        seen = dr.select(second.ok, second.albedo * second.e + second.glow, far)
+        seen = dr.select(second.ok & second.outdoor, far * 0.3, seen)
+        if self.quality == "reference":
+            e = self._traced(second, onward, rng)
+            seen = dr.select(second.ok & ~second.outdoor & second.front, second.albedo * e + second.glow, seen)
+        limit = BRIGHTEST * float(1 / np.median(world.exposure.gains))
+        seen = dr.minimum(seen, limit)
+        return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse)
+
+
+def _camera_rays(position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None):
+    """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
+    mi = mitsuba()
+    import drjit as dr
+
+    h, w = size
+    f, u = np.asarray(forward, float), np.asarray(up, float)
+    right = np.cross(f, u)
+    jitter = rng.random((2, each, h * w), np.float32) if rng is not None else np.full((2, each, h * w), 0.5, np.float32)
+    y, x = np.divmod(np.arange(h * w), w)
+    t = np.tan(vfov / 2)
+    sx = ((x + jitter[0]) / w * 2 - 1) * t * w / h
+    sy = (1 - (y + jitter[1]) / h * 2) * t
+    v = lambda a: mi.Vector3f(*(float(k) for k in a))  # noqa: E731
+    d = v(f) + v(right) * mi.Float(sx.ravel().astype(np.float32)) + v(u) * mi.Float(sy.ravel().astype(np.float32))
+    return mi.Ray3f(mi.Point3f(*(float(k) for k in position)), dr.normalize(d))

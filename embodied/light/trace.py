@@ -1,0 +1,191 @@
+"""A finished bake as a world that camera rays can be traced in; what glossy and reference pictures share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import cv2
+
+from embodied.house import House
+from embodied.light import radiosity
+from embodied.light.atlas import linear
+from embodied.light.backend import mitsuba, scene_of
+from embodied.light.baking import Bake
+from embodied.light.emitters import Lamp, portals_of
+from embodied.light.paths import Lights, Surfaces, lights_of
+from embodied.light.radiosity import Space
+from embodied.light.sky import Outdoors, outdoors
+from embodied.light.unwrap import face_normals
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Device arrays; m faces in mesh order."""
+
+    space: Space
+    """Rays hit opaque indoor things and the house's outer parts; luxel numbers are page pixels."""
+    surfaces: Surfaces
+    lights: Lights
+    owner: np.ndarray
+    """(m,) int32 instance ids."""
+    is_outdoor: object
+    gloss: object
+    """(m * 3) roughness, specular, metallic."""
+    uv: object
+    """(m * 3 * 2)."""
+    page: object
+    size: object
+    """(pages * 2) texels: width, height."""
+    base: object
+    albedo: object
+    """Flat linear RGB texels of all pages, then:"""
+    light: object
+    """Flat e (all light, the sun's too) of all texels; for outer parts the picture as shown, as sRGB."""
+    glow: object
+    """Flat radiance of all texels; None if nothing glows."""
+    dome: object
+    """Flat sRGB picture of the outdoors as shown."""
+    sky: object
+    """Flat radiance of the outdoors."""
+    rows: int
+    exposure: object
+    outdoors: Outdoors
+
+
+def world_of(bake: Bake, house: House) -> World:
+    """Upload a bake."""
+    mi = mitsuba()
+    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))  # noqa: E731
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    lit, own = bake.lit, bake.manifest["own_pages"]
+    with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
+        gloss = [z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
+    number = {o: i + 1 for i, o in enumerate(lit.owners)}
+    solid = [(m, g) for m, g in zip(lit.meshes, gloss) if m.alpha >= 0.9 and g is not None and len(m.faces)]
+    corners = np.concatenate([m.vertices[m.faces] for m, _ in solid])
+    uv = np.concatenate([m.uv[m.faces] for m, _ in solid])
+    page = np.concatenate([np.full(len(m.faces), m.page) for m, _ in solid])
+    owner = np.concatenate([np.full(len(m.faces), number.get(m.owner, 0), np.int32) for m, _ in solid])
+    outer = np.concatenate([np.full(len(m.faces), m.kind == "outdoor") for m, _ in solid])
+    sun = outdoors(house)
+    albedo, light, glow, coarse_albedo, coarse_glow, sizes, luxel_sizes = [], [], [], [], [], [], []
+    for i in range(len(lit.pages) - 1):
+        picture = lit.pages[i]
+        h, w = picture.shape[:2]
+        sizes.append((w, h))
+        if i >= own:
+            light.append(picture.reshape(-1, 3).astype(np.float32) / 255)
+            albedo.append(np.zeros((h * w, 3), np.float32))
+            glow.append(np.zeros((h * w, 3), np.float32))
+            luxel_sizes.append((1, 1))
+            coarse_albedo.append(np.full((1, 3), 0.2, np.float32))
+            coarse_glow.append(np.zeros((1, 3), np.float32))
+            continue
+        one = bake.ingredients(i)
+        soft = one.soft.astype(np.float32)
+        fine = linear(np.arange(256, dtype=np.float32) / 255)[one.albedo]
+        e = cv2.resize(soft, (w, h), interpolation=cv2.INTER_LINEAR)
+        e += (one.sun.astype(np.float32) / 255)[..., None] * (sun.sun * radiosity.GLASS).astype(np.float32)
+        g = one.glow.astype(np.float32) if one.glow.size else np.zeros_like(soft)
+        light.append(e.reshape(-1, 3))
+        albedo.append(fine.reshape(-1, 3))
+        glow.append(cv2.resize(g, (w, h), interpolation=cv2.INTER_NEAREST).reshape(-1, 3))
+        luxel_sizes.append(soft.shape[1::-1])
+        coarse_albedo.append(cv2.resize(fine, soft.shape[1::-1], interpolation=cv2.INTER_AREA).reshape(-1, 3))
+        coarse_glow.append(g.reshape(-1, 3))
+    lw, lh = np.array(luxel_sizes).T
+    size = np.array(sizes)
+    texels = size.prod(1)
+    lamps = _lamps(bake)
+    sampled = {x.placement for x in house.lights if x.on}
+    glow_coarse = np.concatenate(coarse_glow)
+    rows = radiosity.ENV_ROWS
+    k = sun.picture.shape[0] // rows
+    small = sun.picture.reshape(rows, k, 2 * rows, k, 3).mean((1, 3))
+    xy = uv * np.stack([lw, lh], 1)[page][:, None]
+    space = Space(
+        scene_of(corners), np.arange(len(corners)), u32(page), flat(xy), flat(face_normals(corners.astype(np.float64))),
+        mi.Bool(np.zeros(len(corners), bool)), u32(lw), u32(lh), u32(np.cumsum(lw * lh) - lw * lh),
+        u32(np.arange(int((lw * lh).sum()))), flat(small),
+    )
+    hit_by_lamp = glow_coarse if not sampled else np.zeros_like(glow_coarse)
+    surfaces = Surfaces(flat(np.concatenate(coarse_albedo)), flat(hit_by_lamp), flat(np.zeros_like(glow_coarse)))
+    lights = lights_of(None, None, space, portals_of(house), lamps, sun)
+    any_glow = np.concatenate(glow)
+    return World(
+        space, surfaces, lights, owner, mi.Bool(outer), flat(np.concatenate([g for _, g in solid]) / 255), flat(uv), u32(page),
+        u32(size.ravel()), u32(np.cumsum(texels) - texels), flat(np.concatenate(albedo)), flat(np.concatenate(light)),
+        flat(any_glow) if any_glow.any() else None, flat(lit.pages[-1] / 255), flat(sun.picture), sun.picture.shape[0], bake.exposure, sun,
+    )
+
+
+def _lamps(bake: Bake) -> tuple[Lamp, ...]:
+    with np.load(bake.folder / "lamps.npz", allow_pickle=False) as z:
+        return tuple(
+            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), None)
+            for i, x in enumerate(bake.manifest["lamps"])
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """What rays meet first."""
+
+    ok: object
+    distance: object
+    face: object
+    position: object
+    normal: object
+    """Towards the ray's origin."""
+    albedo: object
+    e: object
+    """Baked light, or the shown sRGB colour of an outer part."""
+    glow: object
+    outdoor: object
+    gloss: object
+    """Roughness, specular, metallic."""
+    front: object
+
+
+def look(world: World, ray, active=True) -> Hit:
+    """Bilinear lookup of the pages where rays hit."""
+    mi = mitsuba()
+    import drjit as dr
+
+    h = world.space.scene.ray_intersect_preliminary(ray, False, active)
+    ok = h.is_valid() & active
+    f = h.prim_index
+    b1, b2 = h.prim_uv.x, h.prim_uv.y
+    at = lambda c: dr.gather(mi.Point2f, world.uv, f * 3 + c, ok)  # noqa: E731
+    q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
+    page = dr.gather(mi.UInt32, world.page, f, ok)
+    w, height = (mi.Float(dr.gather(mi.UInt32, world.size, page * 2 + c, ok)) for c in (0, 1))
+    base = dr.gather(mi.UInt32, world.base, page, ok)
+    x, y = dr.clip(q.x * w - 0.5, 0, w - 1), dr.clip(q.y * height - 0.5, 0, height - 1)
+    x0, y0 = dr.floor(x), dr.floor(y)
+    fx, fy = x - x0, y - y0
+    albedo, e, glow = mi.Color3f(0.0), mi.Color3f(0.0), mi.Color3f(0.0)
+    for dx, wx in ((0, 1 - fx), (1, fx)):
+        for dy, wy in ((0, 1 - fy), (1, fy)):
+            i = base + mi.UInt32(dr.minimum(y0 + dy, height - 1)) * mi.UInt32(w) + mi.UInt32(dr.minimum(x0 + dx, w - 1))
+            albedo += dr.gather(mi.Color3f, world.albedo, i, ok) * (wx * wy)
+            e += dr.gather(mi.Color3f, world.light, i, ok) * (wx * wy)
+            if world.glow is not None:
+                glow += dr.gather(mi.Color3f, world.glow, i, ok) * (wx * wy)
+    n = dr.gather(mi.Vector3f, world.space.normal, f, ok)
+    front = dr.dot(n, ray.d) < 0
+    n = dr.select(front, n, -n)
+    return Hit(ok, h.t, f, ray.o + ray.d * h.t, n, albedo, e, glow, dr.gather(mi.Bool, world.is_outdoor, f, ok),
+               dr.gather(mi.Vector3f, world.gloss, f, ok), front)
+
+
+def picture_at(table, rows: int, d, active=True):
+    """Value of an outdoor picture (flat, rows x 2 rows) in direction d, nearest texel."""
+    mi = mitsuba()
+    import drjit as dr
+
+    x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (2 * rows)
+    y = dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * rows
+    i = mi.UInt32(dr.clip(y, 0, rows - 1)) * (2 * rows) + mi.UInt32(dr.clip(x, 0, 2 * rows - 1))
+    return dr.gather(mi.Color3f, table, i, active)
