@@ -25,7 +25,7 @@ from embodied.panorama import FACES, Panorama
 from embodied.scene import COLLISION, VISUAL, Scene, compile_scene
 
 QUALITIES = ("unlit", "baked")
-BACKENDS = ("classic",)
+BACKENDS = ("classic", "filament")
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
 SUPERSAMPLING = 2
@@ -78,7 +78,7 @@ class Renderer:
 
         Args:
           quality: 'unlit' (even light from all sides) or 'baked' (needs `lit`).
-          backend: 'classic'.
+          backend: 'classic' (OpenGL), or 'filament' (Vulkan) for the colours; depth and ids are the classic ones.
           size: side of a cube face of `panorama`, pixels.
           lit: the baked pages that 'baked' shows.
           scene: a scene compiled before from the same house and pages, to save compiling again.
@@ -89,7 +89,7 @@ class Renderer:
         """
         _check(house, quality, backend, size, lit)
         self.house, self.size, self.quality = house, size, quality
-        self._mjr = None
+        self._mjr = self._painter = None
         self.scene = scene or compile_scene(house, catalogue, collisions=False, lit=lit)
         model = self.scene.model
         self._data = mujoco.MjData(model)
@@ -110,6 +110,10 @@ class Renderer:
         self._is_visual = np.array([k != "collision" for k in self.scene.kind_of_geom])
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, self.scene)
+        if backend == "filament":
+            from embodied.filament import Painter  # late: loads Vulkan
+
+            self._painter = Painter(house, catalogue, lit)
         self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
 
     def view(self, position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 3,
@@ -123,14 +127,14 @@ class Renderer:
         """
         camera = camera_at(position, yaw, pitch, vfov)
         drawn = self._choose(camera, size, cull)
-        rgb = self._rgb(size)
+        rgb = self._rgb(camera, size)
         depth, ids = self._depth_and_ids(size, drawn)
         return View(rgb, depth, ids)
 
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
         self._choose(camera, size, True)
-        return self._rgb(size)
+        return self._rgb(camera, size)
 
     def panorama(self, position, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
@@ -139,7 +143,7 @@ class Renderer:
         depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
         for k, camera in enumerate(face_cameras(position)):
             drawn = self._choose(camera, (s, s), True)
-            rgb[k] = self._rgb((s, s))
+            rgb[k] = self._rgb(camera, (s, s))
             depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
         return Panorama(rgb, depth, ids)
 
@@ -153,6 +157,9 @@ class Renderer:
 
     def close(self) -> None:
         """Free what lies on the graphics side; the renderer cannot be used afterwards."""
+        if self._painter is not None:
+            self._painter.close()
+            self._painter = None
         if self._mjr is not None:
             gl.make_current()
             self._mjr.free()
@@ -208,7 +215,9 @@ class Renderer:
         apart = self._data.geom_xpos - np.array(camera.position)
         return np.all(apart @ planes.T >= -self.scene.model.geom_rbound[:, None] - 1e-3, axis=1)
 
-    def _rgb(self, size: tuple[int, int]) -> np.ndarray:
+    def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        if self._painter is not None:
+            return self._painter.rgb(camera, size, NEAR, FAR)
         height, width = size[0] * self._super, size[1] * self._super
         rect, rgb = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
@@ -256,6 +265,8 @@ def _check(house: House, quality: str, backend: str, size: int, lit: LitPages | 
         raise ValueError(f"backend {backend!r} is unknown to this renderer; use one of {BACKENDS}")
     if not 8 <= size <= 4096:
         raise ValueError(f"size is {size} pixels; a cube face needs 8 to 4096")
+    if backend == "filament" and quality != "baked":
+        raise ValueError(f"backend 'filament' draws quality 'baked' only, not {quality!r}; use backend 'classic'")
     if (quality == "baked") != (lit is not None):
         raise ValueError("quality 'baked' needs lit=..., the pages of embodied.light; 'unlit' takes none")
 

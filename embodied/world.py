@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+import numpy as np
 from tqdm import tqdm
 
 from assets.cache import digest
 from embodied import gl, navgraph
 from embodied.house import House
-from embodied.lit import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.parts import Part, house_parts, owners
@@ -24,8 +24,12 @@ from embodied.sightings import FACE, Sighting, SightingTable, load_table, save_t
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.interface import Sight
+    from embodied.light import Bake
+    from embodied.light.reference import Tracer
 
 QUALITIES = ("unlit", "baked", "glossy", "reference")
+TRACED = ("glossy", "reference")
+"""Qualities whose panoramas are ray-traced; everything else, free cameras too, is drawn by a Renderer."""
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
@@ -48,6 +52,7 @@ class World:
         self.size, self.quality, self.backend, self.light = size, quality, backend, light
         self._path = file
         self._renderer: Renderer | None = None
+        self._tracer: Tracer | None = None
         self._file: PanoramaFile | None = None
         self._refused = False
         self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
@@ -85,10 +90,26 @@ class World:
     def renderer(self) -> Renderer:
         """The renderer of this world, for pictures from anywhere; opened on first use."""
         if self._renderer is None:
-            lit = None if self.quality == "unlit" else _lit(self.house, self.catalogue, self.cache, self.light)
-            self._renderer = Renderer(self.house, self.catalogue, quality=self.quality, backend=self.backend, size=self.size,
-                                      lit=lit)
+            baked = self.quality != "unlit"
+            self._renderer = Renderer(
+                self.house, self.catalogue, quality="baked" if baked else "unlit", backend=self.backend, size=self.size,
+                lit=self._bake.lit if baked else None)
         return self._renderer
+
+    @functools.cached_property
+    def _bake(self) -> Bake:
+        from embodied import light  # late: loads the path tracer
+
+        return light.bake(self.house, self.catalogue, self.cache, self.light)
+
+    def _draw(self, position: np.ndarray) -> Panorama:
+        if self.quality not in TRACED:
+            return self.renderer.panorama(position)
+        if self._tracer is None:
+            from embodied.light.reference import Tracer  # late: loads the path tracer
+
+            self._tracer = Tracer(self._bake, self.house, quality=self.quality, size=self.size)
+        return self._tracer.panorama(position)
 
     def panorama(self, node: int) -> Panorama:
         """The panorama of a node: from the file where it is there, else drawn now."""
@@ -122,7 +143,7 @@ class World:
         """Free the renderer and the file; a later use opens them again."""
         if self._renderer is not None:
             self._renderer.close()
-            self._renderer = None
+        self._renderer = self._tracer = None
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -136,11 +157,11 @@ class World:
 
     def _load(self, node: int) -> Panorama:
         file = self._open_file()
-        return self.renderer.panorama(self.graph.positions[node]) if file is None else file.read(node)
+        return self._draw(self.graph.positions[node]) if file is None else file.read(node)
 
     def _draw_all(self, progress: bool) -> Iterator[Panorama]:
         for position in tqdm(self.graph.positions, "panoramas", disable=not progress, unit="node"):
-            yield self.renderer.panorama(position)
+            yield self._draw(position)
 
     def _open_file(self) -> PanoramaFile | None:
         """The panorama file, if it is whole and of this very world."""
@@ -204,9 +225,3 @@ def code_digest() -> str:
     """Hex digest of the sources that decide what a picture shows."""
     files = sorted({f for pattern in PICTURE_SOURCES for f in ROOT.glob(pattern)})
     return digest(*(f.read_bytes() for f in files))[:16]
-
-
-def _lit(house: House, catalogue: Catalogue, cache: Path, light: str) -> LitPages:
-    from embodied.light import bake  # late: loads the path tracer
-
-    return bake(house, catalogue, cache, light).lit

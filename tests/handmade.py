@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from assets.records import Asset, Finish, MeshPart, SupportSurface
+from embodied.geometry import rotation
 from embodied.house import House, Placement
+from embodied.lit import LitMesh, LitPages
+from embodied.parts import house_parts
 
 RED, GREEN, BLUE, WOOD = (0.9, 0.05, 0.05, 1.0), (0.05, 0.8, 0.1, 1.0), (0.1, 0.15, 0.9, 1.0), (0.6, 0.4, 0.25, 1.0)
 
@@ -75,3 +78,17 @@ def furnished(house: House) -> House:
         Placement("red_box_2", "hand/red_box", "red box", "bedroom_1", (8.5, 3.4, 0.0), 0.0, (0.5, 0.5, 0.8)),
     )
     return dataclasses.replace(house, placements=(*house.placements, *things))
+
+
+def painted(house: House, catalogue) -> LitPages:
+    """Lit pages without a bake: every part evenly in its own colour, one texel block each."""
+    parts = [p for p in house_parts(house, catalogue) if len(p.mesh.faces)]
+    page, meshes = np.zeros((8, 8 * len(parts), 3), np.uint8), []
+    for i, part in enumerate(parts):
+        page[:, 8 * i:8 * i + 8] = np.rint(255 * np.array(part.mesh.finish.color[:3]))
+        turned = part.mesh.vertices.copy()
+        turned[:, :2] = turned[:, :2] @ rotation(part.yaw).T
+        uv = np.full((len(turned), 2), [(i + 0.5) / len(parts), 0.5], np.float32)
+        meshes.append(LitMesh(part.owner, part.kind, part.room, 0, (turned + part.position).astype(np.float32), part.mesh.faces,
+                              uv, float(part.mesh.finish.color[3])))
+    return LitPages(tuple(meshes), (page,), "painted")
