@@ -17,7 +17,9 @@ ROOM_KINDS = (
 
 SUPPORTS = ("floor", "against_wall", "corner", "surface", "wall", "ceiling")
 """How an asset is held up: free on the floor, on the floor with its back to a wall, on the
-floor in a corner, on another object's support surface, hung on a wall, hung from the ceiling."""
+floor in a corner, on another object's support surface, hung on a wall, hung from the ceiling.
+What goes in a corner has its back (+y) to one wall and, by its tag, its left side ('corner_left',
+-x) or its right side ('corner_right', +x) to the other."""
 
 
 @dataclass(frozen=True)

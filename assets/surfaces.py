@@ -74,7 +74,7 @@ def find_surfaces(parts: Sequence[MeshPart], step: float = 0.01, limit: int = 12
                     float(room[inside].min()),
                 ))
                 chosen &= ~inside
-    found = [s for s in found if s.headroom >= 1.0 or reach(parts, s) > 0.6]
+    found = [s for s in found if s.headroom == OPEN or reach(parts, s) > 0.6]
     found = sorted(found, key=lambda s: -(s.x1 - s.x0) * (s.y1 - s.y0))[:limit]
     return tuple(_named(sorted(found, key=lambda s: (round(s.z, 3), s.x0, s.y0))))
 
