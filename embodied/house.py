@@ -26,6 +26,7 @@ SCHEMA = 1
 """Version of house.json; a file of another version is refused."""
 
 OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french_window", "garage_door")
+WEATHERS = ("clear", "hazy", "overcast")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
 
@@ -238,9 +239,11 @@ def check(house: House) -> None:
     """Refuse a house that cannot be.
 
     Raises:
-      HouseError: duplicate or dangling ids, unknown kinds, overlapping rooms, a room without a
-        door, an opening that is on no shared wall, an object outside its room.
+      HouseError: duplicate or dangling ids, unknown kinds, numbers out of range, overlapping rooms,
+        a room without a door or cut off from the others, an opening that is on no shared wall, a
+        window between rooms, overlapping openings, an object outside its room.
     """
+    _check_numbers(house)
     _check_ids(house)
     polygons = {}
     for room in house.rooms:
@@ -253,12 +256,29 @@ def check(house: House) -> None:
         polygons[room.id] = polygon
     _check_overlaps(house, polygons)
     _check_openings(house, polygons)
+    _check_walls(house, polygons)
+    _check_reach(house)
     for p in house.placements:
         if polygons[p.room].distance(shapely.Point(p.position[:2])) > house.outer_wall:
             raise HouseError(
                 f"object {p.id!r} stands at {p.position} outside its room {p.room!r}; "
                 "move it inside or name the room it is in"
             )
+
+
+def _check_numbers(house: House) -> None:
+    if not house.storeys or any(s.height < 1.8 for s in house.storeys):
+        raise HouseError(f"a house needs storeys of at least 1.8 m clear height, got {house.storeys}")
+    if not 0 < house.inner_wall < 1 or not house.inner_wall <= house.outer_wall < 2:
+        raise HouseError(f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}")
+    if house.sky.weather not in WEATHERS or not 0 <= house.sky.hour < 24:
+        raise HouseError(f"sky should have a weather of {WEATHERS} and an hour in [0, 24), got {house.sky}")
+    numbers = [(p.id, (*p.position, p.yaw, *p.size)) for p in house.placements]
+    numbers += [(x.id, (*x.position, *x.color, x.power)) for x in house.lights]
+    numbers += [(o.id, (*o.a, *o.b, o.sill, o.head, o.angle)) for o in house.openings]
+    for name, values in numbers:
+        if not all(map(math.isfinite, values)):
+            raise HouseError(f"{name!r} has a number that is not finite: {values}")
 
 
 def _check_ids(house: House) -> None:
@@ -279,6 +299,13 @@ def _check_ids(house: House) -> None:
     for p in house.placements:
         if p.parent is not None and p.parent not in house.placement_by_id:
             raise HouseError(f"object {p.id!r} rests on the unknown object {p.parent!r}")
+        seen = {p.id}
+        above = p
+        while above.parent is not None:
+            above = house.placement_by_id.get(above.parent, p)
+            if above.id in seen:
+                raise HouseError(f"object {p.id!r} rests on itself, through {sorted(seen)}")
+            seen.add(above.id)
         if min(p.size) <= 0:
             raise HouseError(f"object {p.id!r} has the size {p.size}; all three must be positive")
 
@@ -315,6 +342,55 @@ def _check_openings(house: House, polygons: dict[str, shapely.Polygon]) -> None:
     for room in house.rooms:
         if room.id not in has_door:
             raise HouseError(f"room {room.id!r} has no door; every room needs one, add an Opening or drop the room")
+
+
+def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+    """Openings to the outdoors on outer walls only, doors between two rooms of one storey, none through another."""
+    tree = shapely.STRtree([polygons[r.id] for r in house.rooms])
+    lines = [shapely.LineString([o.a, o.b]) for o in house.openings]
+    for o, line in zip(house.openings, lines):
+        first = house.room_by_id[o.rooms[0]]
+        if line.length < 0.2:
+            raise HouseError(f"opening {o.id!r} is {line.length:.2f} m wide; at least 0.2 m is needed")
+        if o.head > house.storey_of(first).height + 1e-6:
+            raise HouseError(f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high")
+        if o.hinge not in ("a", "b") or not 0 <= o.angle <= math.pi:
+            raise HouseError(f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}")
+        if o.rooms[1] is not None:
+            if o.rooms[0] == o.rooms[1] or house.room_by_id[o.rooms[1]].storey != first.storey:
+                raise HouseError(f"opening {o.id!r} should join two rooms of one storey, got {o.rooms}")
+            if o.kind not in ("door", "passage"):
+                raise HouseError(f"{o.kind} {o.id!r} should lead outdoors, it lies between the rooms {o.rooms}")
+            continue
+        for j in sorted(tree.query(line.buffer(1e-3))):
+            other = house.rooms[j]
+            if other.id != first.id and other.storey == first.storey and polygons[other.id].buffer(1e-3).intersection(
+                    line).length > 0.01:
+                raise HouseError(f"{o.kind} {o.id!r} should lead outdoors, behind its wall lies room {other.id!r}")
+    near = shapely.STRtree(lines)
+    for i, o in enumerate(house.openings):
+        for j in sorted(near.query(lines[i].buffer(1e-3))):
+            other = house.openings[j]
+            same = house.room_by_id[o.rooms[0]].storey == house.room_by_id[other.rooms[0]].storey
+            if j > i and same and lines[i].buffer(1e-3).intersection(lines[j]).length > 0.01 and (
+                    min(o.head, other.head) > max(o.sill, other.sill)):
+                raise HouseError(f"openings {o.id!r} and {other.id!r} overlap; move one along the wall")
+
+
+def _check_reach(house: House) -> None:
+    """Every room can be reached from the first one through doors and stairs."""
+    ways: dict[str, list[str]] = {r.id: [] for r in house.rooms}
+    pairs = [o.rooms for o in house.openings if o.kind in DOORS and o.rooms[1] is not None]
+    for a, b in (*pairs, *(s.rooms for s in house.stairs)):
+        ways[a].append(b)
+        ways[b].append(a)
+    reached, todo = {house.rooms[0].id}, [house.rooms[0].id]
+    while todo:
+        new = [r for r in ways[todo.pop()] if r not in reached]
+        reached.update(new)
+        todo += new
+    if lost := [r.id for r in house.rooms if r.id not in reached]:
+        raise HouseError(f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one")
 
 
 def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
