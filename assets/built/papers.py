@@ -277,7 +277,7 @@ def tissue_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
 
 def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
-    r, cup = w / 2, h * 0.55
+    r, high = w / 2, h * 0.55
     tints = ((0.80, 0.60, 0.16), (0.18, 0.32, 0.55), (0.68, 0.17, 0.15), (0.10, 0.10, 0.11), (0.22, 0.45, 0.28))
     pens = []
     for k in range(6):
@@ -289,7 +289,7 @@ def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return parts_of(
         (
             material(look, "skin", finish, "leather/2") if "skin" in look else plain((0.10, 0.10, 0.105), 0.5),
-            cup(r, cup, 0.98, 0.003),
+            cup(r, high, 0.98, 0.003),
         ),
         *pens,
     )

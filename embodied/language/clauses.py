@@ -1,0 +1,116 @@
+"""What a route instruction means, clause by clause, before anybody puts it into words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LEFT, RIGHT = "left", "right"
+
+
+@dataclass(frozen=True)
+class Thing:
+    """Something that is spoken of: any object of one of `classes` that has all of `words`."""
+
+    classes: tuple[str, ...]
+    """Object classes that the noun may stand for, ascending."""
+    words: tuple[str, ...] = ()
+    """Colour and material words, ascending."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Turn on the spot before the next step."""
+
+    side: str
+    """LEFT or RIGHT; either for turning back."""
+    angle: int = 90
+    """Degrees: 45 slightly, 90, or 180 for turning back."""
+
+
+@dataclass(frozen=True)
+class Exit:
+    """Walk out of the room one is in."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class Enter:
+    """Walk into a room of this kind."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class Cross:
+    """Walk on through the room one is in."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class Forward:
+    """Walk straight on for a while."""
+
+
+@dataclass(frozen=True)
+class Metres:
+    """Walk straight on for about this far."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class To:
+    """Walk up to something."""
+
+    thing: Thing
+
+
+@dataclass(frozen=True)
+class Past:
+    """Walk past something."""
+
+    thing: Thing
+    side: str | None = None
+    """Where it is when one passes it."""
+
+
+@dataclass(frozen=True)
+class Avoid:
+    """What not to do: do not go into a room of this kind."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class StopBy:
+    """The end is beside something."""
+
+    thing: Thing
+
+
+@dataclass(frozen=True)
+class StopIn:
+    """The end is in a room of this kind."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class StopHere:
+    """The end is where the last clause ended."""
+
+
+Clause = Turn | Exit | Enter | Cross | Forward | Metres | To | Past | Avoid | StopBy | StopIn | StopHere
+STOPS = (StopBy, StopIn, StopHere)
+WALKS = (Exit, Enter, Cross, Forward, Metres, To, Past)
+"""Clauses that take at least one step."""
+
+
+@dataclass(frozen=True)
+class RouteInstruction:
+    """A route instruction as meaning: `grammar.say` puts it into words, `grammar.parse` reads it back,
+    `listener.cost` tells how badly a walk carries it out."""
+
+    clauses: tuple[Clause, ...]

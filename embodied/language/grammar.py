@@ -1,0 +1,209 @@
+"""Saying a route instruction and reading it back: one list of templates serves both directions."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.language.clauses import (
+    LEFT,
+    Avoid,
+    Clause,
+    Cross,
+    Enter,
+    Exit,
+    Forward,
+    Metres,
+    Past,
+    RouteInstruction,
+    StopBy,
+    StopHere,
+    StopIn,
+    To,
+    Turn,
+)
+from embodied.language.lexicon import ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
+from embodied.language.templates import FILLERS, HEDGES, LINKS, NUMBERS, SLIPS, TEMPLATES, Template
+
+if TYPE_CHECKING:
+    from embodied.language.speakers import Speaker
+
+
+@dataclass(frozen=True)
+class Phrase:
+    """A clause with the noun its speaker chose for the thing in it."""
+
+    clause: Clause
+    word: Word | None = None
+
+
+def kind_of(clause: Clause) -> str:
+    """The name by which templates know a clause."""
+    if isinstance(clause, Turn):
+        return {45: "slight", 90: "turn", 180: "around"}[clause.angle]
+    if isinstance(clause, Past):
+        return "past" if clause.side is None else "past_side"
+    return {Exit: "exit", Enter: "enter", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid",
+            StopBy: "stop_by", StopIn: "stop_in", StopHere: "stop_here"}[type(clause)]
+
+
+_BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
+    kinds: tuple(t for t in TEMPLATES if t.kinds == kinds) for kinds in {t.kinds: None for t in TEMPLATES}
+}
+
+
+# Saying -----------------------------------------------------------------------------------------
+
+def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
+    """Sentences in the speaker's habits, e.g. 'Leave the bedroom and turn left at once. Stop by the sofa.'"""
+    pieces = []
+    i = 0
+    while i < len(phrases):
+        pair = tuple(kind_of(p.clause) for p in phrases[i:i + 2])
+        if len(pair) == 2 and pair in _BY_KINDS and rng.random() < speaker.joining:
+            pieces.append((_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i:i + 2], speaker, rng), pair))
+            i += 2
+        else:
+            pieces.append((_fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i:i + 1], speaker, rng), pair[:1]))
+            i += 1
+    return _slip(_sentences(pieces, speaker, rng), speaker, rng)
+
+
+def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Generator) -> Template:
+    fitting = [t for t in templates if t.habit in ("", speaker.habit)]
+    weights = np.array([3.0 if t.habit else 1.0 for t in fitting])
+    return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
+
+
+def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: np.random.Generator) -> str:
+    slots = {}
+    rooms = [p.clause.kind for p in phrases if hasattr(p.clause, "kind")]
+    for name, kind in zip(("room", "other"), rooms):
+        nouns = ROOM_NOUNS[kind]
+        slots[name] = nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))]
+    for p in phrases:
+        if isinstance(p.clause, Metres):
+            slots["n"] = NUMBERS[p.clause.count] if p.clause.count < len(NUMBERS) and rng.random() < 0.7 else str(p.clause.count)
+        if getattr(p.clause, "side", None):
+            slots["side"] = p.clause.side
+        if p.word is not None:
+            slots["thing"] = f"the {p.word}"
+    return template.text.format(**slots)
+
+
+def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, rng: np.random.Generator) -> str:
+    """Pieces joined by links and full stops; a stop and a warning begin sentences of their own more often."""
+    sentences: list[str] = []
+    current = ""
+    length = 0
+    for n, (text, kinds) in enumerate(pieces):
+        if n and length < speaker.clauses_per_sentence and rng.random() < 0.8 and "avoid" not in kinds:
+            links = LINKS[speaker.habit] if rng.random() < 0.6 else LINKS[""]
+            link = links[int(rng.integers(len(links)))]
+            if not link or rng.random() < 0.15:
+                current += f", {text}"
+            else:
+                pause = "" if link in ("and", "then", "and then") and rng.random() < 0.6 else ","
+                current += f"{pause} {link} {text}"
+            length += 1
+            continue
+        if current:
+            sentences.append(current)
+        current, length = text, 1
+        if n == 0 and rng.random() < speaker.openings and (fillers := (*FILLERS[speaker.habit], *FILLERS[""])):
+            current = f"{fillers[int(rng.integers(len(fillers)))]}, {text}"
+        elif rng.random() < speaker.hedges:
+            current = f"{text}, {HEDGES[int(rng.integers(len(HEDGES)))]}"
+    sentences.append(current)
+    return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
+
+
+def _slip(text: str, speaker: Speaker, rng: np.random.Generator) -> str:
+    """Now and then a misspelt word."""
+    words = text.split(" ")
+    return " ".join(SLIPS.get(w, w) if rng.random() < speaker.slips else w for w in words)
+
+
+# Reading back -----------------------------------------------------------------------------------
+
+def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
+    """The clauses that a text means; what no template accounts for is passed over.
+
+    Raises:
+      ValueError: not one clause was understood.
+    """
+    rest, clauses = normalised(text), []
+    while rest:
+        match, template = _longest(rest, lexicon)
+        if match is None:
+            rest = rest.partition(" ")[2]
+            continue
+        clauses += _clauses(template, match, lexicon)
+        rest = rest[match.end():].lstrip()
+    if not clauses:
+        raise ValueError(f"no part of {text!r} is a route instruction; expected words such as 'turn left and go to the sofa'")
+    return RouteInstruction(tuple(clauses))
+
+
+def normalised(text: str) -> str:
+    """Lower case without punctuation, slips mended, hedges and openings removed."""
+    plain = re.sub(r"[.,;!?]+", " ", text)
+    plain = " " + re.sub(r"\s+", " ", plain).strip().lower() + " "
+    for right, wrong in SLIPS.items():
+        plain = plain.replace(f" {wrong} ", f" {right} ")
+    for empty in _EMPTY:
+        plain = plain.replace(f" {empty} ", " ")
+    return plain.strip()
+
+
+_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in (*FILLERS.values(), *LINKS.values()) for f in fs if " " in f}, key=lambda s: (-len(s), s))
+
+
+def _longest(text: str, lexicon: Lexicon) -> tuple[re.Match | None, Template]:
+    best, chosen = None, TEMPLATES[0]
+    first = text.split(" ", 1)[0]
+    for pattern, start, template in _patterns(lexicon):
+        if start and start != first:
+            continue
+        match = pattern.match(text)
+        if match and (best is None or match.end() > best.end()):
+            best, chosen = match, template
+    return best, chosen
+
+
+@functools.lru_cache(maxsize=4)
+def _patterns(lexicon: Lexicon) -> tuple[tuple[re.Pattern, str, Template], ...]:
+    """(pattern, first word or '', template) for every template."""
+    rooms = "|".join(re.escape(n) for n in sorted(ROOM_OF_NOUN, key=lambda n: (-len(n), n)))
+    slots = {"side": "(?P<side>left|right)", "room": f"(?P<room>{rooms})", "other": f"(?P<other>{rooms})",
+             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "thing": f"the (?P<thing>{lexicon.noun_pattern})"}
+    found = []
+    for t in TEMPLATES:
+        pattern = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
+        for name, slot in slots.items():
+            pattern = pattern.replace(f"{{{name}}}", slot)
+        first = t.text.split(" ", 1)[0].lower()
+        found.append((re.compile(pattern + r"(?![\w-])"), "" if first.startswith("{") else first, t))
+    return tuple(found)
+
+
+def _clauses(template: Template, match: re.Match, lexicon: Lexicon) -> list[Clause]:
+    said = match.groupdict()
+    rooms = iter([ROOM_OF_NOUN[said[k]] for k in ("room", "other") if said.get(k)])
+    thing = lexicon.heard(said["thing"]) if said.get("thing") else None
+    side = said.get("side")
+    count = said.get("n")
+    number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
+    make = {
+        "turn": lambda: Turn(side), "slight": lambda: Turn(side, 45), "around": lambda: Turn(LEFT, 180),
+        "exit": lambda: Exit(next(rooms)), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
+        "forward": Forward, "metres": lambda: Metres(number), "to": lambda: To(thing), "past": lambda: Past(thing),
+        "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "stop_by": lambda: StopBy(thing),
+        "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,
+    }
+    return [make[kind]() for kind in template.kinds]

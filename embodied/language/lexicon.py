@@ -1,0 +1,137 @@
+"""Nouns and adjectives: which words people use for rooms and things, and what those words may mean."""
+
+from __future__ import annotations
+
+import functools
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.language.clauses import Thing
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from assets.records import Asset
+
+ROOM_NOUNS: dict[str, tuple[str, ...]] = {
+    "living_room": ("living room", "lounge", "sitting room"),
+    "family_room": ("family room", "TV room", "den"),
+    "kitchen": ("kitchen",),
+    "dining_room": ("dining room", "dining area"),
+    "main_bedroom": ("main bedroom", "master bedroom", "big bedroom"),
+    "bedroom": ("bedroom",),
+    "kids_room": ("kids room", "children's room", "nursery"),
+    "guest_room": ("guest room", "spare room"),
+    "bathroom": ("bathroom", "washroom"),
+    "toilet": ("toilet room", "restroom", "powder room"),
+    "hall": ("hall", "entrance hall", "entryway", "foyer"),
+    "corridor": ("corridor", "hallway", "passageway"),
+    "study": ("study", "home office"),
+    "laundry_room": ("laundry room", "utility room"),
+    "pantry": ("pantry", "larder"),
+    "closet": ("closet", "walk-in closet", "dressing room"),
+    "library": ("library", "reading room"),
+    "playroom": ("playroom", "games room"),
+    "gym": ("gym", "exercise room", "fitness room"),
+    "garage": ("garage",),
+    "sun_room": ("sun room", "conservatory", "sunroom"),
+    "workshop": ("workshop", "hobby room"),
+    "stairwell": ("stairwell", "staircase"),
+}
+"""Room kind to the nouns for it, the plainest first."""
+ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
+UNFIT = frozenset({
+    "person", "wall socket", "double socket", "network socket", "aerial socket", "light switch", "double light switch",
+    "dimmer switch", "smoke detector", "ceiling lamp", "strip light", "spotlight", "track light", "fluorescent lamp",
+    "security camera", "thermometer", "toilet paper holder", "keys", "cap",
+})
+"""Classes that nobody would steer by."""
+
+
+@dataclass(frozen=True)
+class Word:
+    """One way to name a thing."""
+
+    noun: str
+    adjectives: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " ".join([*self.adjectives, self.noun])
+
+
+class Lexicon:
+    """The words of a catalogue; made once per catalogue, changes never."""
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        classes_of: dict[str, set[str]] = {}
+        nouns_of: dict[str, list[str]] = {}
+        adjectives: set[str] = set()
+        for asset in catalogue.assets.values():
+            adjectives |= {w.lower() for w in (*asset.colours, *asset.materials)}
+            for noun in (asset.object_class, *asset.synonyms):
+                noun = noun.lower()
+                if noun in ROOM_OF_NOUN or not re.fullmatch(r"[a-z][a-z' -]*", noun):
+                    continue
+                classes_of.setdefault(noun, set()).add(asset.object_class)
+                if noun not in nouns_of.setdefault(asset.object_class, []):
+                    nouns_of[asset.object_class].append(noun)
+        self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
+        self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
+        self.adjectives = tuple(sorted(adjectives))
+
+    def thing(self, word: Word) -> Thing:
+        """What a word may stand for.
+
+        Raises:
+          KeyError: no such noun.
+        """
+        return Thing(self.classes_of[word.noun], tuple(sorted(word.adjectives)))
+
+    def words_for(self, asset: Asset, rng: np.random.Generator, *, adjectives: int) -> Word:
+        """A noun for an asset, the plain one most often, with up to `adjectives` of its colour and material words."""
+        nouns = self.nouns_of[asset.object_class]
+        own = [n for n in nouns if n == asset.object_class or n in {s.lower() for s in asset.synonyms}] or list(nouns)
+        noun = own[0] if len(own) == 1 or rng.random() < 0.6 else own[int(rng.integers(1, len(own)))]
+        spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
+        return Word(noun, tuple(spare[:adjectives]))
+
+    @functools.cached_property
+    def noun_pattern(self) -> str:
+        """Regular expression of a thing: adjectives, then the longest noun that fits."""
+        nouns = "|".join(re.escape(n) for n in sorted(self.classes_of, key=lambda n: (-len(n), n)))
+        words = "|".join(re.escape(w) for w in sorted(self.adjectives, key=lambda w: (-len(w), w)))
+        return rf"(?:(?:{words}) ){{0,2}}(?:{nouns})"
+
+    def heard(self, text: str) -> Thing:
+        """The thing that a text of `noun_pattern` means; the longest noun at its end wins."""
+        tokens = text.split(" ")
+        for i in range(len(tokens)):
+            noun, words = " ".join(tokens[i:]), self._adjectives_of(tokens[:i])
+            if noun in self.classes_of and words is not None:
+                return Thing(self.classes_of[noun], tuple(sorted(words)))
+        raise ValueError(f"{text!r} names nothing of the catalogue; expected adjectives and one of its nouns")
+
+    def _adjectives_of(self, tokens: list[str]) -> list[str] | None:
+        """Tokens as adjectives, the longest first ('dark brown', 'wood'); None if they are none."""
+        words = []
+        while tokens:
+            n = next((n for n in range(len(tokens), 0, -1) if " ".join(tokens[:n]) in self.adjectives), None)
+            if n is None:
+                return None
+            words.append(" ".join(tokens[:n]))
+            tokens = tokens[n:]
+        return words
+
+
+@functools.lru_cache(maxsize=4)
+def lexicon_of(catalogue: Catalogue) -> Lexicon:
+    """The lexicon of a catalogue, made once per process and catalogue."""
+    return Lexicon(catalogue)
+
+
+def says(asset: Asset, thing: Thing) -> bool:
+    """Whether `thing` may mean this asset."""
+    own = {w.lower() for w in (*asset.colours, *asset.materials)}
+    return asset.object_class in thing.classes and all(w in own for w in thing.words)

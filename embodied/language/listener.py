@@ -1,0 +1,215 @@
+"""A scripted listener: carries out what it reads, seeing only what anybody would see.
+
+It reads the text with the grammar, then searches, cheapest first, for a walk that fits the
+clauses. A walk is only extended from nodes it has looked around at, so all it knows of the house
+comes through `Eyes`; it may turn back and try another way, as people do.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from embodied.geometry import wrap
+from embodied.language.clauses import (
+    LEFT,
+    STOPS,
+    Avoid,
+    Clause,
+    Cross,
+    Enter,
+    Exit,
+    Metres,
+    Past,
+    RouteInstruction,
+    StopBy,
+    StopIn,
+    To,
+    Turn,
+)
+from embodied.language.grammar import parse
+from embodied.language.lexicon import lexicon_of
+from embodied.language.seen import Eyes, Seen
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+LONGEST = 4
+"""Most steps that one clause may stand for."""
+PATIENCE = 2500
+"""Most partial walks it thinks through before it settles for the best it has."""
+NEAR, BESIDE = 1.6, 2.6
+"""Metres within which one is at a thing, or passes it."""
+MISSING = 4.0
+"""Cost of a thing or room that is not there."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What the listener did."""
+
+    path: tuple[int, ...]
+    cost: float
+    """How badly the walk fits the words; 0 is perfect."""
+    looked: int
+    """Nodes at which it looked around."""
+
+
+def follow(world: World, text: str, start: int, yaw: float) -> Heard:
+    """Walk as `text` says, from `start`, looking along `yaw` (radians).
+
+    Raises:
+      ValueError: the text holds no instruction.
+    """
+    return carry_out(Eyes(world), parse(text, lexicon_of(world.catalogue)), start, yaw)
+
+
+def carry_out(eyes: Eyes, instruction: RouteInstruction, start: int, yaw: float) -> Heard:
+    """The cheapest walk that fits the clauses, found by uniform-cost search."""
+    clauses = runnable(instruction.clauses)
+    tie = itertools.count()
+    queue = [(0.0, next(tie), (start,), yaw, 0, 0, 0.0)]
+    seen_states: set[tuple] = set()
+    fallback, farthest = (start,), -1
+    for _ in range(PATIENCE):
+        if not queue:
+            break
+        cost, _, path, facing, k, begun, pending = heapq.heappop(queue)
+        if k == len(clauses):
+            return Heard(path, cost, eyes.visited)
+        state = (path[-1], path[-2:-1], k, len(path) - 1 - begun, pending)
+        if state in seen_states:
+            continue
+        seen_states.add(state)
+        if k > farthest:
+            fallback, farthest = path, k
+        for step in _onward(eyes, clauses, path, facing, k, begun, pending):
+            added, new_path, new_facing, new_k, new_begun, new_pending = step
+            heapq.heappush(queue, (cost + added, next(tie), new_path, new_facing, new_k, new_begun, new_pending))
+    return Heard(fallback, math.inf, eyes.visited)
+
+
+def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
+    """Without warnings, and with a walk after every turn that has none before the next turn or stop."""
+    kept = [c for c in clauses if not isinstance(c, Avoid)]
+    while len(kept) > 1 and isinstance(kept[-1], Turn):
+        kept.pop()
+    return tuple(kept)
+
+
+def _onward(eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing: float, k: int, begun: int, pending: float):
+    """All ways to go on: finish this clause, or take a step within it.
+
+    `begun` is the index in `path` where clause k began, `pending` the turn (radians) that was asked
+    for and not made yet.
+    """
+    clause = clauses[k]
+    if isinstance(clause, Turn):
+        turned = math.radians(clause.angle) * (1 if clause.side == LEFT else -1)
+        yield 0.0, path, facing, k + 1, len(path) - 1, pending + turned
+        return
+    if isinstance(clause, STOPS):
+        yield stop_cost(clause, eyes.at(path[-1])), path, facing, k + 1, len(path) - 1, pending
+        return
+    steps = len(path) - 1 - begun
+    if steps:
+        yield walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, 0.0
+    elif isinstance(clause, To | Past):
+        yield 0.8 + walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, pending
+    if steps < LONGEST:
+        for way in eyes.at(path[-1]).ways:
+            cost = 0.12 + turn_cost(wrap(way.yaw - facing), pending if steps == 0 else 0.0, asked=steps == 0 and pending != 0.0)
+            cost += 1.5 * (way.node in path)
+            if way.leaves and not isinstance(clause, Exit | Enter):
+                cost += 0.4 * (not isinstance(clause, Cross))
+            yield cost, (*path, way.node), way.yaw, k, begun, 0.0 if steps else pending
+
+
+def turn_cost(turned: float, wanted: float, *, asked: bool) -> float:
+    """How badly a turn (radians, left positive) fits the one that was asked for; straight on needs no asking."""
+    off = abs(float(wrap(turned - wanted)))
+    free, scale = (math.radians(30), math.radians(24)) if asked else (math.radians(35), math.radians(28))
+    return min(max(off - free, 0.0) / scale, 2.5) ** 2
+
+
+def walk_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
+    """How badly a stretch of walk (its start included) fits one clause."""
+    first, last = eyes.at(path[0]), eyes.at(path[-1])
+    crossings = [_way(eyes.at(a), b).leaves for a, b in itertools.pairwise(path)]
+    if isinstance(clause, Exit):
+        return MISSING * (first.kind != clause.kind) + MISSING * (not any(crossings)) + 1.0 * (sum(crossings) > 1)
+    if isinstance(clause, Enter):
+        return MISSING * (last.kind != clause.kind) + MISSING * (not (crossings and crossings[-1])) + 0.8 * (sum(crossings) > 1)
+    if isinstance(clause, Cross):
+        kinds = [eyes.at(n).kind for n in path]
+        return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])
+    if isinstance(clause, Metres):
+        length = sum(_way(eyes.at(a), b).length for a, b in itertools.pairwise(path))
+        return 0.9 * max(abs(length - clause.count) - 0.5, 0.0)
+    if isinstance(clause, To):
+        return near_cost(last, clause.thing)
+    if isinstance(clause, Past):
+        return past_cost(clause, eyes, path)
+    return 0.0
+
+
+def near_cost(seen: Seen, thing) -> float:
+    """How far one is from being at a thing."""
+    found = seen.nearest(thing)
+    return MISSING if found is None else min(1.3 * max(found.distance - NEAR, 0.0) + 0.15 * found.distance, MISSING)
+
+
+def past_cost(clause: Past, eyes: Eyes, path: Sequence[int]) -> float:
+    """How badly a stretch passes a thing: it should come near, on the right side."""
+    best = MISSING
+    for a, b in itertools.pairwise(path):
+        ahead = _way(eyes.at(a), b).yaw
+        for node in (a, b):
+            found = eyes.at(node).nearest(clause.thing)
+            if found is None:
+                continue
+            bearing = float(wrap(found.yaw - ahead))
+            wrong = clause.side is not None and (bearing > 0) != (clause.side == LEFT) and 0.2 < abs(bearing) < 2.9
+            best = min(best, max(found.distance - BESIDE, 0.0) + 2.0 * wrong)
+    return best
+
+
+def stop_cost(clause: Clause, seen: Seen) -> float:
+    """How badly a node fits where one is told to stop."""
+    if isinstance(clause, StopBy):
+        return near_cost(seen, clause.thing)
+    if isinstance(clause, StopIn):
+        return MISSING * (seen.kind != clause.kind)
+    return 0.0
+
+
+def _way(seen: Seen, node: int):
+    return next(w for w in seen.ways if w.node == node)
+
+
+def cost(world: World, instruction: RouteInstruction, path: Sequence[int], yaw: float) -> float:
+    """How badly a finished walk carries out an instruction; 0 is perfect, above about 4 something was not done.
+
+    The clauses are laid along the walk in the cheapest way, with the same costs that a listener uses.
+    """
+    clauses, eyes = runnable(instruction.clauses), _Led(world, path)
+    return carry_out(eyes, RouteInstruction(clauses), path[0], yaw).cost if len(path) > 1 else 0.0
+
+
+class _Led(Eyes):
+    """Eyes of somebody who is led along a path: the only way on is the path's own."""
+
+    def __init__(self, world: World, path: Sequence[int]) -> None:
+        super().__init__(world)
+        self._next = {a: b for a, b in itertools.pairwise(path)}
+
+    def at(self, node: int) -> Seen:
+        seen = super().at(node)
+        onward = self._next.get(node)
+        return Seen(seen.kind, seen.things, tuple(w for w in seen.ways if w.node == onward))
+
+

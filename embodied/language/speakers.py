@@ -1,0 +1,49 @@
+"""People have habits of speech: who names landmarks, who counts metres, who chats, who hedges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Speaker:
+    """Habits as probabilities."""
+
+    habit: str
+    """'terse', 'chatty', 'formal' or '': which templates, links and openings it likes."""
+    landmarks: float = 0.8
+    """Naming a thing to walk to or past where one can be seen."""
+    metres: float = 0.2
+    """Giving a distance where no thing is named."""
+    colours: float = 0.3
+    """Adding a colour or material that is not needed."""
+    avoids: float = 0.05
+    """Saying where not to go."""
+    joining: float = 0.4
+    """Saying two clauses in one breath."""
+    clauses_per_sentence: int = 2
+    openings: float = 0.1
+    hedges: float = 0.03
+    slips: float = 0.01
+    """Per word that can be misspelt."""
+    plainness: float = 0.7
+    """Using the plainest noun for a room."""
+
+
+SPEAKERS: tuple[tuple[float, Speaker], ...] = (
+    (0.28, Speaker("")),
+    (0.16, Speaker("terse", landmarks=0.75, colours=0.15, joining=0.5, clauses_per_sentence=3, hedges=0.0, plainness=0.9)),
+    (0.18, Speaker("chatty", landmarks=0.9, colours=0.45, avoids=0.15, openings=0.45, hedges=0.12, slips=0.03, plainness=0.5)),
+    (0.12, Speaker("formal", landmarks=0.7, metres=0.6, openings=0.25, hedges=0.0, slips=0.0, clauses_per_sentence=2)),
+    (0.16, Speaker("", landmarks=1.0, colours=0.6, joining=0.3, avoids=0.08)),
+    (0.10, Speaker("", landmarks=0.45, metres=0.7, joining=0.55, clauses_per_sentence=2)),
+)
+"""(share, speaker): everyday, terse, chatty, formal, landmark-minded, direction-minded."""
+
+
+def draw_speaker(rng: np.random.Generator) -> Speaker:
+    """One of the speakers by their shares."""
+    shares = np.array([share for share, _ in SPEAKERS])
+    return SPEAKERS[int(rng.choice(len(SPEAKERS), p=shares / shares.sum()))][1]

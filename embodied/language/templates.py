@@ -1,0 +1,126 @@
+"""How clauses sound. A template speaks for one or two clauses at once and is read back by the parser.
+
+Slots: {side} left or right, {room} a room noun, {thing} 'the red sofa', {n} a number. A slot is
+filled by the first clause of the template that has such a field. Weights: how much each habit of
+speech likes a template; a habit that is not named uses 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Template:
+    kinds: tuple[str, ...]
+    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'cross', 'forward', 'metres', 'to',
+    'past', 'past_side', 'avoid', 'stop_by', 'stop_in', 'stop_here'."""
+    text: str
+    habit: str = ""
+    """'terse', 'chatty', 'formal', or '' for everybody."""
+
+
+def _all(kinds: str, *lines: str) -> list[Template]:
+    """Templates of one clause sequence; a line may begin with '<habit>: '."""
+    found = []
+    for line in lines:
+        habit, _, text = line.rpartition(": ")
+        found.append(Template(tuple(kinds.split()), text, habit))
+    return found
+
+
+TEMPLATES: tuple[Template, ...] = tuple([
+    *_all("turn", "turn {side}", "take a {side}", "turn to your {side}", "make a {side} turn", "terse: go {side}",
+          "chatty: hang a {side}", "formal: rotate ninety degrees to the {side}", "face {side}", "turn to the {side}",
+          "chatty: you want to turn {side}", "swing {side}", "chatty: make a {side}"),
+    *_all("slight", "turn slightly {side}", "bear {side}", "veer {side}", "keep {side}", "turn a little to the {side}",
+          "chatty: turn just a bit to your {side}", "go slightly to the {side}", "formal: rotate slightly to the {side}",
+          "angle {side}", "turn half {side}", "drift {side}"),
+    *_all("around", "turn around", "turn back", "turn all the way around", "chatty: do a complete turnaround",
+          "face the other way", "terse: about face", "formal: rotate one hundred and eighty degrees",
+          "chatty: do a full one eighty", "reverse direction", "turn right around", "make a u-turn"),
+    *_all("exit", "leave the {room}", "exit the {room}", "walk out of the {room}", "go out of the {room}", "step out of the {room}",
+          "head out of the {room}", "chatty: get out of the {room}", "terse: out of the {room}", "formal: depart from the {room}",
+          "walk out the door of the {room}", "go through the door and out of the {room}", "come out of the {room}"),
+    *_all("enter", "enter the {room}", "walk into the {room}", "go into the {room}", "step into the {room}", "head into the {room}",
+          "go through the doorway into the {room}", "walk through the door to the {room}", "terse: into the {room}",
+          "continue into the {room}", "chatty: make your way into the {room}", "formal: proceed into the {room}",
+          "move into the {room}", "walk straight into the {room}", "pass through the doorway to the {room}",
+          "chatty: pop into the {room}", "cross the threshold into the {room}", "come into the {room}",
+          "go through the opening to the {room}", "advance into the {room}", "chatty: wander into the {room}"),
+    *_all("cross", "walk through the {room}", "cross the {room}", "continue along the {room}", "go across the {room}",
+          "keep walking through the {room}", "head down the {room}", "follow the {room}", "formal: traverse the {room}",
+          "stay in the {room} and keep going", "walk the length of the {room}", "terse: along the {room}", "proceed along the {room}"),
+    *_all("forward", "walk straight ahead", "go straight", "walk forward", "continue straight", "keep going straight", "move ahead",
+          "head straight on", "terse: straight", "chatty: just keep going", "formal: proceed straight ahead", "carry on ahead",
+          "continue forward", "go ahead", "walk on", "keep on walking", "chatty: keep heading the same way", "stride ahead"),
+    *_all("metres", "walk {n} meters", "go forward about {n} meters", "walk straight for {n} meters", "move ahead {n} meters",
+          "take {n} big steps forward", "terse: {n} meters ahead", "chatty: go on for maybe {n} meters or so",
+          "formal: proceed approximately {n} meters", "continue for {n} meters", "go roughly {n} meters"),
+    *_all("to", "walk to {thing}", "go to {thing}", "walk up to {thing}", "head for {thing}", "head towards {thing}", "walk toward {thing}",
+          "continue until you reach {thing}", "go over to {thing}", "move to {thing}", "terse: to {thing}", "terse: toward {thing}", "go straight to {thing}",
+          "chatty: make your way over to {thing}", "formal: proceed to {thing}", "keep going until you get to {thing}",
+          "walk until you are beside {thing}", "approach {thing}", "aim for {thing}", "chatty: you will see {thing} so walk over to it",
+          "go as far as {thing}", "walk straight to {thing}", "advance to {thing}", "step over to {thing}",
+          "walk in the direction of {thing}", "chatty: look for {thing} and go there"),
+    *_all("past", "walk past {thing}", "go past {thing}", "pass {thing}", "continue past {thing}", "walk by {thing}", "pass by {thing}",
+          "terse: past {thing}", "go around {thing}", "chatty: you will go past {thing}", "formal: proceed past {thing}",
+          "move past {thing}", "walk alongside {thing}", "head past {thing}", "keep going beyond {thing}"),
+    *_all("past_side", "walk past {thing} on your {side}", "pass {thing} on the {side}", "go past {thing} on your {side}",
+          "keep {thing} on your {side}", "walk along with {thing} to your {side}", "continue past {thing} on the {side}",
+          "chatty: you will have {thing} on your {side} as you walk", "formal: proceed with {thing} on the {side}",
+          "leave {thing} to your {side}", "terse: past {thing} on {side}", "stroll by {thing} on your {side}"),
+    *_all("avoid", "do not go into the {room}", "don't enter the {room}", "chatty: don't go in the {room} though",
+          "if you end up in the {room} you went too far", "ignore the {room}", "not the {room}", "formal: avoid the {room}"),
+    *_all("stop_by", "stop next to {thing}", "stop by {thing}", "wait by {thing}", "stop in front of {thing}", "wait near {thing}",
+          "stop beside {thing}", "stop at {thing}", "terse: stop {thing}", "chatty: you are done when you are right by {thing}",
+          "formal: halt beside {thing}", "stand next to {thing} and wait", "stop when you are near {thing}",
+          "come to a stop at {thing}", "chatty: {thing} is where you want to stop", "stop once you reach {thing}",
+          "your spot is beside {thing}", "pause at {thing}", "wait there at {thing}", "stop close to {thing}", "finish near {thing}"),
+    *_all("stop_in", "stop in the {room}", "wait in the {room}", "stop just inside the {room}", "wait once you are in the {room}",
+          "formal: halt inside the {room}", "terse: stop inside {room}", "chatty: that's it once you are in the {room}",
+          "stop when you are in the {room}", "your destination is in the {room}", "end up in the {room}"),
+    *_all("stop_here", "stop there", "wait there", "stop", "chatty: and that's your spot", "formal: halt at that point", "wait here",
+          "that is where you stop", "stay there", "chatty: you made it"),
+    *_all("turn enter", "turn {side} into the {room}", "take a {side} into the {room}", "go {side} into the {room}",
+          "chatty: hang a {side} into the {room}", "terse: {side} into {room}", "enter the {room} on your {side}",
+          "walk into the {room} to your {side}", "go through the door on the {side} into the {room}"),
+    *_all("turn to", "turn {side} and walk to {thing}", "turn {side} toward {thing}", "go {side} to {thing}", "head {side} towards {thing}",
+          "terse: {side} to {thing}", "walk to {thing} on your {side}"),
+    *_all("slight to", "veer {side} toward {thing}", "bear {side} to {thing}"),
+    *_all("turn past", "turn {side} past {thing}", "turn {side} at once and pass {thing}"),
+    *_all("around exit", "turn around and leave the {room}", "turn back and walk out of the {room}"),
+    *_all("exit turn", "leave the {room} and turn {side} at once", "exit the {room} and go {side}", "walk out of the {room} then turn {side}",
+          "chatty: head out of the {room} and hang a {side}", "step out of the {room} and face {side}"),
+    *_all("exit enter", "go from the {room} into the {other}", "leave the {room} and enter the {other}", "walk out of the {room} into the {other}",
+          "formal: proceed from the {room} to the {other}"),
+    *_all("to stop_here", "walk to {thing} and stop", "go to {thing} and wait there", "stop when you reach {thing}", "walk up to {thing} then stop",
+          "go to {thing} and stop there"),
+    *_all("enter stop_here", "enter the {room} and stop", "walk into the {room} and wait there", "step into the {room} and stop just inside"),
+])
+"""Every way of speaking. 'exit enter' names two rooms: {room} is left, {other} entered."""
+
+FILLERS: dict[str, tuple[str, ...]] = {
+    "chatty": ("okay so", "alright", "so", "basically", "well", "you know", "let's see", "hmm"),
+    "formal": ("please", "from here", "from your current position", "to begin"),
+    "terse": (),
+    "": ("from where you are", "first", "starting here", "to start", "now"),
+}
+"""Openings by habit; they mean nothing."""
+HEDGES = ("I think", "I believe", "if I remember correctly", "more or less", "kind of", "probably", "sort of", "I guess", "as far as I recall")
+"""Signs of doubt; they mean nothing."""
+LINKS: dict[str, tuple[str, ...]] = {
+    "chatty": ("and then", "then", "after that", "and", "once you've done that", "next", "and after that just"),
+    "formal": ("then", "next", "subsequently", "following that", "afterwards", "after which"),
+    "terse": ("then", "and", ""),
+    "": ("and", "then", "and then", "next", "after that", "from there", "now", "once there", "at that point"),
+}
+"""What joins two clauses, by habit."""
+SLIPS = {
+    "straight": "strait", "until": "untill", "through": "thru", "hallway": "hall way", "towards": "torwards", "past": "passed",
+    "beside": "besides", "corridor": "coridor", "kitchen": "kichen", "bedroom": "bed room", "bathroom": "bath room",
+    "continue": "contine", "slightly": "slighty", "around": "arround", "doorway": "door way", "reach": "reech", "forward": "foward",
+    "entrance": "enterance", "immediately": "immediatly", "table": "tabel", "chair": "chiar", "cabinet": "cabnet", "mirror": "miror",
+}
+"""Harmless slips of the keyboard."""
+NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")

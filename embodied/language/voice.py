@@ -1,0 +1,80 @@
+"""The voices of the house: a `Language` that speaks as people do, and a describer of what an agent did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.interface import FindObject
+from embodied.language.grammar import parse, say
+from embodied.language.lexicon import lexicon_of
+from embodied.language.listener import carry_out
+from embodied.language.plain import PlainLanguage
+from embodied.language.routes import plan
+from embodied.language.seen import Eyes
+from embodied.language.speakers import draw_speaker
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+TRIES = 6
+"""How often a speaker tries again when an imagined listener gets lost."""
+ARRIVED = 3.0
+"""Metres within which the imagined listener has understood."""
+
+
+class People:
+    """A `Language` in which several speakers with their own habits describe routes.
+
+    Like people who know the way, a speaker checks in his mind whether somebody who reads the words
+    would arrive (the rational speaker of ILIAD, dissertation 3.2.4), and says it otherwise if not.
+    """
+
+    def __init__(self, tries: int = TRIES) -> None:
+        """`tries`: 1 says the first thing that comes to mind."""
+        self.tries = tries
+        self._plain = PlainLanguage()
+
+    def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
+        """'find a mug', 'find a towel in a bathroom'."""
+        return self._plain.request(goal, rng=rng)
+
+    def route(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+        """'Leave the bedroom and turn left at once. Walk past the piano. Stop by the coffee table.'
+
+        Args:
+          path: nodes to walk along.
+          yaw: the walker's first direction, radians.
+        """
+        speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
+        for _ in range(self.tries):
+            text = say(plan(world, path, yaw, speaker, rng=rng), speaker, rng=rng)
+            if self.tries == 1:
+                return text
+            heard = carry_out(Eyes(world), parse(text, lexicon), path[0], yaw)
+            missed = float(world.graph.distance[heard.path[-1], path[-1]])
+            if missed <= 0.5 * ARRIVED:
+                return text
+            if missed < least:
+                best, least = text, missed
+        return best
+
+    def subgoal(self, words: Sequence[str]) -> str:
+        """VNLA's sub-goals in words."""
+        return self._plain.subgoal(words)
+
+
+class Describer:
+    """Describes any execution in words, P(d | e): ILIAD's teacher while no describer has been learned.
+
+    Differs from the dissertation (3.2.5), where the describer is learned from human descriptions: this
+    one is the grammar itself, so what it says is always true of the execution.
+    """
+
+    def describe(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+        """One description of walking `path` (nodes, repeats allowed) with first direction `yaw`, radians."""
+        nodes = [n for i, n in enumerate(path) if i == 0 or n != path[i - 1]]
+        speaker = draw_speaker(rng)
+        return say(plan(world, nodes, yaw, speaker, rng=rng), speaker, rng=rng)
