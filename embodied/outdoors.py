@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 import shapely
 
-from assets.built.primitives import Shape, flat, part
+from assets.built.primitives import (
+    Shape,
+    ball,
+    bar,
+    box,
+    extruded,
+    flat,
+    joined,
+    part,
+    sheet,
+    tube,
+)
 from assets.records import Finish
 from embodied.house import House
 from embodied.part import Part
 from embodied.seeds import stream
 from embodied.walls import hole_on, room_union, wall_face
 
-PIECES = ("facade", "roof", "ground", "terrace", "hedge", "trees", "houses")
+GROUND_DROP = 0.15
+"""How far the ground lies below the ground floor, metres."""
+GARDEN = 11.0
+"""From the house to the hedge, metres."""
+RAIL = Finish(color=(0.10, 0.10, 0.11, 1.0), roughness=0.5)
+BARK = Finish(color=(0.26, 0.21, 0.17, 1.0), roughness=0.95, specular=0.1)
+
+PIECES = ("facade", "roof", "ground", "terrace", "hedge", "trees")
 """Owners outside are 'outdoor/<piece>'."""
 
 FACADES = ("render_white/0", "render_white/1", "brick_red/0", "render_white/2")
@@ -31,29 +50,150 @@ def footprint(house: House, storey: int) -> shapely.Geometry:
 
 
 def outdoor_parts(house: House, finish: Callable[[str], Finish]) -> list[Part]:
-    """All parts of kind 'outdoor'."""
+    """All parts of kind 'outdoor', nearest first; the same for the same house."""
     walls, roofs = [], []
     for k in range(len(house.storeys)):
         shape, lids = _storey_shell(house, k)
         walls += shape
         roofs += lids
+    rng = stream(house.seed, "outdoors", "garden")
+    lawn = finish(f"lawn/{int(rng.random() < 0.3)}")
     parts = [
-        Part("outdoor/facade", "outdoor", "", part(finish(facade_finish(house)), *walls), "outdoor/facade"),
-        Part(
-            "outdoor/roof",
-            "outdoor",
-            "",
-            part(Finish(color=(0.35, 0.34, 0.33, 1.0), roughness=0.9), *roofs),
-            "outdoor/roof",
-        ),
+        _part("facade", finish(facade_finish(house)), walls),
+        _part("roof", Finish(color=(0.35, 0.34, 0.33, 1.0), roughness=0.9), roofs),
+        _part("ground", lawn, [_ground(house)]),
     ]
+    slabs, rails = _terraces(house)
+    if slabs:
+        parts.append(_part("terrace", finish("paving/0"), slabs))
+    if rails:
+        parts.append(_part("terrace", RAIL, rails, "#rails"))
+    x0, y0, x1, y1 = footprint(house, 0).bounds
+    edge = (x0 - GARDEN, y0 - GARDEN, x1 + GARDEN, y1 + GARDEN)
+    parts.append(_part("hedge", finish("foliage/1"), _hedges(*edge, rng=rng)))
+    parts += _trees(edge, finish, rng=rng)
     return parts
+
+
+def _part(piece: str, finish: Finish, shapes: list[Shape], tag: str = "") -> Part:
+    return Part(f"outdoor/{piece}", "outdoor", "", part(finish, *shapes), f"outdoor/{piece}{tag}")
+
+
+def _ground(house: House) -> Shape:
+    """The lawn from the house to the hedge; what lies beyond is painted on the sky."""
+    x0, y0, x1, y1 = footprint(house, 0).bounds
+    plot = shapely.box(x0 - GARDEN, y0 - GARDEN, x1 + GARDEN, y1 + GARDEN).difference(footprint(house, 0))
+    return flat(plot, house.storeys[0].elevation - GROUND_DROP)
+
+
+def _terraces(house: House) -> tuple[list[Shape], list[Shape]]:
+    """A paved slab before each door that leads out; upstairs a balcony with a railing."""
+    slabs, rails = [], []
+    for o in house.openings:
+        if o.rooms[1] is not None or o.kind not in ("front_door", "back_door", "french_window", "garage_door"):
+            continue
+        a, b = np.asarray(o.a), np.asarray(o.b)
+        d = (b - a) / np.linalg.norm(b - a)
+        room = house.room_by_id[o.rooms[0]]
+        n = np.array([-d[1], d[0]])
+        if shapely.Polygon(room.polygon).contains(shapely.Point((a + b) / 2 + 0.03 * n)):
+            n = -n
+        upstairs = room.storey > 0
+        side, deep = (0.5, 1.3) if upstairs or o.kind in ("front_door", "garage_door") else (1.2, 3.0)
+        near = house.outer_wall - house.inner_wall / 2
+        ring = [
+            a - side * d + near * n,
+            b + side * d + near * n,
+            b + side * d + (near + deep) * n,
+            a - side * d + (near + deep) * n,
+        ]
+        area = shapely.geometry.polygon.orient(shapely.Polygon(ring)).difference(footprint(house, room.storey))
+        z = house.storey_of(room).elevation
+        for piece in shapely.get_parts(area):
+            if piece.geom_type != "Polygon" or piece.area < 0.2:
+                continue
+            slabs.append(extruded(piece, z - (0.18 if upstairs else GROUND_DROP), z - 0.02))
+        if upstairs:
+            line = np.array([ring[0], ring[3], ring[2], ring[1]])
+            for p, q in itertools.pairwise(line):
+                rails.append(bar((*p, z + 1.0), (*q, z + 1.0), 0.05, 0.04, 0.006))
+                for t in np.linspace(0, 1, max(2, round(np.linalg.norm(q - p) / 0.12))):
+                    x, y = p + t * (q - p)
+                    rails.append(box([x - 0.007, y - 0.007, z - 0.02], [x + 0.007, y + 0.007, z + 1.0]))
+    return slabs, rails
+
+
+def _hedges(x0: float, y0: float, x1: float, y1: float, *, rng: np.random.Generator) -> list[Shape]:
+    """Clipped hedges around the plot, with an uneven face."""
+    made = []
+    sides = [((x0, y0), (x1, y0)), ((x1, y0), (x1, y1)), ((x1, y1), (x0, y1)), ((x0, y1), (x0, y0))]
+    for a, b in sides:
+        a, b = np.asarray(a), np.asarray(b)
+        d = (b - a) / np.linalg.norm(b - a)
+        n = np.array([-d[1], d[0]])
+        count = int(np.linalg.norm(b - a) / 0.9)
+        across = np.array(
+            [
+                (0.42, -0.2),
+                (0.45, 0.5),
+                (0.42, 1.2),
+                (0.28, 1.52),
+                (0.0, 1.6),
+                (-0.28, 1.52),
+                (-0.42, 1.2),
+                (-0.45, 0.5),
+                (-0.42, -0.2),
+            ]
+        )
+        along = a[None] + np.linspace(0, 1, count + 1)[:, None] * (b - a)[None]
+        lump = 1 + 0.12 * rng.standard_normal((len(across), count + 1))
+        xy = along[None] + (across[:, 0][:, None] * lump)[..., None] * n
+        z = across[:, 1][:, None] * (1 + 0.03 * rng.standard_normal((len(across), count + 1)))
+        made.append(sheet(np.concatenate([xy, z[..., None]], -1)[::-1]))
+    return made
+
+
+def _trees(
+    bounds: tuple[float, float, float, float], finish: Callable[[str], Finish], *, rng: np.random.Generator
+) -> list[Part]:
+    """Three kinds of tree, each standing in three places near the hedge."""
+    parts = []
+    x0, y0, x1, y1 = bounds
+    for k in range(3):
+        trunk, crown = _tree(3.8 + 1.6 * k, rng=rng)
+        meshes = [part(BARK, trunk), part(finish(f"foliage/{k % 2}"), crown)]
+        for _ in range(3):
+            side, t, away = int(rng.integers(4)), rng.random(), rng.uniform(-3.0, 4.0)
+            x = (x0 - away, x1 + away)[side % 2] if side < 2 else x0 + t * (x1 - x0)
+            y = (y0 - away, y1 + away)[side % 2] if side >= 2 else y0 + t * (y1 - y0)
+            yaw = float(rng.uniform(0, 6.28))
+            parts += [
+                Part(
+                    "outdoor/trees", "outdoor", "", m, f"outdoor/tree_{k}_{i}", (float(x), float(y), -GROUND_DROP), yaw
+                )
+                for i, m in enumerate(meshes)
+            ]
+    return parts
+
+
+def _tree(height: float, *, rng: np.random.Generator) -> tuple[Shape, Shape]:
+    trunk = [tube([(0, 0, -0.2), (0.05, 0.02, height * 0.3), (0.0, 0.05, height * 0.62)], [0.17, 0.13, 0.07], 8)]
+    crown = []
+    for i in range(9):
+        a, r = 2.4 * i, height * (0.07 + 0.13 * rng.random())
+        at = np.array([r * np.cos(a), r * np.sin(a), height * (0.52 + 0.38 * i / 9)])
+        size = height * rng.uniform(0.13, 0.20)
+        s = ball(1.0, 14, 9)
+        v = s.vertices * (1 + 0.10 * np.sin(5 * s.vertices[:, :1] + i) * np.cos(4 * s.vertices[:, 1:2] - i))
+        crown.append(Shape(v * size * [1.1, 1.1, 0.9] + at, s.faces, s.normals, s.uv * size * 1.2))
+        trunk.append(tube([(0, 0.03, height * 0.45), at], [0.05, 0.02], 5))
+    return joined(*trunk), joined(*crown)
 
 
 def _storey_shell(house: House, k: int) -> tuple[list[Shape], list[Shape]]:
     """Facade of one storey with its openings, and its roof (and soffit) where no storey covers it."""
     storey = house.storeys[k]
-    low = storey.elevation - (0.15 if k == 0 else 0.0)
+    low = storey.elevation - (GROUND_DROP if k == 0 else 0.0)
     last = k + 1 == len(house.storeys)
     high = storey.elevation + storey.height + 0.25 if last else house.storeys[k + 1].elevation
     outline = footprint(house, k)

@@ -122,7 +122,7 @@ def _paints() -> list[Material]:
                 ("plaster",),
                 2.0,
                 1024,
-                partial(surface.plaster, color=c, relief=2.5, mottle=0.03),
+                partial(surface.plaster, color=c, relief=2.5, mottle=0.012),
                 0.2,
             )
         )

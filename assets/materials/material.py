@@ -36,6 +36,7 @@ ROLES = (
     "art",
     "rug_pattern",
     "label",
+    "outdoor",
 )
 """What a material may be used for."""
 

@@ -62,7 +62,8 @@ def _flat(part):
     """Walls, roofs and lawns of the outdoors unfold like those inside."""
     import dataclasses
 
-    return dataclasses.replace(part, kind="wall") if len(part.mesh.faces) < 4000 else part
+    flat = part.owner in ("outdoor/facade", "outdoor/roof", "outdoor/ground", "outdoor/terrace")
+    return dataclasses.replace(part, kind="wall") if flat else part
 
 
 def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 32) -> np.ndarray:
