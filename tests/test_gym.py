@@ -8,6 +8,7 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+import stable_baselines3
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
@@ -132,9 +133,8 @@ def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
 
 @pytest.mark.parametrize("learner", ["PPO"])
 def test_stable_baselines_learns_to_walk_to_a_mug(learner, tmp):
-    sb3 = pytest.importorskip("stable_baselines3")
     env = Numbers(make("find", tmp, shaping=True))
-    model = getattr(sb3, learner)("MlpPolicy", env, n_steps=128, batch_size=64, n_epochs=2, seed=0, device="cpu")
+    model = getattr(stable_baselines3, learner)("MlpPolicy", env, n_steps=128, batch_size=64, n_epochs=2, seed=0, device="cpu")
     model.learn(384)
     action, _ = model.predict(env.reset(seed=1)[0])
     assert env.action_space.contains(int(action))
