@@ -74,9 +74,20 @@ def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list
         if free and start is None:
             start = i * step
         if not free and start is not None:
-            runs.append((start, wall.length if i == count else i * step))
+            runs.append((_edge(space, wall, start, -1, depth, height),
+                         _edge(space, wall, i * step, 1, depth, height)))
             start = None
     return runs
+
+
+def _edge(space: RoomSpace, wall: Wall, s: float, sign: int, depth: float, height: float) -> float:
+    """The end of a free run, moved outwards by centimetres as far as it stays free."""
+    for _ in range(5):
+        x, y = wall.point(s + sign * 0.005, depth / 2 + 0.005)
+        if not space.fits(box(x, y, 0.0098, depth, wall.yaw, space.bottom, space.bottom + height)):
+            break
+        s += sign * 0.01
+    return min(max(s, 0.0), wall.length)
 
 
 def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
@@ -95,7 +106,7 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
                         continue
                     if fridge and not with_fridge:
                         lone_fridge(ctx)
-                    _second_run(ctx, kit, wall, found)
+                    _more_runs(ctx, kit, found)
                     return found
     return None
 
@@ -151,7 +162,7 @@ def _run(
         if at_end and fridge is not None:
             start = b - fridge.size[0] - 0.02 - count * width
         slots = _slots(ctx, kit, count, width, start, view)
-        items = _run_items(ctx, kit, slots, width, windows, free)
+        items = _run_items(ctx, kit, slots, width, windows, wall.length, free)
         if fridge is not None:
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
             items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, clear=free - 0.05, role="fridge")))
@@ -200,14 +211,17 @@ def _slots(ctx: Context, kit: KitchenSet, count: int, width: float, start: float
     return [(kind, first, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]
 
 
-def _run_items(ctx: Context, kit: KitchenSet, slots, width: float, windows, free: float = 0.6) -> list[tuple[float, Item]]:
+def _run_items(
+    ctx: Context, kit: KitchenSet, slots, width: float, windows, length: float, free: float,
+) -> list[tuple[float, Item]]:
     """(s, item) of all modules, the hob, the hood and the wall cabinets of a run."""
     items: list[tuple[float, Item]] = []
     top = max(a.size[2] for a in kit.base)
 
     def unit(asset: Asset, s: float, w: float, role: str) -> None:
         size = (w, asset.size[1], asset.size[2])
-        items.append((s, Item(asset, 0.0, -asset.size[1] / 2, size=size, clear=free, role=role)))
+        cornered = role == "counter" and (s - w / 2 < 0.12 or s + w / 2 > length - 0.12)  # another run may meet it
+        items.append((s, Item(asset, 0.0, -asset.size[1] / 2, size=size, clear=0.0 if cornered else free, role=role)))
 
     for kind, _, n, s in slots:
         if kind == "sink":
@@ -249,39 +263,53 @@ def _run_items(ctx: Context, kit: KitchenSet, slots, width: float, windows, free
     return items
 
 
-def _second_run(ctx: Context, kit: KitchenSet, main: Wall, done: list[Thing]) -> None:
-    """More cabinets on a neighbouring wall, where the kitchen is large and the first run short."""
-    length = sum(t.size[0] for t in done if t.z < ctx.space.bottom + 0.1)
-    want = min(max(0.3 * ctx.space.area, 2.4), 6.0) - length
-    if want < kit.unit:
-        return
-    runs = []
-    for wall in ctx.space.walls:
-        side = abs(wall.along[0] * main.inward[0] + wall.along[1] * main.inward[1])
-        if wall.index == main.index or side < 0.5:
-            continue
-        for a, b in free_runs(ctx.space, wall, kit.depth, 0.9):
-            if b - a < 2 * kit.unit:
-                continue
-            near = min(math.hypot(t.x - wall.point(s)[0], t.y - wall.point(s)[1]) for t in done for s in (a, b))
-            runs.append((near, a, b, wall))
-    for near, a, b, wall in sorted(runs, key=lambda r: r[0])[:2]:
-        if near > 0.8:
-            continue
-        ends = [min(math.hypot(t.x - wall.point(s)[0], t.y - wall.point(s)[1]) for t in done) for s in (a, b)]
-        count = min(int((b - a) / kit.unit + 0.1), max(int(want / kit.unit), 1), 4)
-        width = min((b - a) / count, kit.unit)
-        start = a if ends[0] <= ends[1] else b - count * width
-        windows = [(s0, s1) for s0, s1, o in wall.openings if o.kind == "window"]
-        for n in (count, count - 1):
-            if n < 1:
+def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
+    """More cabinets, round the corner or opposite, until the kitchen has the worktop its size deserves."""
+    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - sum(t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t))
+    for _ in range(3):
+        if want < 0.8 * kit.unit:
+            return
+        runs = []
+        for wall in ctx.space.walls:
+            for a, b in free_runs(ctx.space, wall, kit.depth, 0.9):
+                if b - a > 0.95 * kit.unit:
+                    near = min(_gap(wall.point(s), t) for t in done if _on_floor(ctx, t) for s in (a, b))
+                    runs.append((near > 0.35, -min(b - a, want), a, b, wall))
+        for far, _, a, b, wall in sorted(runs, key=lambda r: r[:2]):
+            length = _add_run(ctx, kit, wall, a, b, want, done, least=2 if far else 1)
+            if length:
+                want -= length
                 break
-            at = start if ends[0] <= ends[1] else b - n * width
-            slots = [("base", k, 1, at + (k + 0.5) * width) for k in range(n)]
-            items = [_moved(i, -s) for s, i in _run_items(ctx, kit, slots, width, windows)]
-            x, y = wall.point(0.0, 0.005)
-            if ctx.put(items, [Pose(0.0, x, y, wall.yaw, wall)], "kitchen"):
-                return
+        else:
+            return
+
+
+def _on_floor(ctx: Context, thing: Thing) -> bool:
+    return thing.z < ctx.space.bottom + 0.1
+
+
+def _gap(point: tuple[float, float], thing: Thing) -> float:
+    return math.hypot(thing.x - point[0], thing.y - point[1]) - thing.size[0] / 2
+
+
+def _add_run(
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, want: float, done: list[Thing], least: int,
+) -> float:
+    """Cabinets along part of a..b, from the end that is nearer to what stands already; returns their length."""
+    starts_at_a = min(_gap(wall.point(a), t) for t in done) <= min(_gap(wall.point(b), t) for t in done)
+    windows = [(s0, s1) for s0, s1, o in wall.openings if o.kind == "window"]
+    most = min(int((b - a) / kit.unit + 0.1), max(round(want / kit.unit), 1), 5)
+    for n in range(most, least - 1, -1):
+        width = min((b - a) / n, kit.unit) - 0.002
+        at = a + 0.004 if starts_at_a else b - 0.004 - n * width
+        slots = [("base", k, 1, at + (k + 0.5) * width) for k in range(n)]
+        items = [_moved(i, -s) for s, i in _run_items(ctx, kit, slots, width, windows, wall.length, 0.55)]
+        x, y = wall.point(0.0, 0.005)
+        found = ctx.put(items, [Pose(0.0, x, y, wall.yaw, wall)], "kitchen")
+        if found:
+            done.extend(found)
+            return n * width
+    return 0.0
 
 
 def island(ctx: Context) -> list[Thing] | None:

@@ -407,7 +407,7 @@ def stairwell(ctx: Context) -> None:
 
 
 NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "kitchen": (("kitchen sink",), ("cooker",), ("fridge",)),
+    "kitchen": (("kitchen sink",), ("cooker",), ("fridge",), ("counter",)),
     "bathroom": (("toilet",), ("basin",), ("bathtub", "corner bathtub", "shower")),
     "toilet": (("toilet",), ("basin",)),
     "main_bedroom": (("bed",), ("wardrobe",)),
