@@ -80,7 +80,7 @@ def read_glb(path: Path) -> tuple[RawPart, ...]:
     try:
         scene = trimesh.load_scene(path, file_type="glb")
         meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError) as e:
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, OSError) as e:
         raise MeshError(f"{path} cannot be read as .glb ({e}); export it again as binary glTF 2.0") from e
     if not meshes:
         raise MeshError(f"{path} has no triangles; the model is empty")

@@ -108,6 +108,11 @@ def test_attribution_names_every_maker(catalogue):
             assert a.creator in text and a.key.split("/", 1)[1] in text
 
 
+def test_attribution_file_is_up_to_date(catalogue):
+    file = Path(__file__).parent.parent / "ATTRIBUTION.md"
+    assert file.read_text() == attribution(catalogue), "run `embodied assets attribution --out ATTRIBUTION.md`"
+
+
 # import
 
 @pytest.mark.parametrize("key", SOME)
