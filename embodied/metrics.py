@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Ask, Episode, Mode, Move, Stop
+from embodied.interface import Ask, Episode, FollowRoute, Mode, Move, Stop
 
 if TYPE_CHECKING:
     from embodied.navgraph import NavGraph
@@ -146,8 +146,26 @@ def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(v for i, v in enumerate(nodes) if i == 0 or v != nodes[i - 1])
 
 
+def route_ndtw(episode: Episode, graph: NavGraph) -> float:
+    """nDTW of the walk against the route that was described; NaN for other tasks."""
+    goal = episode.task.goal
+    return ndtw(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else float("nan")
+
+
+def route_sdtw(episode: Episode, graph: NavGraph) -> float:
+    """SDTW of the walk against the route that was described; NaN for other tasks."""
+    goal = episode.task.goal
+    return sdtw(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else float("nan")
+
+
 PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
     "success": success, "spl": spl, "navigation error": navigation_error, "requests": requests,
     "oracle success": oracle_success, "path length": path_length, "steps": steps,
 }
 """The numbers every task reports, by name, in the order of their columns."""
+PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {
+    "hanna": {"subtask success": subtask_success},
+    "vnla": {"room success": room_success},
+    "vln": {"nDTW": route_ndtw, "SDTW": route_sdtw},
+}
+"""What only some kinds of task report."""

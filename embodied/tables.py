@@ -77,11 +77,17 @@ def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str]) -> Estimate:
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
-    """Every metric of PER_EPISODE and the repeat rates, over the episodes of one agent."""
+    """Every metric of the kind of task and the repeat rates, over the episodes of one agent.
+
+    Raises:
+      ValueError: no episodes.
+    """
+    if not episodes:
+        raise ValueError(f"{agent!r} played no episodes of {split!r}; a table needs at least one")
     groups = [e.task.world for e in episodes]
     values = {
         name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups)
-        for name, f in metrics.PER_EPISODE.items()
+        for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
     }
     for name, f in (("mistake repeat", metrics.mistake_repeats), ("request repeat", metrics.request_repeats)):
         values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups)

@@ -51,6 +51,8 @@ def test_the_rows_come_out_as_they_should(kind, tmp_path):
     if kind == "hanna":
         assert rows["shortest"]["spl"].mean == pytest.approx(1)
         assert rows["ask every 5"]["requests"].mean > rows["no ask"]["requests"].mean == 0
+    if kind == "vln":
+        assert rows["shortest"]["SDTW"].mean == pytest.approx(1) and rows["random walk"]["nDTW"].mean < 1
     with pytest.raises(ValueError, match="unknown agent"):
         agent(kind, "nobody")
 
@@ -63,7 +65,7 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     assert "| shortest | test_unseen | 100.0 ± 0.0 | 100.0 ± 0.0 | 0.00 ± 0.00 |" in printed
     assert (out / "table.md").read_text().startswith("| agent | split | success (%)")
     assert {r["agent"] for r in json.loads((out / "table.json").read_text())} == {"shortest", "random walk"}
-    assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 9
+    assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 10
     assert (out / "episodes_test_unseen_random_walk.jsonl").exists()
     assert main(["eval", "vnla", "--data", str(data.folder)]) == 2
     assert "data set of 'hanna'" in capsys.readouterr().err

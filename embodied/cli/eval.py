@@ -13,8 +13,9 @@ from embodied.cli.common import add_json, show
 from embodied.datasets.scale import KINDS
 
 COLUMNS = {
+    "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
     "hanna": ("success", "spl", "navigation error", "requests"),
-    "vnla": ("success", "oracle success", "navigation error", "path length", "requests"),
+    "vnla": ("success", "oracle success", "room success", "navigation error", "path length", "requests"),
     "hari": ("success", "navigation error", "requests", "steps"),
 }
 
