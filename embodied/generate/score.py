@@ -67,7 +67,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
             value -= 5.0 * math.log(area / high)
         value -= 0.7 * abs(math.log(area / c.area))
         limit = LIMITS.get(c.kind, 1.65)
-        value -= 2.2 * max(0.0, long / short - limit)
+        value -= (3.5 if area > 15 else 2.2) * max(0.0, long / short - limit)
         if c.kind in DAYLIT and outer < max(14, 0.22 * 2 * (w + h) * 0.6):
             value -= 6.0
         if c.kind in ("hall", "garage") and outer < (13 if c.kind == "hall" else 26):

@@ -1,0 +1,261 @@
+"""Truths about generated houses before the furniture: what an architect would check on the plan."""
+
+from __future__ import annotations
+
+import functools
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import shapely
+
+from assets.materials import MATERIALS
+from assets.records import ROOM_KINDS
+from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.generate.clearing import cleared
+from embodied.generate.finishes import STYLES
+from embodied.generate.footprint import draw_footprint
+from embodied.generate.kinds import BEDROOMS
+from embodied.generate.stages import Draft
+from embodied.house import DOORS, House, HouseError, Placement, Room, check
+from embodied.navgraph import unreachable_rooms
+from embodied.seeds import stream
+
+SEEDS = 30
+BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
+PRIVATE = (*BEDROOMS, "bathroom", "toilet", "closet", "pantry")
+
+
+@functools.cache
+def houses() -> tuple[House, ...]:
+    return tuple(generate_house(seed, stages=BARE) for seed in range(SEEDS))
+
+
+def polygon(room: Room) -> shapely.Polygon:
+    return shapely.Polygon(room.polygon)
+
+
+def doors_of(house: House) -> dict[str, set[str]]:
+    ways: dict[str, set[str]] = {r.id: set() for r in house.rooms}
+    for o in house.openings:
+        if o.kind in DOORS and o.rooms[1] is not None:
+            ways[o.rooms[0]].add(o.rooms[1])
+            ways[o.rooms[1]].add(o.rooms[0])
+    return ways
+
+
+def test_every_house_passes_check_and_survives_json():
+    for house in houses():
+        check(house)
+        assert House.from_json(house.to_json()) == house
+
+
+def test_rooms_tile_the_footprint_without_gaps():
+    for house in houses():
+        union = shapely.union_all([polygon(r) for r in house.rooms])
+        assert union.geom_type == "Polygon" and not union.interiors
+        assert union.area == pytest.approx(sum(polygon(r).area for r in house.rooms), abs=1e-6)
+
+
+def test_corners_lie_on_the_tenth_of_a_metre():
+    for house in houses():
+        corners = np.concatenate([r.polygon for r in house.rooms])
+        assert np.allclose(corners * 10, np.round(corners * 10), atol=1e-6)
+
+
+def test_every_room_can_be_entered_on_foot_past_the_open_leaves():
+    for house in houses():
+        assert unreachable_rooms(house) == ()
+
+
+def test_nobody_crosses_a_bedroom_or_a_bath_to_reach_another_room():
+    """Take away a private room: only rooms it owns (an ensuite, a closet) may be cut off with it."""
+    for house in houses():
+        ways = doors_of(house)
+        start = next(r.id for r in house.rooms if r.kind == "hall")
+        kinds = {r.id: r.kind for r in house.rooms}
+        for gone in (r.id for r in house.rooms if r.kind in PRIVATE):
+            reached, todo = {start, gone}, [start]
+            while todo:
+                new = [n for n in sorted(ways[todo.pop()]) if n not in reached]
+                reached.update(new)
+                todo += new
+            cut = {kinds[r.id] for r in house.rooms if r.id not in reached}
+            assert cut <= ({"bathroom", "closet"} if kinds[gone] in BEDROOMS else set()), (house.seed, gone, cut)
+
+
+def test_there_is_one_front_door_and_it_opens_into_the_hall():
+    for house in houses():
+        front = [o for o in house.openings if o.kind == "front_door"]
+        assert len(front) == 1 and house.room_by_id[front[0].rooms[0]].kind == "hall"
+
+
+def test_windows_keep_clear_of_the_ends_of_inner_walls():
+    for house in houses():
+        corners = np.concatenate([r.polygon for r in house.rooms])
+        for o in house.openings:
+            if o.kind in ("window", "french_window"):
+                window = shapely.LineString([o.a, o.b])
+                assert min(window.distance(shapely.Point(c)) for c in corners) > house.inner_wall / 2
+
+
+def test_rooms_to_live_in_have_daylight():
+    dark = total = 0
+    for house in houses():
+        lit = {o.rooms[0] for o in house.openings if o.kind in ("window", "french_window")}
+        for r in house.rooms:
+            if r.kind in (*BEDROOMS, "living_room", "kitchen", "dining_room", "study"):
+                total += 1
+                dark += r.id not in lit
+    assert dark <= 0.01 * total
+
+
+def test_bedrooms_open_off_halls_and_corridors_except_in_flats():
+    for house in houses():
+        ways = doors_of(house)
+        kinds = {r.id: r.kind for r in house.rooms}
+        for r in house.rooms:
+            if r.kind in BEDROOMS and house.area > 75:
+                assert any(kinds[n] in ("hall", "corridor") for n in ways[r.id]), (house.seed, r.id)
+
+
+def test_rooms_have_the_proportions_of_rooms_and_corridors_their_width():
+    ratios = []
+    for house in houses():
+        for r in house.rooms:
+            x0, y0, x1, y1 = polygon(r).bounds
+            long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
+            if r.kind == "corridor":
+                assert 1.0 <= short - house.inner_wall <= 1.6 or long < 1.6, (house.seed, r.id)
+                assert long <= 10.0
+            elif r.kind not in ("hall", "toilet", "pantry", "closet"):
+                ratios.append(long / short)
+    assert np.median(ratios) < 1.5
+    assert np.quantile(ratios, 0.95) < 2.1
+
+
+def test_circulation_takes_a_tenth_to_a_sixth_of_most_houses():
+    shares = [sum(polygon(r).area for r in h.rooms if r.kind in ("hall", "corridor")) / h.area for h in houses()]
+    assert 0.07 < np.median(shares) < 0.16
+
+
+def test_sizes_fit_the_table_of_usual_rooms():
+    areas: dict[str, list[float]] = {}
+    for house in houses():
+        for r in house.rooms:
+            areas.setdefault(r.kind, []).append(polygon(r).area)
+    for kind, low, high in (("living_room", 14, 40), ("kitchen", 6, 18), ("main_bedroom", 10, 22), ("bedroom", 8, 15),
+                            ("bathroom", 3.8, 9), ("toilet", 1.4, 3.6)):
+        assert low < np.median(areas[kind]) < high, kind
+
+
+def test_at_least_sixteen_room_kinds_occur_and_all_are_known():
+    kinds = {r.kind for house in houses() for r in house.rooms}
+    assert len(kinds) >= 16
+    assert kinds <= set(ROOM_KINDS)
+
+
+def test_wide_houses_are_not_all_rectangles():
+    corners = [len(shapely.union_all([polygon(r) for r in h.rooms]).simplify(1e-6).exterior.coords) - 1 for h in houses()]
+    assert 4 in corners and 6 in corners and 8 in corners
+
+
+@pytest.mark.parametrize("shape, corners", [("rectangle", 4), ("L", 6), ("T", 8), ("U", 8)])
+def test_an_asked_shape_is_built(shape, corners):
+    house = generate_house(5, HouseConfig(area=(180, 200), shape=shape), stages=BARE)
+    outline = shapely.union_all([polygon(r) for r in house.rooms]).simplify(1e-6)
+    assert len(outline.exterior.coords) - 1 == corners
+
+
+@pytest.mark.parametrize("area", [35, 60, 120, 260, 600])
+def test_an_asked_area_is_met_from_flat_to_mansion(area):
+    house = generate_house(3, HouseConfig(area=(area, area)), stages=BARE)
+    assert house.area == pytest.approx(area, rel=0.06)
+
+
+def test_asked_rooms_are_counted_as_in_advertisements():
+    minor = ("kitchen", "bathroom", "toilet", "hall", "corridor", "laundry_room", "pantry", "closet", "garage")
+    for rooms, area in ((2, (38, 44)), (4, (100, 110)), (20, (590, 610))):
+        house = generate_house(11, HouseConfig(rooms=rooms, area=area), stages=BARE)
+        assert sum(r.kind not in minor for r in house.rooms) == rooms
+    house = generate_house(12, HouseConfig(bedrooms=4), stages=BARE)
+    assert sum(r.kind in BEDROOMS for r in house.rooms) == 4
+
+
+def test_palettes_use_known_materials_and_one_style_per_house():
+    for house in houses():
+        assert house.style in STYLES
+        for r in house.rooms:
+            keys = [r.floor_finish, r.wall_finish, r.ceiling_finish, r.skirting_finish]
+            keys += [r.accent_finish] if r.accent_finish else []
+            assert all(k in MATERIALS for k in keys), (r.id, keys)
+        assert all(o.leaf_finish is None or o.leaf_finish in MATERIALS for o in house.openings)
+        floors = {r.floor_finish for r in house.rooms if r.kind in ("living_room", "dining_room", "family_room")}
+        assert len(floors) == 1
+
+
+def test_an_accent_wall_has_neither_door_nor_window():
+    for house in houses():
+        for r in house.rooms:
+            if r.accent_wall is not None:
+                corners = [*r.polygon, r.polygon[0]]
+                wall = shapely.LineString(corners[r.accent_wall:r.accent_wall + 2])
+                assert all(wall.distance(shapely.Point((np.add(o.a, o.b)) / 2)) > 0.1
+                           for o in house.openings if r.id in o.rooms)
+
+
+def test_fixed_sky_and_disorder_are_kept():
+    house = generate_house(1, HouseConfig(hour=7.5, weather="overcast", disorder=0.9, style="classic"), stages=BARE)
+    assert (house.sky.hour, house.sky.weather, house.disorder, house.style) == (7.5, "overcast", 0.9, "classic")
+
+
+@pytest.mark.parametrize("options, message", [
+    ({"area": (10, 20)}, "area"), ({"rooms": 30}, "rooms"), ({"shape": "star"}, "shape"), ({"storeys": 2}, "storeys"),
+    ({"hour": 25.0}, "hour"), ({"weather": "snow"}, "weather"), ({"disorder": 2.0}, "disorder"), ({"style": "rococo"}, "style"),
+    ({"rooms": 3, "bedrooms": 3}, "bedrooms"), ({"rooms": 12, "area": (40, 60)}, "need at least"),
+    ({"rooms": 2, "area": (400, 500)}, "fill at most"), ({"area": (200, 100)}, "area"), ({"shape": "U", "area": (40, 60)}, "U"),
+])
+def test_impossible_wishes_are_refused_at_once(options, message):
+    with pytest.raises(HouseError, match=message):
+        HouseConfig(**options)
+
+
+def test_the_same_seed_gives_the_same_house_in_another_process():
+    code = ("from embodied.generate import *; print(*(generate_house(s, stages={k: v for k, v in STAGES.items() "
+            "if k not in ('furnish', 'clear')}).digest for s in (3, 17)))")
+    env = {"PYTHONHASHSEED": "4711", "PATH": ""}
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
+    assert out.stdout.split() == [houses()[3].digest, houses()[17].digest]
+
+
+def test_different_seeds_give_different_houses():
+    assert len({h.digest for h in houses()}) == SEEDS
+
+
+def test_a_stage_can_be_replaced():
+    def square(draft: Draft) -> Draft:
+        rng = stream(draft.seed, "mine")
+        return Draft(draft.seed, draft.config, draft.catalogue, 100.0, "rectangle",
+                     tuple(draw_footprint(100.0, "rectangle", rng=rng) for _ in range(10)))
+
+    house = generate_house(2, stages={**BARE, "footprint": square})
+    assert house.area == pytest.approx(100, rel=0.05)
+
+
+def test_a_wardrobe_in_the_doorway_is_cleared_away_with_what_lies_on_it():
+    house = houses()[1]
+    door = next(o for o in house.openings if o.kind == "door" and house.room_by_id[o.rooms[0]].kind in BEDROOMS)
+    x, y = (np.add(door.a, door.b) / 2).tolist()
+    block = Placement("wardrobe_1", "a/b", "wardrobe", door.rooms[0], (x, y, 0.0), 0.0, (1.2, 1.2, 2.0))
+    box = Placement("box_1", "a/c", "box", door.rooms[0], (x, y, 2.0), 0.0, (0.3, 0.3, 0.3), parent="wardrobe_1")
+    rug = Placement("rug_1", "a/d", "rug", door.rooms[0], (x, y, 0.0), 0.3, (1.2, 1.2, 0.01))
+    blocked = House(**{**vars_of(house), "placements": (block, box, rug)})
+    assert door.rooms[0] in unreachable_rooms(blocked)
+    assert [p.id for p in cleared(blocked).placements] == ["rug_1"]
+    assert math.isfinite(house.area)
+
+
+def vars_of(house: House) -> dict:
+    return {k: getattr(house, k) for k in house.__dataclass_fields__}
