@@ -201,6 +201,11 @@ def _box(low: np.ndarray, high: np.ndarray, least: np.ndarray | None = None) -> 
     return Box(tuple(centre.tolist()), tuple(half.tolist()))
 
 
+def bounding_box(vertices: np.ndarray) -> Box:
+    """The box around `vertices` (n, 3), in their own frame."""
+    return _box(vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float))
+
+
 def density_of(asset: Asset) -> float:
     """Kilograms per cubic metre of the asset's boxes, from its material words."""
     return next((d for word, d in DENSITIES if any(word in m for m in asset.materials)), DENSITY)

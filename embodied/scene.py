@@ -25,6 +25,7 @@ from embodied import collision
 from embodied.house import House, Placement
 from embodied.lit import LitPages
 from embodied.parts import Part, house_parts, owners
+from embodied.shell import shell_parts
 
 VISUAL, COLLISION = 2, 3
 """Geom groups."""
@@ -34,6 +35,8 @@ OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
 """Supports under which a freed object can move; what hangs on walls and ceilings stays fixed."""
+LEAVES = ("/leaf", "/leaf_2", "/glass")
+"""Ends of the owners of what closes an opening."""
 UNDERFOOT = 0.03
 """Things on the floor that are lower than this (rugs, mats) are cloth to walk on and stop nothing, metres."""
 
@@ -120,12 +123,14 @@ def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), c
     if lit is None:
         _light(spec)
         _add_sky(spec)
-        _add_parts(spec, house_parts(house, catalogue) if parts is None else parts, bodies)
+        parts = house_parts(house, catalogue) if parts is None else parts
+        _add_parts(spec, parts, bodies)
     else:
         spec.visual.headlight.active = 0
         _add_pages(spec, lit)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies)
+        _add_leaves(spec, parts or shell_parts(house, catalogue.finish))
     return spec
 
 
@@ -315,14 +320,24 @@ def _add_collisions(spec: mujoco.MjSpec, house: House, catalogue, bodies: Mappin
             _add_boxes(spec.worldbody, p.id, boxes, frame=frame)
 
 
+def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
+    """One box for every door leaf and window pane, as it stands."""
+    count: dict[str, int] = {}
+    for part in parts:
+        if part.kind == "opening" and part.owner.endswith(LEAVES):
+            first = count[part.owner] = count.get(part.owner, -1) + 1
+            frame = spec.worldbody.add_frame(pos=part.position, quat=yaw_quat(part.yaw))
+            _add_boxes(spec.worldbody, part.owner, [collision.bounding_box(part.mesh.vertices)], frame=frame, first=first)
+
+
 def placement_boxes(catalogue, p: Placement) -> tuple[collision.Box, ...]:
     """The collision boxes of a placement, in the asset frame."""
     return collision.object_boxes(catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params), p.size)
 
 
 def _add_boxes(body: mujoco.MjsBody, owner: str, boxes: Sequence[collision.Box], *, density: float = 1000.0,
-               frame: mujoco.MjsFrame | None = None) -> None:
-    for k, box in enumerate(boxes):
+               frame: mujoco.MjsFrame | None = None, first: int = 0) -> None:
+    for k, box in enumerate(boxes, first):
         geom = body.add_geom(
             name=f"{owner}#box{k}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=box.centre, quat=yaw_quat(box.yaw),
             size=box.half, group=COLLISION, rgba=[0.6, 0.7, 0.9, 0.4], density=density, friction=[0.9, 0.005, 0.0001])

@@ -121,6 +121,17 @@ def test_walls_stop_and_openings_let_through(compiled):
     assert not free_at(2.5, 0.0, 0.5) and not free_at(2.5, 0.0, 2.3), "not below or above the window"
 
 
+def test_door_leaves_stand_where_they_are_drawn(compiled):
+    """The bedroom door stands open at 80 degrees: its box lies in the bedroom, not in the doorway."""
+    m = compiled.model
+    data = mujoco.MjData(m)
+    mujoco.mj_forward(m, data)
+    g = m.geom("door_1/leaf#box0").id
+    assert m.geom_size[g][2] > 0.9 and m.geom_size[g].min() < 0.04, "a leaf is tall and thin"
+    assert data.geom_xpos[g][0] > 5.3, "in the bedroom"
+    assert m.geom("window_1/glass#box0").id > 0
+
+
 def test_a_table_keeps_its_underside_free_and_its_top_exact():
     catalogue = HandCatalogue()
     asset = catalogue.assets["hand/table"]
