@@ -22,6 +22,8 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="size of the houses in square metres (default: 150 420)")
     parser.add_argument("--routes", choices=("sampled", "spanning"), default="sampled",
                         help="what assistants know: random stretches, or a spanning tree's (default: %(default)s)")
+    parser.add_argument("--language", choices=("people", "plain"), default="people",
+                        help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)")
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
     parser.add_argument("--panoramas", choices=("unlit", "baked", "glossy"), help="also draw every viewpoint, this well")
     parser.add_argument("--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)")
@@ -40,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
     from embodied.datasets.store import Dataset
 
-    config = DatasetConfig(args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people)
+    config = DatasetConfig(args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language)
 
     def watch(jobs, total):
         return tqdm(jobs, "houses", total=total, unit="house", disable=args.json)

@@ -34,7 +34,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.env import HelpEnv
     from embodied.generate import generate_house
-    from embodied.language.plain import PlainLanguage
+    from embodied.language import People
     from embodied.metrics import navigation_error, spl, success
     from embodied.plan import save_plan
     from embodied.policies import Shortest
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         save_plan(house, args.out / "plan.png", graph=world.graph)
         with timed("panoramas", timings):
             world.render_all(progress=True)
-        task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=PlainLanguage())
+        task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
         note(f"the agent is asked: “{task.request}”")
         sinks = sinks_of(args, args.out / "episode.rrd")
         with timed("recording", timings), open_recording(

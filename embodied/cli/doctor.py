@@ -87,12 +87,13 @@ def packs(args: argparse.Namespace) -> Finding:
 
 
 def path_tracer() -> Finding:
-    """Mitsuba's variant: CUDA, LLVM or scalar."""
-    from embodied.light.tracer import variant_in_use
+    """Mitsuba's back end: CUDA or LLVM; without it houses are drawn unlit."""
+    from embodied.light.backend import LightError, device
 
-    variant = variant_in_use()
-    fast = not variant.startswith("scalar")
-    return Finding("path tracer", fast, f"Mitsuba {variant}", "apt-get install libllvm19 makes baking light many times faster", False)
+    try:
+        return Finding("path tracer", True, f"Mitsuba on {device()}", needed=False)
+    except LightError as e:
+        return Finding("path tracer", False, str(e), "apt-get install libllvm19; until then use --quality unlit", False)
 
 
 def vulkan() -> Finding:

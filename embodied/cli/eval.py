@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_json, show
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 from embodied.datasets.scale import KINDS
 
 COLUMNS = {
@@ -28,6 +28,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write the table and the episodes")
+    add_cache(parser)
+    add_packs(parser)
     add_json(parser)
 
 
@@ -37,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from embodied import tables
     from embodied.cli import UserError
     from embodied.datasets.store import Dataset
-    from embodied.evaluate import AGENTS, agent, evaluate
+    from embodied.evaluate import AGENTS, LOOKING, agent, evaluate
     from embodied.records import save_lines
 
     data = Dataset(args.data)
@@ -50,8 +52,11 @@ def run(args: argparse.Namespace) -> int:
             if args.out:
                 save_lines(args.out / f"episodes_{split}_{name.replace(' ', '_').replace(',', '')}.jsonl", episodes)
 
-        agents = {name: agent(args.kind, name) for name in names}
-        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep)
+        agents, worlds = {name: agent(args.kind, name) for name in names}, None
+        if set(names) & set(LOOKING):
+            catalogue = catalogue_of(args)
+            worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
+        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds)
     if args.out:
         tables.save(rows, args.out, "table")
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))

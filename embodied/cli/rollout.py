@@ -34,7 +34,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied.env import HelpEnv
-    from embodied.language.plain import PlainLanguage
+    from embodied.language import People
     from embodied.metrics import PER_EPISODE
     from embodied.rollout import play
     from embodied.tasks.find import find_pool, find_task
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         pool = find_pool(world, seed=args.seed)
         if args.episodes > len(pool):
             raise ValueError(f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house")
-        tasks = [find_task(pool, i, seed=args.seed, language=PlainLanguage()) for i in range(args.episodes)]
+        tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
         episodes = play(lambda: HelpEnv({world.name: world}), policy_of(args.agent), tasks, seed=args.seed, agent=args.agent)
         rows = []
         for number, episode in enumerate(episodes):

@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.house import House, HouseError
 from embodied.interface import Language
-from embodied.language.plain import PlainLanguage
+from embodied.language.voice import People
 from embodied.navgraph import NavGraph, build_graph, from_matterport, to_matterport
 from embodied.people import add_people
 from embodied.records import save_lines
@@ -30,6 +30,7 @@ from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
+VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
 
@@ -49,10 +50,14 @@ class DatasetConfig:
     """'sampled' as in Room-to-Room, or 'spanning' as in Lemma 2."""
     people: bool = True
     """Whether assistants stand in the house as figures (HANNA)."""
+    language: str = "people"
+    """Who words the routes: 'people' with their habits and landmarks, or 'plain' turns and rooms."""
 
     def __post_init__(self) -> None:
         if self.routes not in ("sampled", "spanning"):
             raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
+        if self.language not in VOICES:
+            raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
         scale(self.scale, self.kind)
 
 
@@ -79,9 +84,8 @@ def units(wanted: Scale) -> tuple[Unit, ...]:
 
 
 def build_dataset(
-    config: DatasetConfig, folder: Path, cache: Path, *, workers: int = 1, language: Language | None = None,
-    make_house: HouseMaker | None = None, watch: Watch | None = None,
-    packs: tuple[Path, ...] = (), ray_address: str | None = None,
+    config: DatasetConfig, folder: Path, cache: Path, *, workers: int = 1, make_house: HouseMaker | None = None,
+    watch: Watch | None = None, packs: tuple[Path, ...] = (), ray_address: str | None = None,
 ) -> Path:
     """Build what is missing of the data set in `folder` and write its index; returns the index.
 
@@ -98,7 +102,7 @@ def build_dataset(
     wanted = scale(config.scale, config.kind)
     _claim(folder, config)
     work = units(wanted)
-    arguments = (config, folder, Path(cache), language or PlainLanguage(), make_house or make_dataset_house, packs)
+    arguments = (config, folder, Path(cache), language or People(), make_house or make_dataset_house, packs)
     for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
     return write_index(config, folder)
 
@@ -141,8 +145,7 @@ def for_each_unit(
 
 
 def build_unit(
-    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, language: Language,
-    make_house: HouseMaker, packs: tuple[Path, ...] = (),
+    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...] = (),
 ) -> str:
     """Build one house's folder unless it is there; returns its name.
 
@@ -155,7 +158,7 @@ def build_unit(
     home.parent.mkdir(parents=True, exist_ok=True)
     draft = Path(tempfile.mkdtemp(prefix=f".{unit.name}.", dir=home.parent))
     try:
-        _write_unit(unit, config, draft, cache, language, make_house, packs)
+        _write_unit(unit, config, draft, cache, make_house, packs)
         os.chmod(draft, 0o755)
         if home.exists():
             shutil.rmtree(home)
@@ -185,10 +188,9 @@ def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: o
 
 
 def _write_unit(
-    unit: Unit, config: DatasetConfig, home: Path, cache: Path, language: Language,
-    make_house: HouseMaker, packs: tuple[Path, ...],
+    unit: Unit, config: DatasetConfig, home: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...],
 ) -> None:
-    catalogue = load_catalogue(cache, packs)
+    catalogue, language = load_catalogue(cache, packs), VOICES[config.language]()
     house, graph = make_house(config.seed, unit.name, config, catalogue)
     wording = WORDINGS["train" if unit.group in ("train", "extra") else unit.group]
     paths: list[tuple[int, ...]] = []

@@ -14,6 +14,7 @@ from embodied.geometry import wrap
 from embodied.language.clauses import (
     LEFT,
     RIGHT,
+    STOPS,
     Avoid,
     Cross,
     Enter,
@@ -105,6 +106,34 @@ def plan(world: World, path: Sequence[int], yaw: float, speaker: Speaker, *, rng
         phrases.append(Phrase(Avoid(wrong)))
     phrases.append(_stop(eyes, lexicon, path, kind(path[-1]), legs[-1].crosses if legs else False, phrases, speaker, used, rng))
     return phrases
+
+
+def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
+    """At most `clauses` clauses where that is possible: what can best be guessed is left out first.
+
+    Left out, in this order: slight turns, straight stretches, rooms walked through, turns before a
+    doorway or a thing, things passed, passages entered. What remains keeps its order.
+    """
+    kept = list(phrases)
+    for rank in range(len(_DROPPABLE)):
+        for i in range(len(kept) - 2, 0, -1):
+            if len(kept) <= clauses:
+                return kept
+            if _DROPPABLE[rank](kept[i].clause, kept[i + 1].clause):
+                del kept[i]
+    return kept
+
+
+_DROPPABLE = (
+    lambda c, after: isinstance(c, Turn) and c.angle == 45,
+    lambda c, after: isinstance(c, Forward | Metres),
+    lambda c, after: isinstance(c, Cross),
+    lambda c, after: isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To),
+    lambda c, after: isinstance(c, Past),
+    lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not isinstance(after, STOPS),
+    lambda c, after: isinstance(c, To) and not isinstance(after, STOPS),
+)
+"""What may be left out before what follows it, the most dispensable first."""
 
 
 def _turn(angle: float) -> list[Phrase]:

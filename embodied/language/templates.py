@@ -80,7 +80,7 @@ TEMPLATES: tuple[Template, ...] = tuple([
     *_all("stop_in", "stop in the {room}", "wait in the {room}", "stop just inside the {room}", "wait once you are in the {room}",
           "formal: halt inside the {room}", "terse: stop inside {room}", "chatty: that's it once you are in the {room}",
           "stop when you are in the {room}", "your destination is in the {room}", "end up in the {room}"),
-    *_all("stop_here", "stop there", "wait there", "stop", "chatty: and that's your spot", "formal: halt at that point", "wait here",
+    *_all("stop_here", "stop there", "wait there", "stop", "chatty: and that's your spot", "formal: halt at this spot", "wait here",
           "that is where you stop", "stay there", "chatty: you made it"),
     *_all("turn enter", "turn {side} into the {room}", "take a {side} into the {room}", "go {side} into the {room}",
           "chatty: hang a {side} into the {room}", "terse: {side} into {room}", "enter the {room} on your {side}",
@@ -110,10 +110,10 @@ FILLERS: dict[str, tuple[str, ...]] = {
 HEDGES = ("I think", "I believe", "if I remember correctly", "more or less", "kind of", "probably", "sort of", "I guess", "as far as I recall")
 """Signs of doubt; they mean nothing."""
 LINKS: dict[str, tuple[str, ...]] = {
-    "chatty": ("and then", "then", "after that", "and", "once you've done that", "next", "and after that just"),
-    "formal": ("then", "next", "subsequently", "following that", "afterwards", "after which"),
+    "chatty": ("and then", "and then", "then", "then", "and", "after that", "once you've done that", "next", "and after that just"),
+    "formal": ("then", "then", "and then", "next", "subsequently", "following that", "afterwards", "after which"),
     "terse": ("then", "and", ""),
-    "": ("and", "then", "and then", "next", "after that", "from there", "now", "once there", "at that point"),
+    "": ("and", "and", "and", "then", "then", "and then", "and then", "next", "after that", "from there", "once there", "at that point"),
 }
 """What joins two clauses, by habit."""
 SLIPS = {

@@ -12,7 +12,7 @@ from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
 from embodied.language.plain import PlainLanguage
-from embodied.language.routes import plan
+from embodied.language.routes import plan, shortened
 from embodied.language.seen import Eyes
 from embodied.language.speakers import draw_speaker
 
@@ -49,8 +49,10 @@ class People:
           yaw: the walker's first direction, radians.
         """
         speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
-        for _ in range(self.tries):
-            text = say(plan(world, path, yaw, speaker, rng=rng), speaker, rng=rng)
+        wanted = max(int(round(rng.normal(speaker.clauses, 1.2))), 3)
+        for attempt in range(self.tries):
+            phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + attempt)
+            text = say(phrases, speaker, rng=rng)
             if self.tries == 1:
                 return text
             heard = carry_out(Eyes(world), parse(text, lexicon), path[0], yaw)
@@ -77,4 +79,4 @@ class Describer:
         """One description of walking `path` (nodes, repeats allowed) with first direction `yaw`, radians."""
         nodes = [n for i, n in enumerate(path) if i == 0 or n != path[i - 1]]
         speaker = draw_speaker(rng)
-        return say(plan(world, nodes, yaw, speaker, rng=rng), speaker, rng=rng)
+        return say(shortened(plan(world, nodes, yaw, speaker, rng=rng), speaker.clauses), speaker, rng=rng)

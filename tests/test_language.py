@@ -1,0 +1,150 @@
+"""Language closes: what is said can be read back, and whoever reads it arrives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assets.catalogue import load_catalogue
+from embodied.assistants.routes import RouteConfig, sampled_paths
+from embodied.generate import HouseConfig, generate_house
+from embodied.language.clauses import Enter, Exit, Metres, Past, StopBy, StopHere, To, Turn
+from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
+from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
+from embodied.language.listener import cost, follow
+from embodied.language.routes import legs_of, shortened
+from embodied.language.speakers import SPEAKERS, draw_speaker
+from embodied.language.templates import SLIPS, TEMPLATES
+from embodied.language.voice import Describer, People
+from embodied.world import open_world
+
+PATHS = 30
+
+
+@pytest.fixture(scope="module")
+def lexicon():
+    return lexicon_of(load_catalogue())
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    catalogue = load_catalogue(tmp_path_factory.mktemp("cache"))
+    house = generate_house(8, HouseConfig(area=(90.0, 110.0)), catalogue)
+    with open_world(house, catalogue, catalogue.cache) as world:
+        yield world
+
+
+@pytest.fixture(scope="module")
+def spoken(world):
+    """(text, path, yaw) of sampled routes."""
+    rng, people = np.random.default_rng(0), People()
+    paths = sampled_paths(world.graph, PATHS, rng=rng, config=RouteConfig())
+    yaws = [float(rng.integers(12)) * np.pi / 6 for _ in paths]
+    return [(people.route(world, p, y, rng=rng), p, y) for p, y in zip(paths, yaws)]
+
+
+def some_phrases(lexicon, rng) -> list[Phrase]:
+    assets = [a for a in load_catalogue().assets.values() if a.object_class not in UNFIT]
+    kinds = sorted(ROOM_NOUNS)
+
+    def of(make):
+        word = lexicon.words_for(assets[int(rng.integers(len(assets)))], rng, adjectives=int(rng.integers(3)))
+        return Phrase(make(lexicon.thing(word)), word)
+
+    choice = lambda: kinds[int(rng.integers(len(kinds)))]
+    return [Phrase(Exit(choice())), Phrase(Turn("left")), of(To), of(lambda t: Past(t, "right")), Phrase(Turn("right", 45)),
+            Phrase(Enter(choice())), Phrase(Turn("left", 180)), Phrase(Metres(int(rng.integers(1, 9)))), of(StopBy)]
+
+
+def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
+    rng = np.random.default_rng(1)
+    right = 0
+    for n in range(120):
+        phrases = some_phrases(lexicon, rng)
+        text = say(phrases, SPEAKERS[n % len(SPEAKERS)][1], rng=rng)
+        right += parse(text, lexicon).clauses == tuple(p.clause for p in phrases)
+    assert right >= 114, f"{right} of 120"
+
+
+def test_every_template_means_the_clauses_it_is_for(lexicon):
+    for t in TEMPLATES:
+        text = t.text.format(side="left", room="kitchen", other="study", n="3", thing="the red sofa")
+        assert tuple(kind_of(c) for c in parse(text, lexicon).clauses) == t.kinds, t.text
+
+
+def test_slips_hedges_and_openings_change_nothing(lexicon):
+    plain = parse("Turn left and walk straight into the kitchen. Stop by the table.", lexicon)
+    assert parse("Okay so, turn left, I think and walk strait into the kichen. Stop by the tabel.", lexicon) == plain
+    assert all(normalised(wrong) == right for right, wrong in SLIPS.items())
+
+
+def test_text_without_an_instruction_is_refused(lexicon):
+    with pytest.raises(ValueError, match="no part of 'lorem ipsum'"):
+        parse("lorem ipsum", lexicon)
+
+
+def test_a_turn_before_a_doorway_is_left_out_before_the_doorway():
+    phrases = [Phrase(Exit("study")), Phrase(Turn("left")), Phrase(Enter("kitchen")), Phrase(StopHere())]
+    assert [kind_of(p.clause) for p in shortened(phrases, 3)] == ["exit", "enter", "stop_here"]
+
+
+def test_legs_cover_the_path_and_end_at_doorways(world, spoken):
+    rooms = world.graph.room_of_node
+    for _, path, yaw in spoken:
+        legs = legs_of(world, path, yaw)
+        assert [n for leg in legs for n in leg.nodes[1:]] == list(path[1:])
+        assert all((rooms[leg.nodes[-2]] != rooms[leg.nodes[-1]]) == leg.crosses for leg in legs)
+
+
+def test_the_listener_arrives_within_three_metres(world, spoken):
+    missed = [world.graph.distance[follow(world, text, path[0], yaw).path[-1], path[-1]] for text, path, yaw in spoken]
+    assert np.mean(np.array(missed) <= 3.0) >= 0.9
+
+
+def test_the_instruction_of_another_route_leads_astray(world, spoken):
+    astray = []
+    for i, (_, path, yaw) in enumerate(spoken):
+        other = spoken[(i + 7) % len(spoken)][0]
+        astray.append(world.graph.distance[follow(world, other, path[0], yaw).path[-1], path[-1]] > 3.0)
+    assert np.mean(astray) >= 0.75
+
+
+def test_a_walk_carries_out_its_own_description_better_than_anothers(world, spoken):
+    lexicon = lexicon_of(world.catalogue)
+    own, others = [], []
+    for i, (text, path, yaw) in enumerate(spoken):
+        own.append(cost(world, parse(text, lexicon), path, yaw))
+        others.append(cost(world, parse(spoken[(i + 7) % len(spoken)][0], lexicon), path, yaw))
+    assert np.median(own) < 4.0 < np.median(others)
+
+
+def test_instructions_are_as_long_as_those_of_people_and_all_different(spoken):
+    words = [len(text.split()) for text, _, _ in spoken]
+    assert 18 <= np.mean(words) <= 36
+    assert len({text for text, _, _ in spoken}) == len(spoken)
+
+
+def test_the_same_generator_says_the_same(world, spoken):
+    _, path, yaw = spoken[0]
+    said = [People().route(world, path, yaw, rng=np.random.default_rng(5)) for _ in range(2)]
+    assert said[0] == said[1]
+
+
+def test_landmarks_are_visible_from_the_route(world, spoken):
+    lexicon = lexicon_of(world.catalogue)
+    for text, path, _ in spoken:
+        seen = {s.object_class for n in path for s in world.sightings(n)}
+        for clause in parse(text, lexicon).clauses:
+            if isinstance(clause, To | Past | StopBy):
+                assert seen & set(clause.thing.classes), (text, clause)
+
+
+def test_any_execution_can_be_described_even_standing_still(world):
+    rng = np.random.default_rng(2)
+    assert Describer().describe(world, (0, 0), 0.0, rng=rng)
+    assert Describer().describe(world, (0, *world.graph.path(0, len(world.graph.ids) - 1)), 0.0, rng=rng)
+
+
+def test_speakers_have_shares_that_sum_to_one():
+    assert sum(share for share, _ in SPEAKERS) == pytest.approx(1.0)
+    assert draw_speaker(np.random.default_rng(0)) == draw_speaker(np.random.default_rng(0))
