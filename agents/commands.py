@@ -1,8 +1,7 @@
-"""Entry points of the console command for everything that learns: train vision, train hanna, features, eval.
+"""What the commands that learn do: train vision, train hanna, features, eval; their options are in agents.options.
 
-Each pair (`add_...`, `run_...`) declares the options of one subcommand and runs it. The console
-command composes them (embodied.cli); what belongs to viz, such as recordings, is passed in from
-there as a function.
+The console command (embodied.cli) calls these; what belongs to viz, such as recordings, is passed
+in from there as a function.
 """
 
 from __future__ import annotations
@@ -10,26 +9,25 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import typing
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import torch
 
 from agents.evaluate import failures, hanna_policies, predictions, request_share
-from agents.hanna.agent import SHIPPED as SHIPPED_AGENT
 from agents.hanna.agent import load_agent, new_agent
-from agents.imitation.config import SCALES, TrainingConfig
+from agents.imitation.config import SCALES
+from agents.imitation.parallel import join_launcher
 from agents.imitation.training import Split, train
-from agents.vision.encoder import SHIPPED as SHIPPED_ENCODER
+from agents.options import chosen
+from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_bank, load_features, save_features
 from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
 from agents.vision.probe import Labelled, read
-from agents.vision.training import VisionConfig, save_training, train_encoder, whitened
+from agents.vision.training import save_training, train_encoder, whitened
 from agents.vocabulary import build_vocabulary
-from assets.cache import default_cache, write_json
+from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.evaluate import AGENTS, evaluate, spread
@@ -42,77 +40,6 @@ from embodied.teachers.hanna import HannaTeacher
 Note = Callable[[str], None]
 FACES = 192
 """Side of the cube faces from which features are made: the strip's resolution."""
-
-
-# Options -----------------------------------------------------------------------------------------
-
-def add_common(parser: argparse.ArgumentParser) -> None:
-    """Options that all of them share."""
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built")
-    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR", help="where expensive products are kept")
-    parser.add_argument("--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)")
-
-
-def add_encoder(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
-                        help="an encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)")
-    parser.add_argument("--network", metavar="NAME", help="torchvision network of --encoder: resnet18 to resnet152; "
-                        "'random' for an untrained compact one")
-
-
-def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
-    """One option per field of a configuration; without it, the field keeps its default."""
-    hints = typing.get_type_hints(config)
-    for f in dataclasses.fields(config):
-        if f.name in skip:
-            continue
-        option = f"--{f.name.replace('_', '-')}"
-        if hints[f.name] is bool:
-            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=f"default: {f.default}")
-        else:
-            parser.add_argument(option, type=hints[f.name], default=None, metavar=hints[f.name].__name__.upper(),
-                                help=f"default: {f.default}")
-
-
-def chosen(args: argparse.Namespace, config):
-    """`config` with the fields that were given on the command line."""
-    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}
-    return dataclasses.replace(config, **{k: v for k, v in given.items() if v is not None})
-
-
-def add_train_vision(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where strips, weights and numbers go")
-    add_fields(parser, VisionConfig)
-
-
-def add_features(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    add_encoder(parser)
-    parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
-    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
-
-
-def add_train_hanna(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    add_encoder(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it")
-    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
-    parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
-    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
-    add_fields(parser, TrainingConfig)
-
-
-def add_eval(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    add_encoder(parser)
-    parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)")
-    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
-    parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
-    parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
-    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
 
 
 # Vision ------------------------------------------------------------------------------------------
@@ -220,11 +147,12 @@ def run_train_hanna(
 ) -> int:
     """Train an agent on a data set's training houses, validating on its unseen validation houses."""
     torch.set_num_threads(args.threads)
+    device = join_launcher(args.device)
     data, encoder, config = Dataset(args.data), encoder_of(args), chosen(args, SCALES[args.scale])
-    training = split_of(data, "train", encoder, args.device)
-    validation = split_of(data, "val_unseen", encoder, args.device, config.validation_tasks)
+    training = split_of(data, "train", encoder, device)
+    validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
     agent = new_agent(config, vocabulary_of(data), encoder.digest, encoder.size)
-    agent.network.to(args.device)
+    agent.network.to(device)
     parameters = sum(p.numel() for p in agent.network.parameters())
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
     train(agent, training, validation, HannaTeacher(), args.out, minutes=args.minutes, note=note, on_validation=on_validation)

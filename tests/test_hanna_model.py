@@ -10,8 +10,9 @@ import pytest
 import torch
 
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, sim_attend, sinusoid
+from agents.hanna.config import HannaConfig
 from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import HannaConfig, HannaNetwork
+from agents.hanna.network import HannaNetwork
 from agents.hanna.percept import (
     DO_NOTHING,
     REQUEST,

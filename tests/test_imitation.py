@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import torch.distributed as dist
 from hand_worlds import grid_world
 
 from agents.hanna.agent import load_agent, new_agent, save_agent
@@ -31,7 +32,7 @@ from agents.imitation.losses import (
     reason_loss,
     relative_entropy,
 )
-from agents.imitation.training import Split, TrainingError, for_training, tasks_of_update, train
+from agents.imitation.training import Clock, Split, TrainingError, for_training, learn_once, tasks_of_update, train
 from agents.vision.bank import FeatureBank
 from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied import metrics
@@ -367,3 +368,30 @@ def test_success_in_the_progress_line_is_the_judges():
         episodes = play(split.make_env, policy, split.tasks[:4], seed=0, batch=4)
     world = split.worlds[episodes[0].task.world]
     assert all(metrics.success(e, world.graph) in (0.0, 1.0) for e in episodes)
+
+
+def gradients_of_a_share(rank: int, folder: str) -> None:
+    """One of two processes: its share of one update, and the gradient that it then has."""
+    dist.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=2)
+    save_gradients(Path(folder) / f"{rank}.pt")
+    dist.destroy_process_group()
+
+
+def save_gradients(path: Path) -> None:
+    torch.set_num_threads(1)
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0))
+    optimizer = torch.optim.SGD(agent.network.parameters(), 0.0)
+    learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
+    torch.save([p.grad for p in agent.network.parameters()], path)
+
+
+def test_two_processes_learn_what_one_would(tmp_path):
+    torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=2)
+    save_gradients(tmp_path / "alone.pt")
+    alone, first, second = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("alone", "0", "1"))
+    for a, b, c in zip(alone, first, second, strict=True):
+        assert (a is None) == (b is None) == (c is None)
+        if a is not None:
+            assert torch.equal(b, c)
+            assert torch.allclose(a, b, atol=1e-4, rtol=1e-3)

@@ -11,11 +11,12 @@ import torch
 
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
+from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
 from agents.vision.features import load_bank, load_features, save_features, to_matterport_order
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, read_weights
-from agents.vision.training import VisionConfig, train_encoder, turned
+from agents.vision.training import train_encoder, turned
 from embodied.interface import Sight
 
 

@@ -14,14 +14,16 @@ from agents.hanna.asking import RULES
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy, choose_likeliest
-from agents.imitation.config import MODELS, TrainingConfig
+from agents.imitation.config import TrainingConfig
+from agents.options import SHIPPED_AGENT
 from agents.vision.bank import FeatureBank
 from agents.vision.resnet import read_weights
 from agents.vocabulary import Vocabulary
 from assets.cache import atomic_path
 
 FORMAT = "embodied-agent-1"
-SHIPPED = Path(__file__).resolve().parent.parent / "weights" / "hanna_mini.safetensors"
+NETWORKS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+SHIPPED = SHIPPED_AGENT
 """The agent of this repository; see weights/README.md."""
 
 
@@ -56,7 +58,7 @@ def new_agent(config: TrainingConfig, vocabulary: Vocabulary, encoder_digest: st
     """An untrained agent; its weights follow from config.seed."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        network = MODELS[config.model](config.network_config(len(vocabulary), feature_size))
+        network = NETWORKS[config.model](config.network_config(len(vocabulary), feature_size))
     return HannaAgent(network, vocabulary, config, encoder_digest, feature_size)
 
 

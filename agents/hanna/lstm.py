@@ -13,7 +13,8 @@ import torch
 from torch import Tensor, nn
 
 from agents.hanna.attention import DotAttend
-from agents.hanna.network import HannaConfig, Scores
+from agents.hanna.config import HannaConfig
+from agents.hanna.network import Scores
 from agents.hanna.percept import SLOTS, VIEWS, Percept, slot_distribution, target_similarity
 
 

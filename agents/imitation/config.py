@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from agents.hanna.asking import RULES
-from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import HannaConfig, HannaNetwork
+from agents.hanna.config import HannaConfig
 
-MODELS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+MODELS = ("hanna", "lstm")
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
-            raise ValueError(f"model must be one of {sorted(MODELS)}, got {self.model!r}")
+            raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
         if self.ask_rule not in RULES:
             raise ValueError(f"ask_rule must be one of {sorted(RULES)}, got {self.ask_rule!r}")
         for name in ("iterations", "batch", "training_steps", "evaluation_steps", "evaluation_batch", "validate_every",

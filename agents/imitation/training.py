@@ -29,6 +29,7 @@ import torch
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
+from agents.imitation import parallel
 from agents.imitation.checkpoint import Progress, load_checkpoint, save_checkpoint
 from agents.imitation.collect import Experience, collect, imitation_loss
 from agents.imitation.losses import IGNORE
@@ -100,9 +101,10 @@ def train(
     progress = load_checkpoint(checkpoint, agent, optimizer) if checkpoint.exists() else Progress()
     if progress.update:
         note(f"continuing after update {progress.update}")
-    (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
+    if parallel.rank() == 0:
+        (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
     learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0])
-    report = Report(folder, config.iterations, progress, note)
+    report = Report(folder, config.iterations, progress, note if parallel.rank() == 0 else lambda line: None)
     began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
 
     def now() -> Progress:
@@ -115,14 +117,17 @@ def train(
                 progress = dataclasses.replace(progress, update=progress.update + 1)
                 report.add(progress.update, numbers, now().seconds)
                 last = progress.update == config.iterations
-                if progress.update % config.validate_every == 0 or last:
+                if parallel.rank() == 0 and (progress.update % config.validate_every == 0 or last):
                     with report.clock.on("validation"):
                         progress = validate(agent, validation, progress, folder, report, now().seconds, on_validation)
-                late = minutes is not None and time.monotonic() - began > 60 * minutes
-                if time.monotonic() - saved > 60 * config.checkpoint_minutes or last or late or stop.is_set():
+                device = next(agent.network.parameters()).device
+                late = parallel.any_of_us(minutes is not None and time.monotonic() - began > 60 * minutes, device)
+                stopped = parallel.any_of_us(stop.is_set(), device)
+                due = time.monotonic() - saved > 60 * config.checkpoint_minutes
+                if parallel.rank() == 0 and (due or last or late or stopped):
                     save_checkpoint(checkpoint, agent, optimizer, now())
                     saved = time.monotonic()
-                if stop.is_set():
+                if stopped:
                     note(f"stopped after update {progress.update}; the same command goes on from there")
                     raise KeyboardInterrupt
                 if late and not last:
@@ -144,19 +149,20 @@ def learn_once(
       TrainingError: the loss or a gradient is not finite (weights are as before), or memory ran out.
     """
     config = agent.config
-    tasks = tasks_of_update(training.tasks, update, config.batch, config.seed)
+    tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
     tasks = [dataclasses.replace(t, horizon=config.training_steps) for t in tasks]
     try:
-        with dropout_of(config.seed, update):
+        with dropout_of(config.seed + parallel.rank(), update):
             agent.network.train()
             with clock.on("play"):
                 experience = collect(
                     training.make_env, learner, tasks, teacher, training.worlds, seed=seed_of(config.seed, update)
                 )
             with clock.on("backward"):
-                losses = imitation_loss(experience.said, experience.targets, config.alpha, len(tasks))
+                losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch)
                 optimizer.zero_grad(set_to_none=True)
                 (losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]).backward()
+                parallel.add_gradients(agent.network.parameters())
     except torch.OutOfMemoryError as e:
         raise TrainingError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
     norm = torch.nn.utils.get_total_norm([p.grad for p in agent.network.parameters() if p.grad is not None])
@@ -254,7 +260,8 @@ class Report:
         self.folder, self.iterations, self.note = folder, iterations, note
         self.clock = Clock()
         self.best = (progress.best, progress.best_update)
-        self._writer = SummaryWriter(str(folder), purge_step=progress.update + 1)
+        where = folder if parallel.rank() == 0 else folder / f"process_{parallel.rank()}"
+        self._writer = SummaryWriter(str(where), purge_step=progress.update + 1)
         self._sums: dict[str, float] = {}
         self._counts: dict[str, int] = {}
         self._since = time.monotonic()

@@ -14,12 +14,13 @@ import safetensors.torch
 import torch
 from torch import Tensor
 
+from agents.options import SHIPPED_ENCODER
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise, read_weights
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from assets.cache import atomic_path
 
 FORMAT = "embodied-encoder-1"
-SHIPPED = Path(__file__).resolve().parent.parent / "weights" / "encoder.safetensors"
+SHIPPED = SHIPPED_ENCODER
 """The encoder of this repository, trained on our own renders; see weights/README.md."""
 MARGIN = 3 * CELL
 """Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""

@@ -18,29 +18,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.resnet import ARCHITECTURES, ResNet
 from agents.vision.strip import CELL, COLUMNS
 from assets.records import ROOM_KINDS
 from embodied.seeds import stream
-
-
-@dataclass(frozen=True)
-class VisionConfig:
-    """How the encoder is trained."""
-
-    network: str = "compact"
-    """Key of resnet.ARCHITECTURES."""
-    epochs: int = 6
-    batch: int = 8
-    """Strips per update."""
-    learning_rate: float = 2e-3
-    """Highest rate of a one-cycle schedule."""
-    weight_decay: float = 1e-2
-    least_views: int = 50
-    """A class is learned if it is visible in at least this many training views."""
-    seed: int = 0
 
 
 class Heads(nn.Module):

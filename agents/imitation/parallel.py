@@ -1,0 +1,60 @@
+"""Several processes, one run: each plays a share of every batch, and gradients are added up.
+
+Started by PyTorch's own launcher, `torchrun --nproc-per-node 4 -m embodied.cli train hanna ...`.
+The batch of the settings is the whole batch, so results do not depend on the number of processes
+but for rounding and for the draws of dropout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+import torch
+import torch.distributed as dist
+
+T = TypeVar("T")
+
+
+def rank() -> int:
+    """Number of this process, 0 without others."""
+    return dist.get_rank() if dist.is_initialized() else 0
+
+
+def processes() -> int:
+    return dist.get_world_size() if dist.is_initialized() else 1
+
+
+def join_launcher(device: str) -> str:
+    """Join the other processes if torchrun started this one; returns the device to use."""
+    if not dist.is_torchelastic_launched():
+        return device
+    dist.init_process_group("nccl" if device.startswith("cuda") else "gloo")
+    return f"cuda:{dist.get_node_local_rank()}" if device == "cuda" else device
+
+
+def share(items: Sequence[T]) -> Sequence[T]:
+    """What this process works on: every n-th item."""
+    return items[rank() :: processes()]
+
+
+def add_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
+    """Every process gets the sum of all gradients."""
+    if processes() == 1:
+        return
+    gradients = [p.grad for p in parameters if p.grad is not None]
+    flat = torch.cat([g.flatten() for g in gradients])
+    dist.all_reduce(flat)
+    at = 0
+    for g in gradients:
+        g.copy_(flat[at : at + g.numel()].view_as(g))
+        at += g.numel()
+
+
+def any_of_us(flag: bool, device: torch.device) -> bool:
+    """Whether `flag` is true in any process, so that all stop together."""
+    if processes() == 1:
+        return flag
+    tensor = torch.tensor(float(flag), device=device)
+    dist.all_reduce(tensor, dist.ReduceOp.MAX)
+    return bool(tensor.item())

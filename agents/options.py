@@ -1,0 +1,89 @@
+"""Options of the commands that learn: `embodied train vision | hanna`, `embodied features`, `embodied eval --learned`.
+
+Free of torch, so that `embodied --help` answers at once; what they do is in agents.commands.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import typing
+from collections.abc import Sequence
+from pathlib import Path
+
+from agents.imitation.config import SCALES, TrainingConfig
+from agents.vision.config import VisionConfig
+from assets.cache import default_cache
+
+WEIGHTS = Path(__file__).resolve().parent / "weights"
+"""What this repository ships; see its README.md."""
+SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Options that all of them share."""
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built")
+    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR", help="where expensive products are kept")
+    parser.add_argument("--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)")
+
+
+def add_encoder(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
+                        help="an encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)")
+    parser.add_argument("--network", metavar="NAME", help="torchvision network of --encoder: resnet18 to resnet152; "
+                        "'random' for an untrained compact one")
+
+
+def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
+    """One option per field of a configuration; without it, the field keeps its default."""
+    hints = typing.get_type_hints(config)
+    for f in dataclasses.fields(config):
+        if f.name in skip:
+            continue
+        option = f"--{f.name.replace('_', '-')}"
+        if hints[f.name] is bool:
+            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=f"default: {f.default}")
+        else:
+            parser.add_argument(option, type=hints[f.name], default=None, metavar=hints[f.name].__name__.upper(),
+                                help=f"default: {f.default}")
+
+
+def chosen(args: argparse.Namespace, config):
+    """`config` with the fields that were given on the command line."""
+    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}
+    return dataclasses.replace(config, **{k: v for k, v in given.items() if v is not None})
+
+
+def add_train_vision(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where strips, weights and numbers go")
+    add_fields(parser, VisionConfig)
+
+
+def add_features(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+
+
+def add_train_hanna(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it")
+    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
+    parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    add_fields(parser, TrainingConfig)
+
+
+def add_eval(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)")
+    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
+    parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
+    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
