@@ -21,6 +21,8 @@ RADIUS = 0.2
 """Radius of the agent's body, metres."""
 CELL = 0.1
 """Grid on which viewpoints are chosen, metres."""
+ENTERED = 0.4
+"""Share of a room's free floor that must be reachable for the room to count as entered."""
 APART = 0.8
 """Least distance between viewpoints of one room, in units of the wanted spacing."""
 LOOKS = 16
@@ -115,10 +117,9 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
     rooms = [r for r in house.rooms if r.storey == storey]
     grid, room_of_cell, reach = reachable(house, storey)
     space = grid.space
-    for k, r in enumerate(rooms):
-        if not (room_of_cell[reach] == k).any():
-            raise HouseError(f"room {r.id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
-                             "widen its door or move the furniture that blocks it")
+    if shut := closed_rooms(room_of_cell, reach, len(rooms)):
+        raise HouseError(f"room {rooms[shut[0]].id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
+                         "widen its door or move the furniture that blocks it")
     room_of_cell[~reach] = -1
     nodes = _spread(space, grid, room_of_cell, rooms, spacing)
     nodes = _join(house, storey, space, grid, reach, nodes, spacing)
@@ -134,8 +135,15 @@ def unreachable_rooms(house: House) -> tuple[str, ...]:
     for storey in range(len(house.storeys)):
         rooms = [r for r in house.rooms if r.storey == storey]
         _, room_of_cell, reach = reachable(house, storey)
-        found += [r.id for k, r in enumerate(rooms) if not (room_of_cell[reach] == k).any()]
+        found += [rooms[k].id for k in closed_rooms(room_of_cell, reach, len(rooms))]
     return tuple(found)
+
+
+def closed_rooms(room_of_cell: np.ndarray, reach: np.ndarray, rooms: int) -> list[int]:
+    """Indices of rooms of whose free floor less than ENTERED can be reached."""
+    free = np.bincount(room_of_cell[room_of_cell >= 0], minlength=rooms)
+    reached = np.bincount(room_of_cell[reach & (room_of_cell >= 0)], minlength=rooms)
+    return [k for k in range(rooms) if reached[k] == 0 or reached[k] < ENTERED * free[k]]
 
 
 def reachable(house: House, storey: int) -> tuple[Grid, np.ndarray, np.ndarray]:

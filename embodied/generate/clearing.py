@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from embodied.house import House, HouseError
-from embodied.navgraph import CELL, RADIUS, reachable
+from embodied.navgraph import CELL, RADIUS, closed_rooms, reachable
 from embodied.walkable import HEAD, STEP, footprint
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
@@ -28,8 +28,7 @@ def cleared(house: House) -> House:
         for _ in range(ROUNDS):
             grid, room_of_cell, reach = reachable(house, storey)
             rooms = [r for r in house.rooms if r.storey == storey]
-            entered = set(room_of_cell[reach].tolist())
-            closed = [k for k in range(len(rooms)) if k not in entered]
+            closed = closed_rooms(room_of_cell, reach, len(rooms))
             if not closed:
                 break
             blocking = _blocking(house, storey, closed, grid.xy[reach])
@@ -79,13 +78,16 @@ def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarr
     start = [n for n, k in enumerate(np.round(grid.xy / CELL).astype(int).tolist()) if tuple(k) in keys]
     if not start:
         return ()
+    at_start = np.zeros(len(grid.xy), bool)
+    at_start[start] = True
     cost, before, _ = dijkstra(dear, directed=False, indices=start, min_only=True, return_predecessors=True)
     way: set[int] = set()
     for k in closed:
-        goal = np.flatnonzero(room_of_cell == k)
-        # a cell well inside the room, not merely its doorstep
-        deep = goal[grid.clearance[goal] >= min(0.3, float(grid.clearance[goal].max()))] if len(goal) else goal
-        at = int(deep[np.argmin(cost[deep])]) if len(deep) else -1
+        goal = np.flatnonzero((room_of_cell == k) & ~at_start)
+        # the free part of the room, not merely its doorstep
+        free = goal[toll[goal] == 0]
+        goal = free if len(free) else goal
+        at = int(goal[np.argmin(cost[goal])]) if len(goal) else -1
         while at >= 0:
             way.add(at)
             at = int(before[at])

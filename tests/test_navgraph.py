@@ -1,0 +1,160 @@
+"""Truths about navigation graphs: who can walk where, how far it is, and the files other programs read."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+from conftest import two_rooms
+
+from assets.catalogue import load_catalogue
+from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.house import HouseError, Placement
+from embodied.navgraph import RADIUS, build_graph, from_matterport, graph_of, to_matterport
+from embodied.walkable import EYE, free_floor, leaves, sight_floor
+
+BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
+
+
+@functools.cache
+def pairs():
+    """(house, graph): bare and furnished ones."""
+    catalogue = load_catalogue()
+    houses = [generate_house(seed, stages=BARE) for seed in range(6)]
+    houses += [generate_house(seed, catalogue=catalogue) for seed in range(100, 106)]
+    return tuple((h, build_graph(h)) for h in houses)
+
+
+def line() -> tuple:
+    """Four nodes on a line, 1, 2 and 3 m apart."""
+    x = np.array([0.0, 1.0, 3.0, 6.0])
+    positions = np.stack([x, 0 * x, 0 * x + 1.5], axis=1)
+    return graph_of(positions, np.array([[0, 1], [2, 1], [2, 3]]), ("a", "b", "c", "d"), ("r",) * 4)
+
+
+def test_distances_and_hops_on_a_line_by_hand():
+    graph = line()
+    assert graph.distance[0].tolist() == [0, 1, 3, 6]
+    assert graph.path(3, 0) == (3, 2, 1, 0) and graph.path(2, 2) == (2,)
+    assert graph.neighbours(1) == (0, 2)
+    assert graph.next_hop[0].tolist() == [0, 1, 1, 1]
+
+
+def test_a_graph_in_two_pieces_is_refused():
+    with pytest.raises(HouseError, match="not connected"):
+        graph_of(np.zeros((3, 3)) + np.arange(3)[:, None], np.array([[0, 1]]), ("a", "b", "c"), ("r",) * 3)
+
+
+def test_two_rooms_are_joined_through_their_door():
+    graph = build_graph(two_rooms())
+    assert set(graph.room_of_node) == {"living_room_1", "bedroom_1"}
+    assert np.allclose(graph.positions[:, 2], EYE)
+
+
+def test_every_room_has_a_node_in_it():
+    for house, graph in pairs():
+        assert set(graph.room_of_node) == {r.id for r in house.rooms}
+        for p, room in zip(graph.positions, graph.room_of_node):
+            assert shapely.Polygon(house.room_by_id[room].polygon).distance(shapely.Point(p[:2])) < 1e-6
+
+
+def test_distance_is_a_metric():
+    for _, graph in pairs():
+        d = graph.distance
+        assert np.isfinite(d).all() and (d == d.T).all() and (np.diag(d) == 0).all()
+        for k in range(len(d)):
+            assert (d <= d[:, [k]] + d[[k], :] + 1e-9).all()
+
+
+def test_every_hop_is_an_edge_and_hops_add_up_to_the_distance():
+    for _, graph in pairs():
+        lengths = {tuple(e): x for e, x in zip(graph.edges.tolist(), graph.lengths.tolist())}
+        n = len(graph.ids)
+        for i in range(0, n, 3):
+            for j in range(0, n, 5):
+                path = graph.path(i, j)
+                total = sum(lengths[min(a, b), max(a, b)] for a, b in itertools.pairwise(path))
+                assert total == pytest.approx(graph.distance[i, j])
+
+
+def test_each_edge_is_walkable_for_the_agents_radius_and_sees_its_other_end():
+    for house, graph in pairs():
+        floor, sight = free_floor(house, 0), sight_floor(house, 0)
+        for i, j in graph.edges:
+            way = shapely.LineString(graph.positions[[i, j], :2])
+            assert floor.covers(way.buffer(RADIUS - 1e-3)), (house.seed, i, j)
+            assert sight.covers(way), (house.seed, i, j)
+
+
+def test_edge_lengths_are_those_of_matterport3d():
+    """originals.md 2.1: mean 2.27 m, median 2.06 over the 90 public graphs; issue 2: near 2.25."""
+    lengths = np.concatenate([graph.lengths for _, graph in pairs()])
+    assert 1.85 < lengths.mean() < 2.5
+    assert np.quantile(lengths, 0.95) < 5.0
+
+
+def test_a_large_house_has_about_125_nodes():
+    house = generate_house(500, HouseConfig(area=(500, 520)), load_catalogue())
+    assert 100 <= len(build_graph(house).ids) <= 155
+    assert len(house.placements) >= 250
+
+
+def test_the_graph_is_the_same_every_time():
+    house, graph = pairs()[-1]
+    again = build_graph(house)
+    assert (again.positions == graph.positions).all() and (again.edges == graph.edges).all()
+
+
+def test_a_wall_of_wardrobes_keeps_the_agent_out_and_a_rug_does_not():
+    house = two_rooms()
+    wall = Placement("wardrobe_1", "a/b", "wardrobe", "bedroom_1", (5.7, 2.0, 0.0), 0.0, (0.6, 4.0, 2.0))
+    rug = dataclasses.replace(wall, id="rug_2", size=(0.6, 4.0, 0.01))
+    shelf = dataclasses.replace(wall, id="shelf_1", position=(5.7, 2.0, 1.85))
+    with pytest.raises(HouseError, match="cannot be entered on foot"):
+        build_graph(dataclasses.replace(house, placements=(wall,)))
+    assert len(build_graph(dataclasses.replace(house, placements=(rug, shelf))).ids) >= 3
+
+
+def test_a_shut_door_cuts_and_an_open_one_does_not():
+    house = two_rooms()
+    door = house.openings[0]
+    shut = dataclasses.replace(house, openings=(dataclasses.replace(door, angle=0.0), *house.openings[1:]))
+    with pytest.raises(HouseError, match="cannot be entered on foot"):
+        build_graph(shut)
+    leaf = leaves(house, door)[0]
+    assert leaf.centroid.x > 5.0  # opens into the bedroom, its first room
+    assert leaf.length == pytest.approx(2 * (0.9 - 0.06) + 2 * 0.05, abs=0.01)
+    assert math.isclose(door.angle, 1.4)
+
+
+def test_connectivity_files_survive_the_round_trip(tmp_path):
+    _, graph = pairs()[0]
+    to_matterport(graph, tmp_path / "house_connectivity.json")
+    items = json.loads((tmp_path / "house_connectivity.json").read_text())
+    assert set(items[0]) >= {"image_id", "pose", "included", "visible", "unobstructed", "height"}
+    assert len(items[0]["pose"]) == 16 and items[0]["pose"][11] == graph.positions[0, 2]
+    again = from_matterport(tmp_path / "house_connectivity.json")
+    assert again.ids == graph.ids and again.room_of_node == graph.room_of_node
+    assert (again.edges == graph.edges).all() and np.allclose(again.distance, graph.distance)
+
+
+def test_excluded_viewpoints_are_left_out_and_broken_files_refused(tmp_path):
+    path = tmp_path / "scan_connectivity.json"
+    to_matterport(line(), path)
+    items = json.loads(path.read_text())
+    items[3]["included"] = False
+    path.write_text(json.dumps(items))
+    assert from_matterport(path).ids == ("a", "b", "c")
+    items[0]["unobstructed"][1] = False
+    path.write_text(json.dumps(items))
+    with pytest.raises(HouseError, match="symmetric"):
+        from_matterport(path)
+    path.write_text(path.read_text()[:50])
+    with pytest.raises(HouseError, match="connectivity file"):
+        from_matterport(path)
