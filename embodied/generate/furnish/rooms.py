@@ -12,8 +12,20 @@ from embodied.generate.furnish.context import Context
 
 
 def furnish_room(ctx: Context) -> None:
-    """Put the furniture of its kind into the room."""
+    """Put the furniture of its kind into the room, and more where it would look bare."""
     PROGRAMMES[ctx.kind](ctx)
+    if ctx.kind in FILLERS:
+        target, fillers = FILLERS[ctx.kind]
+        for _ in range(8):
+            if coverage(ctx) >= target:
+                return
+            fillers[int(ctx.rng.integers(len(fillers)))](ctx)
+
+
+def coverage(ctx: Context) -> float:
+    """Share of the floor that furniture stands on."""
+    standing = (t for t in ctx.things if t.parent is None and t.z < ctx.space.bottom + 0.1 and t.size[2] > 0.05)
+    return sum(t.size[0] * t.size[1] for t in standing) / ctx.space.area
 
 
 def lacks(ctx: Context) -> int:
@@ -421,6 +433,49 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "laundry_room": (("washing machine",),),
 }
 """Room kind to the roles it should not lack; any one of a tuple will do."""
+
+def _piece(role: str, **limits) -> Callable[[Context], object]:
+    """A filler that puts one piece of storage at a wall."""
+    return lambda ctx: work.storage(ctx, role, **limits)
+
+
+def _corner(role: str, **limits) -> Callable[[Context], object]:
+    """A filler that puts one thing in a corner or at a wall."""
+    return lambda ctx: work.corner_thing(ctx, role, **limits)
+
+
+SITTING = (
+    living.conversation, living.reading_corner, work.bookshelf, _piece("living storage"), work.corner_plant,
+    _piece("display storage"), work.console, work.corner_plant, living.sofa_group, _corner("floor vase"),
+)
+RESTING = (
+    sleep.dresser, sleep.bedroom_chair, work.corner_plant, work.bookshelf, living.reading_corner, sleep.wardrobe, work.desk,
+    _piece("bench", clear=0.3), _corner("basket", most=(0.6, 0.6, 0.7)),
+)
+ROUGH = (
+    _piece("rough storage", clear=0.5, avoid=()), _corner("box", avoid=()), _corner("box", avoid=()),
+    _piece("shelving unit", clear=0.5, avoid=()), _corner("step ladder"), _corner("trash can"),
+)
+FILLERS: dict[str, tuple[float, tuple[Callable[[Context], object], ...]]] = {
+    "living_room": (0.26, SITTING), "family_room": (0.26, SITTING), "library": (0.26, SITTING), "sun_room": (0.24, SITTING),
+    "dining_room": (0.26, (_piece("display storage"), work.corner_plant, living.reading_corner, work.console,
+                           work.corner_plant, _piece("cupboard"), work.bookshelf)),
+    "main_bedroom": (0.34, RESTING), "bedroom": (0.36, RESTING), "guest_room": (0.34, RESTING),
+    "kids_room": (0.34, (sleep.toys, sleep.child_table, work.bookshelf, _corner("big toy"), _piece("shelving unit", clear=0.4),
+                         _corner("bean bag"), sleep.dresser)),
+    "study": (0.3, (work.bookshelf, work.corner_plant, living.reading_corner, _piece("office storage"), work.console)),
+    "hall": (0.14, (work.console, work.corner_plant, work.hall_bench, _piece("cupboard"), living.reading_corner)),
+    "playroom": (0.26, (sleep.toys, _corner("bean bag"), _piece("shelving unit", clear=0.4), _corner("big toy"),
+                        living.reading_corner, sleep.child_table)),
+    "gym": (0.26, (_piece("bench", clear=0.3), work.corner_plant, _piece("shelving unit", clear=0.4), _corner("basketball"))),
+    "garage": (0.24, ROUGH), "workshop": (0.28, ROUGH),
+    "pantry": (0.36, (_piece("shelving unit", clear=0.4, avoid=()), _corner("box", avoid=()), _piece("cupboard", clear=0.4),
+                      _corner("basket", most=(0.6, 0.6, 0.7)))),
+    "closet": (0.36, (sleep.clothes, sleep.clothes, _corner("shoes"), _corner("box", most=(0.6, 0.6, 0.5)), _corner("basket"))),
+    "laundry_room": (0.34, (_piece("rough storage", clear=0.4), _corner("laundry basket"), _corner("box"),
+                            _piece("cupboard", clear=0.4))),
+}
+"""Room kind to the share of floor that should be stood on, and what fills it up."""
 
 PROGRAMMES: dict[str, Callable[[Context], None]] = {
     "living_room": living_room, "family_room": living_room, "dining_room": dining_room, "kitchen": kitchen,
