@@ -387,25 +387,18 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
 
 def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
     """A panel between stiles, sunk by a third of the leaf, with a sloping moulding on both sides."""
-    sunk, slope = thick * 0.28, 0.022
-    rings = [((x0, z0), (x1, z1)), ((x0 + slope, z0 + slope), (x1 - slope, z1 - slope))]
+    sunk, slope, lip = thick * 0.28, 0.022, 0.0025
+    # The moulding starts a little inside the rounded edges of the stiles, so that no gap shows.
+    outer = [(x0 - lip, z0 - lip), (x1 + lip, z0 - lip), (x1 + lip, z1 + lip), (x0 - lip, z1 + lip)]
+    inner = [(x0 + slope, z0 + slope), (x1 - slope, z0 + slope), (x1 - slope, z1 - slope), (x0 + slope, z1 - slope)]
     corners = []
-    (a, b), (c, d) = rings
-    outer = [(a[0], a[1]), (b[0], a[1]), (b[0], b[1]), (a[0], b[1])]
-    inner = [(c[0], c[1]), (d[0], c[1]), (d[0], d[1]), (c[0], d[1])]
-    for face, flip in ((0.0, False), (-thick, True)):
-        sign = -1.0 if not flip else 1.0
-        quad = [(x, face + sign * sunk, z) for x, z in inner]
-        corners.append(quad[::-1] if not flip else quad)
+    for face, side in ((0.0, -1.0), (-thick, 1.0)):
+        high, low = face + side * lip, face + side * sunk
+        rings = [[(x, low, z) for x, z in inner]]
         for k in range(4):
-            m = (k + 1) % 4
-            quad = [
-                (outer[k][0], face, outer[k][1]),
-                (outer[m][0], face, outer[m][1]),
-                (inner[m][0], face + sign * sunk, inner[m][1]),
-                (inner[k][0], face + sign * sunk, inner[k][1]),
-            ]
-            corners.append(quad[::-1] if not flip else quad)
+            (ax, az), (bx, bz), (cx, cz), (dx, dz) = outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]
+            rings.append([(ax, high, az), (bx, high, bz), (cx, low, cz), (dx, low, dz)])
+        corners += rings if side > 0 else [r[::-1] for r in rings]
     return _grain_up(quads(np.asarray(corners, float)))
 
 

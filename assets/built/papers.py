@@ -289,7 +289,7 @@ def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return parts_of(
         (
             material(look, "skin", finish, "leather/2") if "skin" in look else plain((0.10, 0.10, 0.105), 0.5),
-            cup(r, high, 0.98, 0.003),
+            lathe([(0, 0), (r * 0.98, 0), (r, high), (r - 0.003, high), (r * 0.98 - 0.003, 0.004), (0, 0.004)], 24),
         ),
         *pens,
     )

@@ -416,9 +416,21 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
 
 
 def _grid_normals(p: np.ndarray) -> np.ndarray:
+    """Unit normals of a grid (r, c, 3); where rows meet in a point, those of the next row."""
     du, dv = np.gradient(p, axis=1), np.gradient(p, axis=0)
     n = np.cross(du, dv)
-    return n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-12)
+    length = np.linalg.norm(n, axis=2, keepdims=True)
+    pointed = length[..., 0] < 1e-9 * max(float(length.max()), 1e-12)
+    n = n / np.maximum(length, 1e-12)
+    if pointed.any():
+        near = sum(
+            np.roll(np.pad(n, ((1, 1), (1, 1), (0, 0))), s, (0, 1))[1:-1, 1:-1]
+            for s in ((0, 1), (0, -1), (1, 0), (-1, 0))
+        )
+        near = np.where(np.linalg.norm(near, axis=2, keepdims=True) > 1e-9, near, n.mean((0, 1)))
+        near = near / np.maximum(np.linalg.norm(near, axis=2, keepdims=True), 1e-12)
+        n = np.where(pointed[..., None], near, n)
+    return n
 
 
 def _grid(points: np.ndarray, normals: np.ndarray, uv: np.ndarray) -> Shape:

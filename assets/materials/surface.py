@@ -71,7 +71,7 @@ def metal(
 def wicker(n: int, tile: float, color, strands: int = 24, *, rng: np.random.Generator) -> Maps:
     """Basketwork: level strands over and under upright stakes."""
     u, v = coordinates(n, tile)
-    y = v / tile * strands
+    y = v / tile * strands + 0.5
     j = np.floor(y).astype(int)
     fy = y - j - 0.5
     x = u / tile * (strands // 3)

@@ -75,9 +75,10 @@ def furniture(
     t = (np.arange(n) + 0.5) / n * tile
     u, v = np.meshgrid(t, t[::-1])
     width = tile / strips
-    k = np.floor(v / width).astype(int)
-    across = v - k * width - width / 2
-    layout = Layout(k, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips)
+    # Half a strip up: the tile's border lies within a strip, not on a joint.
+    k = np.floor(v / width + 0.5).astype(int)
+    across = v - k * width
+    layout = Layout(k % strips, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips)
     kind = SPECIES[species]
     calm = Species(
         kind.early, kind.late, kind.pore, kind.contrast, kind.pores, kind.ring, kind.tone * 0.25, kind.rays, 0.0

@@ -1,0 +1,144 @@
+"""Materials tile, are the same everywhere, and look like what they are called."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
+from assets.materials.maps import fbm, herringbone, hexagons, noise, planks
+from assets.materials.wood import SPECIES, boards
+
+PICTURES = ("art", "rug", "label")
+"""Families that are shown once, not repeated."""
+
+
+def seam_ratio(image: np.ndarray) -> float:
+    """Step across the tile's border over the largest step that is usual between its rows and columns."""
+    worst = 0.0
+    for axis in (0, 1):
+        inner = np.abs(np.diff(image, axis=axis)).mean(axis=tuple(k for k in range(image.ndim) if k != axis))
+        border = np.abs(np.take(image, 0, axis) - np.take(image, -1, axis)).mean()
+        worst = max(worst, float(border / max(np.percentile(inner, 99.5) * 1.05, 1e-4)))
+    return worst
+
+
+def one_of_each_recipe() -> list[str]:
+    """One key per maker function and layout, so that every code path is tried once."""
+    seen, keys = set(), []
+    for key, m in MATERIALS.items():
+        recipe = m.recipe
+        inner = [getattr(getattr(v, "func", v), "__qualname__", "") for v in getattr(recipe, "keywords", {}).values()]
+        path = (getattr(recipe, "func", recipe).__qualname__, *inner)
+        if path not in seen and m.family not in PICTURES:
+            seen.add(path)
+            keys.append(key)
+    return keys
+
+
+@pytest.mark.parametrize("key", one_of_each_recipe())
+def test_a_material_tiles_without_a_seam_and_its_maps_are_sane(key):
+    maps = make_maps(key)
+    n = MATERIALS[key].pixels
+    assert maps.color.shape == (n, n, 3) and maps.height.shape == maps.roughness.shape == (n, n)
+    assert maps.color.dtype == np.float32 and 0 < maps.color.min() and maps.color.max() < 1
+    assert 0 < maps.roughness.min() and maps.roughness.max() <= 1
+    assert seam_ratio(maps.color) <= 1.0
+    assert seam_ratio(maps.height[..., None] * 1e3) <= 1.0
+
+
+def test_a_seam_would_be_noticed():
+    image = make_maps("oak_planks/0").color.copy()
+    ramp = np.linspace(0, 0.3, len(image))[None, :, None]
+    assert seam_ratio(image) <= 1.0 < seam_ratio(image + ramp)
+
+
+def test_no_blob_is_slower_than_asked_for():
+    field = fbm(256, 8, 60, rng=np.random.default_rng(0))
+    power = np.abs(np.fft.fft2(field)) ** 2
+    f = np.hypot(*np.meshgrid(np.fft.fftfreq(256) * 256, np.fft.fftfreq(256) * 256))
+    assert power[f < 3].sum() < 0.02 * power.sum()
+    assert abs(float(noise(256, 4, 4, rng=np.random.default_rng(1)).std()) - 1) < 1e-3
+
+
+def test_adjacent_planks_differ():
+    layout = planks(512, 2.4, 13, 1.0, rng=np.random.default_rng(0))
+    maps = boards(512, 2.4, layout, SPECIES["oak"], 0.4, 0.0012, rng=np.random.default_rng(1))
+    tones = np.array([maps.color[layout.piece == k].mean(0) for k in range(layout.count)])
+    gaps = np.linalg.norm(tones[:, None] - tones[None], axis=-1)[np.triu_indices(layout.count, 1)]
+    assert layout.count >= 13 and gaps.min() > 5e-4 and np.median(gaps) > 0.02
+
+
+def test_layouts_have_the_pieces_they_promise():
+    lie = herringbone(256, 2.0, 5, 4)
+    lengths = np.bincount(lie.piece.reshape(-1))
+    assert lengths.std() / lengths.mean() < 0.06, "all blocks of a herringbone are alike in size"
+    assert abs(lie.along.max() / (5 * 2.0 / (4 * 5 * np.sqrt(2))) - 1) < 0.02
+    hexes = np.bincount(hexagons(420, 1.26, 7).piece.reshape(-1))
+    assert len(hexes) == 7 * 8 and hexes.std() / hexes.mean() < 0.05
+
+
+def test_normals_of_a_slope_have_the_closed_form():
+    n, tile = 64, 1.0
+    x = (np.arange(n) + 0.5) / n
+    height = np.broadcast_to(0.02 * np.sin(2 * np.pi * x), (n, n))
+    got = normal_map(height, tile).astype(float) / 255 * 2 - 1
+    slope = 0.02 * 2 * np.pi * np.cos(2 * np.pi * x)
+    expected = -slope / np.sqrt(1 + slope**2)
+    assert np.abs(got[10, :, 0] - expected).max() < 0.01
+    assert got[..., 2].min() > 0.9
+
+
+def test_the_maps_on_disk_are_whole_or_made_again(tmp_path):
+    first = finish("cotton/0", tmp_path)
+    for path in (first.texture, first.normal_map, first.roughness_map):
+        assert path.startswith(str(tmp_path))
+    assert first.tile == MATERIALS["cotton/0"].tile
+    before = Path(first.texture).read_bytes()
+    Path(first.texture).write_bytes(before[:100])
+    finish.cache_clear()
+    again = finish("cotton/0", tmp_path)
+    assert again == first and Path(again.texture).read_bytes() == before
+
+
+def test_another_process_makes_the_same_maps():
+    code = (
+        "import hashlib; from assets.materials import make_maps, fingerprint; m = make_maps('linen/3');"
+        "print(hashlib.sha256((m.color * 255).round().astype('uint8').tobytes()).hexdigest(), fingerprint('linen/3'))"
+    )
+    other = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    ).stdout.split()
+    mine = hashlib.sha256((make_maps("linen/3").color * 255).round().astype("uint8").tobytes()).hexdigest()
+    assert other == [mine, fingerprint("linen/3")]
+
+
+def test_fingerprints_differ_and_unknown_keys_say_what_exists(tmp_path):
+    prints = [fingerprint(k) for k in MATERIALS]
+    assert len(set(prints)) == len(prints)
+    with pytest.raises(ValueError, match=r"oak_planks/7.*oak_planks/0"):
+        finish("oak_planks/7", tmp_path)
+    with pytest.raises(ValueError, match="unknown material role"):
+        of_role("flor")
+
+
+def test_every_role_a_house_needs_has_a_choice():
+    for role in (
+        "floor_wood",
+        "floor_tile",
+        "carpet",
+        "wall_paint",
+        "wallpaper",
+        "wall_tile",
+        "worktop",
+        "door",
+        "facade",
+    ):
+        assert len(of_role(role)) >= 4, role
+    assert {"paint_white/0", "oak_planks/0", "oak_planks/1"} <= set(MATERIALS)
+    assert len(MATERIALS) >= 90 and len({k.split("/")[0] for k in MATERIALS}) >= 30
