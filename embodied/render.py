@@ -43,7 +43,7 @@ class View:
     rgb: np.ndarray
     """(h, w, 3) uint8 sRGB, top row first."""
     depth: np.ndarray
-    """(h, w) float32 metres along the optical axis; inf where nothing is."""
+    """(h, w) float32 metres along the optical axis; inf where nothing is (the sky)."""
     ids: np.ndarray
     """(h, w) int32: i + 1 for parts.owners(house)[i], 0 where nothing is."""
 
@@ -75,6 +75,8 @@ class Renderer:
     def __init__(self, house: House, catalogue, *, quality: str = "unlit", backend: str = "classic", size: int = 256,
                  lit: LitPages | None = None, scene: Scene | None = None) -> None:
         """Compile `house`, open OpenGL and upload.
+
+        A pane of glass counts as what is seen where it is: its depth and its id, though colours shine through.
 
         Args:
           quality: 'unlit' (even light from all sides) or 'baked' (needs `lit`).
@@ -240,7 +242,9 @@ class Renderer:
         packed = np.zeros((*size, 4), np.uint8)
         packed[..., :3] = numbers
         ids = owner_of_number[packed.view("<u4")[..., 0]]
-        return depth_of_reversed_z(reversed_z)[::-1], ids[::-1]
+        depth = depth_of_reversed_z(reversed_z)
+        depth[ids == 0] = np.inf  # a painted sky is no thing
+        return depth[::-1], ids[::-1]
 
 
 def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> np.ndarray:

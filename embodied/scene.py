@@ -112,12 +112,15 @@ def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), c
       parts: house_parts(house, catalogue) where the caller has them already.
 
     Raises:
-      ValueError: `free` names something that is no placement, or is asked for together with `lit`.
+      ValueError: `free` names something that is no placement, or is asked for together with `lit`; `lit` was
+        baked for another house.
     """
     if unknown := sorted(free - set(house.placement_by_id)):
         raise ValueError(f"free names {unknown}, which are no placements of house {house.name!r}")
     if free and lit is not None:
         raise ValueError("a lit house is static: its light is painted on; build it without free, or without lit")
+    if lit is not None and lit.owners and lit.owners != owners(house):
+        raise ValueError(f"this light was baked for another house than {house.name!r}; bake it again (embodied light)")
     spec = _empty_spec(house)
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:

@@ -188,6 +188,12 @@ def test_lit_pages_replace_the_materials(house):
         scene.build_spec(house, HandCatalogue(), free=frozenset({"mug_1"}), lit=pages)
 
 
+def test_light_of_another_house_is_refused(house):
+    pages = LitPages((), (), "x", owners=("somebody_else",))
+    with pytest.raises(ValueError, match="another house"):
+        scene.build_spec(house, HandCatalogue(), lit=pages)
+
+
 def test_a_missing_texture_says_how_to_get_it():
     with pytest.raises(FileNotFoundError, match="embodied assets build"):
         scene.load_texture("/nowhere/oak.png")
