@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from embodied.interface import Episode, Policy, Task
+from embodied.listening import ListeningInterpreter, ScriptedListener
 from embodied.policies import (
     Asking,
     Forward10,
@@ -25,17 +26,21 @@ from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
+    from embodied.world import World
 
 PLAIN: Mapping[str, Callable[[], Policy]] = {"random walk": RandomWalk, "forward 10": Forward10, "shortest": Shortest}
+LOOKING = ("scripted listener",)
+"""Agents that need worlds with sightings, not only houses and graphs."""
 AGENTS: Mapping[str, Mapping[str, Callable[[], Policy]]] = {
     "find": PLAIN,
-    "vln": PLAIN,
+    "vln": {**PLAIN, "scripted listener": ScriptedListener},
     "hanna": {
         **PLAIN,
         "no ask": lambda: Asking(Shortest(), never_ask),
         "random ask": lambda: Asking(Shortest(), ask_at_random),
         "ask every 5": lambda: Asking(Shortest(), ask_every_5),
         "perfect interpretation": PerfectInterpreter,
+        "scripted listener": ListeningInterpreter,
     },
     "vnla": {
         "random walk": RandomWalk,
@@ -73,17 +78,18 @@ def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
 def evaluate(
     data: Dataset, split: str, agents: Mapping[str, Policy], *,
     seed: int = 0, limit: int | None = None, batch: int = 1, keep: Callable[[str, Sequence[Episode]], None] | None = None,
-    watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    watch: Callable[[Iterable[str]], Iterable[str]] = iter, worlds: Mapping[str, World] | None = None,
 ) -> list[Row]:
     """One row per agent, over the same tasks.
 
     Args:
       keep: is given each agent's name and episodes (to save them).
       watch: wraps the iterator over agent names (a progress bar).
+      worlds: worlds with pictures by house name, for agents that look.
     """
     tasks = spread(data.tasks(split), limit)
     graphs = {name: data.place(name).graph for name in data.names(split)}
-    make_env = data.environment(split)
+    make_env = data.environment(split, worlds=worlds)
     rows = []
     for name in watch(agents):
         episodes = play(make_env, agents[name], tasks, seed=seed, batch=batch, agent=name)

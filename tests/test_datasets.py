@@ -32,7 +32,7 @@ def hand_house(seed, name, config, catalogue):
 
 
 def build(folder, cache, kind="hanna", workers=1, **options):
-    config = DatasetConfig(kind, "tiny", seed=4, **options)
+    config = DatasetConfig(kind, "tiny", seed=4, language="plain", **options)
     build_dataset(config, folder, cache, workers=workers, make_house=hand_house)
     return Dataset(folder)
 
@@ -93,12 +93,12 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
 
 def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache", "hari")
-    for split, room, thing in (("train", None, None), ("pretrain", None, None), ("val_unseen_start", "val", None),
+    for split, room, held in (("train", None, None), ("pretrain", None, None), ("val_unseen_start", "val", None),
                                ("test_unseen_object", None, "test")):
         for t in data.tasks(split):
             place = data.place(t.world)
             assert room_part(place, place.graph.room_of_node[t.start.node], seed=4) == room, split
-            assert object_part(t.goal.object_class, seed=4) == thing, split
+            assert object_part(t.goal.object_class, seed=4) == held, split
 
 
 def test_workers_do_not_change_a_byte(tmp_path):
@@ -109,7 +109,7 @@ def test_workers_do_not_change_a_byte(tmp_path):
 
 def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
     whole = build(tmp_path / "whole", tmp_path / "cache")
-    config = DatasetConfig("hanna", "tiny", seed=4)
+    config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
     calls = []
 
     def interrupted(seed, name, *rest):
@@ -129,15 +129,9 @@ def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
 
 def test_a_house_does_not_depend_on_the_others(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
-    config = DatasetConfig("hanna", "tiny", seed=4)
-    build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", *_extra())
+    config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
+    build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", hand_house)
     assert content(tmp_path / "alone" / "houses" / "test_0000") == content(data.folder / "houses" / "test_0000")
-
-
-def _extra():
-    from embodied.language.plain import PlainLanguage
-
-    return PlainLanguage(), hand_house
 
 
 def test_wrong_folders_and_splits_are_refused(tmp_path):

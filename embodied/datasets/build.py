@@ -21,7 +21,7 @@ from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.house import House, HouseError
 from embodied.interface import Language
-from embodied.language.voice import People
+from embodied.language import People, PlainLanguage
 from embodied.navgraph import NavGraph, build_graph, from_matterport, to_matterport
 from embodied.people import add_people
 from embodied.records import save_lines
@@ -102,7 +102,7 @@ def build_dataset(
     wanted = scale(config.scale, config.kind)
     _claim(folder, config)
     work = units(wanted)
-    arguments = (config, folder, Path(cache), language or People(), make_house or make_dataset_house, packs)
+    arguments = (config, folder, Path(cache), make_house or make_dataset_house, packs)
     for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
     return write_index(config, folder)
 
