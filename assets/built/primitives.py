@@ -207,34 +207,16 @@ def _band_between(low: np.ndarray, z0: float, high: np.ndarray, z1: float) -> Sh
 # ------------------------------------------------------------------ boxes
 
 
-def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shape:
-    """An axis-aligned box from corner `low` to corner `high`, its edges rounded off by `bevel` metres.
-
-    The bevel shares the faces' vertices, so that shading runs smoothly around the edge. The grain
-    (u) follows the longest side.
-    """
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    middle, half = (low + high) / 2, (high - low) / 2
-    bevel = float(min(bevel, 0.49 * half.min() * 2 * 0.5))
+def _box_corners() -> tuple[np.ndarray, np.ndarray]:
+    """(24, 3) signs of the corners of a box's six faces, and their outward normals."""
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
-    vertices, normals, faces = np.zeros((24, 3)), np.zeros((24, 3)), []
+    corners, normals = np.zeros((24, 3)), np.zeros((24, 3))
     for f in range(6):
         i, s = f // 2, 1.0 if f % 2 else -1.0
         j, k = (i + 1) % 3, (i + 2) % 3
-        corner = signs if s > 0 else signs[::-1]
-        v = vertices[4 * f : 4 * f + 4]
-        v[:, i], v[:, j], v[:, k] = s * half[i], corner[:, 0] * (half[j] - bevel), corner[:, 1] * (half[k] - bevel)
-        normals[4 * f : 4 * f + 4, i] = s
-        faces += [[4 * f, 4 * f + 1, 4 * f + 2], [4 * f, 4 * f + 2, 4 * f + 3]]
-    if bevel > 0:
-        faces += _bevel_faces(vertices)
-    longest = int(half.argmax())
-    uv = projected_uv(vertices + middle, normals)
-    u_axis = np.select([np.abs(normals[:, 0]) > 0.5, np.abs(normals[:, 1]) > 0.5], [1, 0], 0)
-    v_axis = np.select([np.abs(normals[:, 0]) > 0.5, np.abs(normals[:, 1]) > 0.5], [2, 2], 1)
-    swap = (v_axis == longest) | ((u_axis != longest) & (half[v_axis] > half[u_axis]))
-    uv[swap] = uv[swap][:, ::-1]
-    return Shape(vertices + middle, np.asarray(faces), normals, uv)
+        corners[4 * f : 4 * f + 4, [j, k]] = signs if s > 0 else signs[::-1]
+        corners[4 * f : 4 * f + 4, i] = normals[4 * f : 4 * f + 4, i] = s
+    return corners, normals
 
 
 def _bevel_faces(vertices: np.ndarray) -> list[list[int]]:
@@ -254,13 +236,43 @@ def _bevel_faces(vertices: np.ndarray) -> list[list[int]]:
                     ends.append((octant[(j, *key)], octant[(k, *key)]))
                 (a, b), (c, d) = ends
                 faces += [[a, c, d], [a, d, b]]
-    for sx in (False, True):
-        for sy in (False, True):
-            for sz in (False, True):
-                faces.append([octant[(0, sx, sy, sz)], octant[(1, sx, sy, sz)], octant[(2, sx, sy, sz)]])
-    p = vertices[np.asarray(faces)]
-    outward = np.sum(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * p.mean(axis=1), axis=1) > 0
-    return [f if out else f[::-1] for f, out in zip(faces, outward, strict=True)]
+    for octet in np.ndindex(2, 2, 2):
+        faces.append([octant[(i, *(bool(o) for o in octet))] for i in range(3)])
+    done = []
+    for f in faces:
+        p = vertices[f]
+        outward = np.dot(np.cross(p[1] - p[0], p[2] - p[0]), p.mean(0)) > 0
+        done.append(f if outward else f[::-1])
+    return done
+
+
+CORNERS, NORMALS = _box_corners()
+AXIS = np.abs(NORMALS).argmax(1)
+FACES = (4 * np.arange(6)[:, None] + [0, 1, 2, 0, 2, 3]).reshape(-1, 3)
+BEVELLED_FACES = np.concatenate([FACES, _bevel_faces(CORNERS * np.where(NORMALS != 0, 1.0, 0.9))])
+U_AXIS, V_AXIS = np.array([1, 0, 0])[AXIS], np.array([2, 2, 1])[AXIS]
+U_SIGN = np.where(AXIS == 2, 1.0, np.where(AXIS == 0, 1.0, -1.0) * NORMALS.sum(1))
+V_SIGN = np.where(AXIS == 2, NORMALS.sum(1), 1.0)
+ROWS = np.arange(24)
+for shared in (NORMALS, FACES, BEVELLED_FACES):
+    shared.setflags(write=False)
+
+
+def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shape:
+    """An axis-aligned box from corner `low` to corner `high`, its edges rounded off by `bevel` metres.
+
+    The bevel shares the faces' vertices, so that shading runs smoothly around the edge. The grain
+    (u) follows the longest side.
+    """
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    half = (high - low) / 2
+    bevel = min(bevel, 0.49 * float(half.min()))
+    vertices = (low + high) / 2 + CORNERS * (half - bevel + bevel * np.abs(NORMALS))
+    uv = np.stack([vertices[ROWS, U_AXIS] * U_SIGN, vertices[ROWS, V_AXIS] * V_SIGN], axis=1)
+    longest = half.argmax()
+    swap = (longest == V_AXIS) | ((longest != U_AXIS) & (half[V_AXIS] > half[U_AXIS]))
+    uv[swap] = uv[swap, ::-1]
+    return Shape(vertices, BEVELLED_FACES if bevel > 0 else FACES, NORMALS, uv)
 
 
 def bar(a: Sequence[float], b: Sequence[float], width: float, height: float, bevel: float = 0.0) -> Shape:
