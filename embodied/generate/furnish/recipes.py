@@ -108,7 +108,8 @@ CLUTTER: dict[str, tuple[str, ...]] = {
     "any": ("vase", "photo frame", "book", "small plant", "candle", "succulent", "jug", "deer figurine", "camera", "pot",
             "cactus", "speaker"),
     "pantry": ("wine bottle", "jug", "pot", "mixing bowl", "bowl", "cooking pot", "oil bottle", "milk carton",
-               "bread box", "basket", "tray", "cardboard box", "plate", "beer bottle", "multicooker", "jar", "tin can"),
+               "bread box", "wicker basket", "tray", "cardboard box", "stack of plates", "beer bottle", "multicooker", "jug", "milk carton", "bread",
+               "wine bottle", "wine bottle", "storage box", "glass", "frying pan"),
     "kitchen": ("plate", "bowl", "jug", "mug", "glass", "pot", "wine bottle", "teapot"),
     "closet": ("folded clothes", "folded clothes", "hat", "cap", "handbag", "towel", "gloves", "storage box"),
     "garage": ("cardboard box", "helmet", "drill", "spray bottle", "camping lantern", "gloves", "flashlight",
@@ -127,12 +128,13 @@ CLUTTER: dict[str, tuple[str, ...]] = {
 
 MOST_ALIKE: dict[str, int] = {
     "book": 8, "books": 60, "mug": 4, "glass": 5, "plate": 4, "cushion": 6, "photo frame": 4, "folded clothes": 6,
-    "vase": 3, "towel": 5, "place setting": 10, "spray bottle": 3, "cardboard box": 5, "wine bottle": 3,
+    "vase": 3, "towel": 5, "place setting": 10, "spray bottle": 3, "jug": 4, "cooking pot": 3, "bowl": 4, "mixing bowl": 3, "beer bottle": 4, "milk carton": 4,
+    "stack of plates": 3, "hat": 3, "cap": 3, "gloves": 3, "cardboard box": 5, "wine bottle": 6,
     "table lamp": 3, "table tennis bat": 2, "candlestick": 2, "telephone": 1, "microwave": 1, "kettle": 1, "toaster": 1,
     "coffee maker": 1, "bread box": 1, "television": 1, "stereo": 1, "printer": 1, "aquarium": 1, "laptop": 2,
     "computer": 1, "knife block": 1, "espresso machine": 1, "toaster oven": 1, "chess set": 1, "christmas tree": 1,
     "small christmas tree": 0, "birthday cake": 1, "radio": 1, "keys": 1, "remote control": 1, "newspaper": 1,
-    "alarm clock": 2, "storage box": 6, "blanket": 2, "ashtray": 1, "deer figurine": 1, "teddy bear": 2, "toothbrush cup": 2,
+    "alarm clock": 2, "storage box": 8, "blanket": 2, "ashtray": 1, "deer figurine": 1, "teddy bear": 2, "toothbrush cup": 2,
     "chopping board": 1, "fruit bowl": 1, "soap dispenser": 2, "game console": 1, "video projector": 1,
 }
 """Object class to how many of it one room may hold on its surfaces; 2 for the others."""

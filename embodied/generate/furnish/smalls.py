@@ -231,8 +231,12 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
     for board in boards:
         if books is not None and bookish and ctx.chance(0.8):
             _book_row(tops, thing, board, ctx.pick("row of books", avoid=()), (kx, ky, kz))
-        for _ in range(int(ctx.rng.integers(1, 4))):
-            if not ctx.chance(0.75 * density):
+        if bookish:
+            count, share = int(ctx.rng.integers(1, 4)), 0.75 * density
+        else:  # storage is there to be filled
+            count, share = 2 + int(ctx.rng.integers(3) + 3 * (board.x1 - board.x0)), 0.9
+        for _ in range(count):
+            if not ctx.chance(share):
                 continue
             asset = _resident(tops, thing, board)
             tops.put(asset, thing, board, "any", 0.3, tries=5)
