@@ -9,7 +9,9 @@ from __future__ import annotations
 import dataclasses
 import enum
 import functools
+import importlib.metadata
 import json
+import platform
 import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping
@@ -63,6 +65,13 @@ def load_lines(path: Path, kind: type[T]) -> Iterator[T]:
                 yield from_json(kind, line)
             except RecordError as e:
                 raise RecordError(f"{path}:{number}: {e}") from e
+
+
+def fingerprint(**facts: object) -> dict[str, object]:
+    """What a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
+    versions = {name: importlib.metadata.version(name) for name in ("embodied", "numpy", "scipy", "shapely", "mujoco")}
+    machine = f"{platform.machine()} {platform.system()}"
+    return {"python": platform.python_version(), "versions": versions, "machine": machine, **facts}
 
 
 def _plain(value: object) -> object:

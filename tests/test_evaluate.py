@@ -67,5 +67,6 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     assert {r["agent"] for r in json.loads((out / "table.json").read_text())} == {"shortest", "random walk"}
     assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 10
     assert (out / "episodes_test_unseen_random_walk.jsonl").exists()
+    assert json.loads((out / "run.json").read_text())["data"] == data.digest
     assert main(["eval", "vnla", "--data", str(data.folder)]) == 2
     assert "data set of 'hanna'" in capsys.readouterr().err

@@ -36,11 +36,12 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     import json
 
+    from assets.cache import write_bytes
     from embodied import tables
     from embodied.cli import UserError
     from embodied.datasets.store import Dataset
     from embodied.evaluate import AGENTS, LOOKING, agent, evaluate
-    from embodied.records import save_lines
+    from embodied.records import fingerprint, save_lines
 
     data = Dataset(args.data)
     if data.kind != args.kind:
@@ -59,6 +60,8 @@ def run(args: argparse.Namespace) -> int:
         rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds)
     if args.out:
         tables.save(rows, args.out, "table")
+        facts = fingerprint(data=data.digest, seed=args.seed, splits=args.split, agents=names, tasks=args.tasks)
+        write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))
     show(args, {"data": data.digest, "rows": json.loads(tables.as_json(rows))}, tables.markdown(rows, columns))
     return 0
