@@ -1,6 +1,6 @@
 """Several processes, one run: each plays a share of every batch, and gradients are added up.
 
-Started by PyTorch's own launcher, `torchrun --nproc-per-node 4 -m embodied.cli train hanna ...`.
+Started by PyTorch's own launcher, `torchrun --nproc-per-node 4 --no-python embodied train hanna ...`.
 The batch of the settings is the whole batch, so results do not depend on the number of processes
 but for rounding and for the draws of dropout.
 """

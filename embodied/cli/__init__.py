@@ -11,7 +11,8 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "eval", "bench")
+COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features",
+            "train", "eval", "judge", "bench")
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
 

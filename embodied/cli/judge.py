@@ -1,0 +1,17 @@
+"""Judge a learned HANNA agent beside those without learning: Tables 4.3 to 4.5, and why its episodes fail."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    from agents import options
+
+    options.add_eval(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from agents import commands
+
+    return commands.run_eval(args)

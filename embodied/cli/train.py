@@ -1,0 +1,58 @@
+"""Teach: the encoder that sees (vision), or the agent that navigates and asks for help (hanna).
+
+Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
+not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
+--rrd. On several GPUs: `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from embodied.cli.common import note
+
+WATCHED = 2
+"""Validation episodes that --rrd records each time."""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    from agents import options
+
+    kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    vision = kinds.add_parser("vision", help="the encoder, on renders of a data set's training houses")
+    options.add_train_vision(vision)
+    hanna = kinds.add_parser("hanna", help="the agent, on a HANNA data set with features")
+    options.add_train_hanna(hanna)
+    hanna.add_argument("--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder")
+
+
+def run(args: argparse.Namespace) -> int:
+    from agents import commands
+
+    if args.what == "vision":
+        return commands.run_train_vision(args, note)
+    return commands.run_train_hanna(args, note, on_validation=_recorder(args) if args.rrd else None)
+
+
+def _recorder(args: argparse.Namespace):
+    """Writes the first validation episodes of each validation as Rerun recordings."""
+    from assets.catalogue import load_catalogue
+    from embodied.cli.demo import texts
+    from embodied.datasets.store import Dataset
+    from viz.blueprint import episode_blueprint
+    from viz.recording import record
+    from viz.sinks import Sinks, open_recording
+
+    data, catalogue = Dataset(args.data), load_catalogue(args.cache)
+
+    def keep(update: int, episodes) -> None:
+        for number, episode in enumerate(episodes[:WATCHED]):
+            with data.open_world(episode.task.world, catalogue, args.cache) as world:
+                sinks = Sinks(Path(args.out) / f"validation_{update:06d}_{number}.rrd", False, None, False)
+                blueprint, about = episode_blueprint(world.house), texts(world.fingerprint)
+                with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as recording:
+                    for _ in record(recording, world, episode.task, episode.steps):
+                        pass
+
+    return keep
