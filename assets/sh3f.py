@@ -190,13 +190,13 @@ def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Ent
 
 
 def _lights(row: Mapping[str, str], size: tuple[float, float, float]) -> tuple[LightSource, ...]:
-    """Sources given as cm from the left, the back and the floor, brought into the asset frame."""
+    """Sources given as cm from the left, the front and the floor, brought into the asset frame."""
     columns = [row.get(f"lightSource{f}", "").split() for f in ("X", "Y", "Z", "Color", "Diameter")]
     diameters = columns[4] or [""] * len(columns[0])
     return tuple(
         LightSource(
-            (float(x) / 100.0 - size[0] / 2, size[1] / 2 - float(y) / 100.0, float(z) / 100.0),
-            tuple(int(color.lstrip("#"), 16) >> s & 255 for s in (16, 8, 0)),
+            (float(x) / 100.0 - size[0] / 2, float(y) / 100.0 - size[1] / 2, float(z) / 100.0),
+            tuple((int(color.lstrip("#"), 16) >> s & 255) / 255 for s in (16, 8, 0)),
             float(d) / 100.0 if d else None,
         )
         for x, y, z, color, d in zip(*columns[:4], diameters)

@@ -141,6 +141,14 @@ def test_things_put_on_a_surface_touch_the_mesh(catalogue, key):
         assert contact(catalogue.mesh(key), s) >= 0.95, (key, s)
 
 
+@pytest.mark.parametrize("key", ["scopia/saloon_lamp", "scopia/desk_lamp1", "katorlegaz/wall-spotlight"])
+def test_a_lamp_shines_from_where_its_mesh_glows(catalogue, key):
+    glowing = [p for p in catalogue.mesh(key) if p.finish.emission is not None]
+    low, high = bounds(tuple(glowing))
+    lamp = np.array(catalogue.assets[key].lamp)
+    assert (lamp > low - 0.02).all() and (lamp < high + 0.02).all()
+
+
 def test_mesh_is_stretched_to_the_size_asked_for(catalogue):
     low, high = bounds(catalogue.mesh("scopia/toaster", (0.5, 0.2, 0.4)))
     np.testing.assert_allclose(high - low, (0.5, 0.2, 0.4), atol=0.01)
