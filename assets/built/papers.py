@@ -317,13 +317,13 @@ def papers_makers() -> list[Maker]:
         "sun_room": 1.0,
     }
     made = []
-    for k in range(6):
+    for k in range(14):
         made.append(
             maker(
                 f"book_row_{k}",
                 "row of books",
                 "row of books",
-                ((0.30, 0.22, 0.45, 0.36, 0.18, 0.55)[k], 0.18, 0.25),
+                ((0.30, 0.22, 0.45, 0.36, 0.18, 0.55, 0.27)[k % 7], (0.18, 0.16)[k % 2], (0.25, 0.22, 0.28)[k % 3]),
                 book_row,
                 on=SHELVES,
                 rooms=study,

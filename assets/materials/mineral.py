@@ -89,8 +89,8 @@ def marble(base, vein, amount: float = 0.7, second=None):
         p = p + 0.05 * look_up(wx, x, y) + 0.008 * look_up(wy, x, y)
         q = q + 0.06 * look_up(wx, y, x) + 0.012 * look_up(wy, y, x)
         x2, y2 = x + 0.03 * look_up(wx, x, y), y + 0.03 * look_up(wy, x, y)
-        wide = np.abs(look_up(fbm(n, 0.9, 7, 1.6, rng=rng), p, q))
-        thin = np.abs(look_up(fbm(n, 1.8, 16, 1.4, rng=rng), p, q + 0.3))
+        wide = np.abs(look_up(fbm(n, 0.9, 7, 2.3, rng=rng), p, q))
+        thin = np.abs(look_up(fbm(n, 1.8, 16, 2.0, rng=rng), p, q + 0.3))
         presence = smooth_step(look_up(fbm(n, 1.5, 8, 1.3, rng=rng), x, y), -0.6, 1.6)
         cloud = look_up(fbm(n, 1.5, 90, 1.3, rng=rng), x2, y2)
         strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
@@ -177,7 +177,7 @@ def granite(
 
 
 def terrazzo(
-    n: int, tile: float, base, chips, size: float = 0.014, cover: float = 0.45, *, rng: np.random.Generator
+    n: int, tile: float, base, chips, size: float = 0.009, cover: float = 0.45, *, rng: np.random.Generator
 ) -> Maps:
     """Broken stone chips in cement, ground flat."""
     color = np.round(rgb(base, (n, n)) * 255).astype(np.uint8)

@@ -25,7 +25,7 @@ def paint(n: int, tile: float, color, rough: float = 0.85, nap: float = 1.0, *, 
 def gloss_paint(n: int, tile: float, color, rough: float = 0.35, *, rng: np.random.Generator) -> Maps:
     """Satin paint on joinery, with faint brush marks along u."""
     brush = noise(n, 40, 1.2, rng=rng)
-    out = rgb(color) * (1 + 0.004 * brush)[..., None]
+    out = rgb(color) * (1 + 0.0022 * brush)[..., None]
     return Maps(
         np.clip(out, 0.01, 0.98).astype(np.float32),
         (1e-5 * brush).astype(np.float32),

@@ -78,7 +78,9 @@ def furniture(
     # Half a strip up: the tile's border lies within a strip, not on a joint.
     k = np.floor(v / width + 0.5).astype(int)
     across = v - k * width
-    layout = Layout(k % strips, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips)
+    layout = Layout(
+        k % strips, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips
+    )
     kind = SPECIES[species]
     calm = Species(
         kind.early, kind.late, kind.pore, kind.contrast, kind.pores, kind.ring, kind.tone * 0.25, kind.rays, 0.0
