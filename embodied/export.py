@@ -36,12 +36,17 @@ def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] =
     folder = Path(folder)
     spec = build_spec(house, catalogue, free=free, lit=lit)
     spec.compile()
+    (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
+    for name, pattern in ((MESHES, "*.msh"), (TEXTURES, "*.png")):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        for old in sorted((folder / name).glob(pattern)):
+            old.unlink()
     for name, data in spec.assets.items():
-        write_bytes(folder / MESHES / name, data)
+        (folder / MESHES / name).write_bytes(data)
     for texture in spec.textures:
         if texture.data:
             image = np.frombuffer(bytes(texture.data), np.uint8).reshape(texture.height, texture.width, texture.nchannel)
-            write_bytes(folder / TEXTURES / f"{texture.name}.png", _png(image))
+            (folder / TEXTURES / f"{texture.name}.png").write_bytes(_png(image))
             texture.data = b""
             texture.file = f"{texture.name}.png"
     spec.modelfiledir, spec.meshdir, spec.texturedir = str(folder), MESHES, TEXTURES
