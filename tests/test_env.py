@@ -129,3 +129,15 @@ def test_monocular_turns_close_a_circle():
     assert pose == Pose(1, 5)
     assert moves.at(world, Pose(0, 0))[1][0] == Pose(1, 0), "forward along +x from the west end"
     assert not moves.at(world, Pose(0, 6))[0].allowed[0], "nothing ahead at the west wall"
+
+
+def test_candidates_come_by_bearing_and_point_at_their_nodes():
+    world, moves = grid_world(), PanoramicMoves()
+    for node in (7, 14, 21):
+        for turn in range(12):
+            candidates, poses = moves.at(world, Pose(node, turn))
+            assert (np.diff(np.abs(candidates.bearing)) >= -1e-6).all()
+            for bearing, pose in zip(candidates.bearing, poses, strict=True):
+                offset = world.graph.positions[pose.node] - world.graph.positions[node]
+                assert np.cos(bearing + turn * np.pi / 6 - np.arctan2(offset[1], offset[0])) == pytest.approx(1)
+                assert abs((pose.yaw - bearing - turn * np.pi / 6 + np.pi) % (2 * np.pi) - np.pi) <= np.pi / 12 + 1e-6
