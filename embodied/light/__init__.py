@@ -7,3 +7,4 @@ from embodied.light.baking import bake as bake
 from embodied.light.baking import open_bake as open_bake
 from embodied.light.settings import QUALITIES as QUALITIES
 from embodied.light.settings import Settings as Settings
+from embodied.light.settings import settings_of as settings_of

@@ -115,7 +115,7 @@ def things_of(
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            things.append(Thing(owner, room, kind, flat, finishes, _fineness(kind, flat, finishes), glass))
+            things.append(Thing(owner, room, kind, flat, finishes, _fineness(kind, flat, finishes, density), glass))
     return tuple(things)
 
 
@@ -242,14 +242,14 @@ def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped
     return replace(flat, corners=corners.astype(np.float32), normals=(flat.normals @ turn.T.astype(np.float32)))
 
 
-def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish]) -> int:
-    """Texels per luxel: floors 5, patterned walls 4, plain walls 2; furniture by its pattern and density."""
+def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float) -> int:
+    """Texels per luxel: floors 5, patterned walls 3, else 2; furniture by its pattern and density."""
     used = np.bincount(flat.part, weights=areas_of(flat.corners), minlength=len(finishes))
     patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
     if kind in SHELL:
-        return (5 if kind == "floor" else 4) if patterned else 2
+        return {"floor": 5, "wall": 3, "ceiling": 2}[kind] if patterned else 2
     side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
-    return int(np.clip(round(220 / side), 2, 4)) if patterned else 2
+    return int(np.clip(round(4.5 * density / side), 2, 4)) if patterned else 2
 
 
 def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:

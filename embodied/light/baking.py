@@ -7,6 +7,7 @@ stopped; manifest.json is written last and lists every file with its checksum.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import json
@@ -139,9 +140,21 @@ def _open(folder: Path, house: House) -> Bake | None:
         return None
     try:
         return open_bake(folder, house)
-    except StaleBake:
-        (folder / "manifest.json").unlink(missing_ok=True)
+    except StaleBake as e:
+        if (folder / "manifest.json").exists():
+            warn(f"{e}; doing so now")
+        _drop_damaged(folder)
         return None
+
+
+def _drop_damaged(folder: Path) -> None:
+    """Delete the manifest and every file that is not as it says, so that they are made anew."""
+    path = folder / "manifest.json"
+    with contextlib.suppress(OSError, ValueError, KeyError, AttributeError):
+        for name, size in json.loads(path.read_text())["files"].items():
+            if (folder / name).is_file() and (folder / name).stat().st_size != size:
+                (folder / name).unlink()
+    path.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +183,8 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
                        progress=lambda i, n: progress("unwrapping", i / n))
     clock("unwrap")
     atlas = atlas_of(things)
+    if folder is not None:
+        _same_atlas(folder, atlas)
     outdoors = outdoors_of(house)
     clock("outdoors")
     lamps = lamps_of(house, atlas)
@@ -241,6 +256,16 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
     return Bake(folder, manifest)
+
+
+def _same_atlas(folder: Path, atlas: Atlas) -> None:
+    """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
+    pages = [digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes)) for p in atlas.pages]
+    mark, path = digest(pages), folder / "atlas.txt"
+    if not path.exists() or path.read_text() != mark:
+        for old in sorted(folder.iterdir()):
+            old.unlink()
+        write_bytes(path, mark.encode())
 
 
 class _Clock:

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import shapely
 from scipy.ndimage import distance_transform_edt
 
 from embodied.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, Texels, albedo, gamma, rasterise
+from embodied.light.backend import array, constant, mitsuba, r2, vector
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Space, points_of
 from embodied.light.settings import Settings
@@ -54,6 +56,7 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     e = cv2.resize(soft, size, interpolation=cv2.INTER_LINEAR).reshape(-1, 3)[t.index]
     sun = _sharp_sun(page, t, share, space, portals, outdoors, settings)
     radiance = colour * (e + sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32))
+    _add_metal(radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
     radiance += glow_of(house, atlas, page, t, lamps)
     picture = spread(t.index, display(radiance, exposure.at(t.position)), t.shape)
     whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
@@ -61,8 +64,50 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     shown = spread(t.index, (gamma(colour) * 255 + 0.5).astype(np.uint8), t.shape)
     glow = lux.glow[mine]
     glow = spread(coarse.index, glow, coarse.shape) if glow.any() else np.zeros((0, 0, 3))
-    half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)  # noqa: E731
+    half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
     return Ingredients(half(soft), whole.reshape(t.shape), shown, picture, half(glow))
+
+
+def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels, colour: np.ndarray, lux: Luxels,
+               light: Radiosity, space: Space, outdoors: Outdoors, rays: int = 8) -> None:
+    """Mirrors and metals in place of their diffuse light: what somebody in the middle of the room sees in them.
+
+    A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
+    """
+    metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish[t.face]]
+    i = np.nonzero(metal > 0.3)[0]
+    if not len(i):
+        return
+    mi = mitsuba()
+    import drjit as dr
+
+    rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
+    room = house.room_by_id.get(atlas.rooms[page.owner[t.face[i[0]]]], house.rooms[0])
+    eye = [*shapely.Polygon(room.polygon).representative_point().coords[0], house.storey_of(room).elevation + 1.5]
+    to_eye = np.asarray(eye, np.float32) - t.position[i]
+    to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True) + 1e-9
+    side = np.where((to_eye * t.face_normal[i]).sum(1, keepdims=True) < 0, -1.0, 1.0).astype(np.float32)
+    normal = t.normal[i] * np.where(page.thin[t.face[i]][:, None], side, 1.0)
+    cos = (normal * to_eye).sum(1, keepdims=True)
+    bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
+    p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
+    seen = lux.albedo * (light.soft + light.sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32)) + lux.glow
+    table, spread_of = mi.Float(seen.astype(np.float32).ravel()), mi.Float(np.square(rough).astype(np.float32))
+    straight, total = vector(bounced), dr.zeros(mi.Color3f, p.n)
+    for k in range(rays):
+        a, b = (constant(x) for x in r2(k))
+        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
+        ball = mi.warp.square_to_uniform_sphere(u - dr.floor(u))
+        d = dr.normalize(straight + ball * spread_of)
+        d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
+        luxel, hit, front, _ = radiosity.hit_luxel(space, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
+        far = radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS
+        total += dr.select(hit, dr.gather(mi.Color3f, table, luxel, hit & front), far)
+        dr.eval(total)
+    share = metal[i, None]
+    tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])
+    limit = 8.0 * np.percentile(seen.mean(1), 95)
+    radiance[i] = radiance[i] * (1 - share) + np.minimum(array(total) / rays, limit) * tint * share
 
 
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

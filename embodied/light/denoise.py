@@ -30,8 +30,8 @@ def smooth_pages(
       e: (n, 3) float32.
       good: (n,) bool, luxels whose value counts.
       chosen: (n,) bool, luxels to smooth.
-      likeness: standard deviation of log brightness that still counts as the same light; the
-        coarser the step, the stricter.
+      likeness: standard deviation of log brightness that still counts as the same light; wider
+        in the first steps, when noise is still there, stricter in the coarse ones.
     """
     mi = mitsuba()
     import drjit as dr
@@ -46,7 +46,7 @@ def smooth_pages(
         own = dr.gather(mi.Color3f, values, grid.own)
         shade = dr.log(_brightness(own) + 1e-4)
         total, weight = mi.Color3f(0.0), mi.Float(0.0)
-        tight = constant(1.0 / (likeness * (1.0 if step < 4 else 0.7)))
+        tight = constant(1.0 / (likeness * {1: 2.2, 2: 1.4}.get(step, 0.8)))
         for i, j, q, inside in grid.around(step):
             other = dr.gather(mi.Color3f, values, q, inside)
             far = (dr.log(_brightness(other) + 1e-4) - shade) * tight
@@ -98,7 +98,7 @@ class _Grid:
         self.mine = np.nonzero(chosen)[0]
         page = np.searchsorted(np.cumsum(sizes), flat[self.mine], side="right")
         widths = np.array([p.width for p in atlas.pages])[page]
-        i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))  # noqa: E731
+        i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))
         self._number, self._at, self._width = i32(number), i32(flat[self.mine]), i32(widths)
         self._low, self._high = i32(base[page]), i32(base[page] + sizes[page] - 1)
         self._column = i32((flat[self.mine] - base[page]) % widths)
@@ -133,7 +133,7 @@ def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chose
     where = np.concatenate([position, normal * 0.02], axis=1).astype(np.float32)
     tree = cKDTree(where[pool], balanced_tree=False, compact_nodes=False)
     _, near = tree.query(where[chosen], k=min(k, len(pool)), workers=-1)
-    return pool[near.reshape(int(np.count_nonzero(chosen)), -1)]
+    return pool[near.reshape(int(np.count_nonzero(chosen)), min(k, len(pool)))]
 
 
 def smooth_space(

@@ -69,7 +69,7 @@ class Surfaces:
 def surfaces_of(lux: Luxels) -> Surfaces:
     """Upload; glow that lamps account for is left out."""
     mi = mitsuba()
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     return Surfaces(flat(lux.albedo), flat(np.where(lux.sampled[:, None], 0.0, lux.glow)), flat(lux.normal))
 
 
@@ -90,8 +90,8 @@ def lights_of(atlas, lux: Luxels, space: Space, portals: Sequence[Portal], lamps
     centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(k, 3)
     power = np.array([p.area * sky for p in portals] + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1)
                                                        for x in lamps])
-    fill = lambda a: a[np.arange(POINTS) % len(a)]  # noqa: E731
-    flat = lambda rows: mi.Float(np.ascontiguousarray(np.array(rows, np.float32).reshape(-1)))  # noqa: E731
+    fill = lambda a: a[np.arange(POINTS) % len(a)]
+    flat = lambda rows: mi.Float(np.ascontiguousarray(np.array(rows, np.float32).reshape(-1)))
     scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
@@ -138,7 +138,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         open_ &= ~here
     dr.eval(pick, chance)
     a, b = mi.Float(u[1]), mi.Float(u[2])
-    at = lambda t: dr.gather(mi.Vector3f, t, pick)  # noqa: E731
+    at = lambda t: dr.gather(mi.Vector3f, t, pick)
     lamp, bare = dr.gather(mi.Bool, lights.lamp, pick), dr.gather(mi.Bool, lights.bare, pick)
     spot = pick * POINTS + dr.minimum(mi.UInt32(a * POINTS), POINTS - 1)
     q = dr.select(lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b)

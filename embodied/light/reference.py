@@ -5,6 +5,7 @@ Both return an embodied.panorama.Panorama with the bake's exposure, so that pict
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from embodied.house import House
@@ -13,7 +14,7 @@ from embodied.light.backend import array, mitsuba
 from embodied.light.baking import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
-from embodied.light.trace import Hit, World, look, picture_at, world_of
+from embodied.light.trace import Hit, look, picture_at, world_of
 from embodied.panorama import FACES, Panorama
 from embodied.seeds import stream
 
@@ -57,37 +58,47 @@ class Tracer:
         """(h, w, 3) uint8, (h, w) float32 depth along the axis, (h, w) int32 ids of a pinhole camera."""
         rng = stream(self._seed, "light", "trace", self.quality, name)
         h, w = size
-        total = np.zeros((h * w, 3), np.float32)
-        for start in range(0, self.rays, 4):
-            ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
-            colour = self._colours(ray, rng)
-            total += colour.reshape(-1, h * w, 3).sum(0)
-        rgb = (np.clip(total / self.rays, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
         centre = _camera_rays(position, forward, up, vfov, size, 1, 0, None)
         hit = look(self._world, centre)
-        ok, t = np.asarray(hit.ok), np.asarray(hit.distance)
+        ok, t, normal = np.asarray(hit.ok), np.asarray(hit.distance), array(hit.normal)
         ids = np.where(ok, self._world.owner[np.where(ok, np.asarray(hit.face), 0)], 0)
         along = array(centre.d) @ np.asarray(forward, np.float32)
+        inside, light, other, albedo = (np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3))
+        rounds = range(0, self.rays, 4)
+        for start in rounds:
+            ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
+            for total, part in zip((inside, light, other, albedo), self._samples(ray, rng)):
+                total += part.reshape(-1, h * w, part.shape[1]).sum(0)
+        share = np.maximum(inside, 1e-6)
+        light, albedo = light / share, albedo / share
+        if self.quality != "glossy":
+            guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(h, w, 4)
+            light = _smoothed((light / np.maximum(albedo, 0.02)).reshape(h, w, 3), guide).reshape(-1, 3) * np.maximum(albedo, 0.02)
+        rgb = (develop(light, np.ones(3)) * inside + other) / self.rays
+        rgb = (np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
         return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
 
-    def _colours(self, ray, rng: np.random.Generator) -> np.ndarray:
-        """(n, 3) shown colours in [0, 1] along rays."""
+    def _samples(self, ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+        """Per ray: whether it ends indoors (n, 1), exposed radiance there, shown colour elsewhere, and albedo (n, 3).
+
+        Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
+        curved noise is too dark.
+        """
         import drjit as dr
 
-        mi, world = mitsuba(), self._world
+        world = self._world
         hit = look(world, ray)
         inside = hit.ok & ~hit.outdoor
-        if self.quality == "glossy":
-            diffuse = hit.albedo * hit.e
-        else:
-            diffuse = hit.albedo * self._traced(hit, ray, rng)
+        e = hit.e if self.quality == "glossy" else self._traced(hit, ray, rng)
+        diffuse = hit.albedo * e
         if self.quality != "diffuse":
             diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
         radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
-        shown_outside = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
-        keep, there, seen, outside = np.asarray(inside), array(hit.position), array(radiance), array(shown_outside)
-        gain = world.exposure.at(np.where(keep[:, None], there, 0.0))
-        return np.where(keep[:, None], develop(np.nan_to_num(seen), gain), outside)
+        shown = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
+        keep = np.asarray(inside)[:, None]
+        there, seen = array(hit.position), np.nan_to_num(array(radiance), posinf=0.0)
+        x = np.where(keep, seen * world.exposure.at(np.where(keep, there, 0.0)), 0.0)
+        return keep.astype(np.float32), np.minimum(x, 60.0), np.where(keep, 0.0, array(shown)), np.where(keep, array(hit.albedo), 0.0)
 
     def _traced(self, hit: Hit, ray, rng: np.random.Generator):
         """e at first hits by path tracing."""
@@ -133,6 +144,23 @@ class Tracer:
         return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse)
 
 
+def _smoothed(light: np.ndarray, guide: np.ndarray) -> np.ndarray:
+    """(h, w, 3) light, smoothed where normal and distance (h, w, 4) agree: a-trous (Dammertz et al. 2010), three passes."""
+    kernel = (0.0625, 0.25, 0.375, 0.25, 0.0625)
+    for step, like in ((1, 0.7), (2, 0.4), (4, 0.3)):
+        shade = np.log(cv2.blur(light.mean(-1), (3, 3)) + 1e-3)
+        total, weight = np.zeros_like(light), np.zeros(light.shape[:2], np.float32)
+        for j in range(-2, 3):
+            for i in range(-2, 3):
+                moved = lambda a: np.roll(a, (j * step, i * step), axis=(0, 1))  # noqa: B023
+                apart = np.square(moved(guide) - guide).sum(-1) / 0.02 + np.square((moved(shade) - shade) / like)
+                w = kernel[i + 2] * kernel[j + 2] * np.exp(-0.5 * apart).astype(np.float32)
+                total += moved(light) * w[..., None]
+                weight += w
+        light = total / weight[..., None]
+    return light
+
+
 def _camera_rays(position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None):
     """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
     mi = mitsuba()
@@ -146,6 +174,6 @@ def _camera_rays(position, forward, up, vfov: float, size: tuple[int, int], each
     t = np.tan(vfov / 2)
     sx = ((x + jitter[0]) / w * 2 - 1) * t * w / h
     sy = (1 - (y + jitter[1]) / h * 2) * t
-    v = lambda a: mi.Vector3f(*(float(k) for k in a))  # noqa: E731
+    v = lambda a: mi.Vector3f(*(float(k) for k in a))
     d = v(f) + v(right) * mi.Float(sx.ravel().astype(np.float32)) + v(u) * mi.Float(sy.ravel().astype(np.float32))
     return mi.Ray3f(mi.Point3f(*(float(k) for k in position)), dr.normalize(d))

@@ -133,8 +133,8 @@ def _noise(rng: np.random.Generator, rows: int, columns: int, shape: tuple[int, 
     grid = rng.random((rows, columns)).astype(np.float32)
     grid = np.concatenate([grid[:, -4:], grid, grid[:, :4]], axis=1)
     scale = shape[1] / columns
-    wide = cv2.resize(grid, (int(round((columns + 8) * scale)), shape[0]), interpolation=cv2.INTER_CUBIC)
-    start = int(round(4 * scale))
+    wide = cv2.resize(grid, (round((columns + 8) * scale), shape[0]), interpolation=cv2.INTER_CUBIC)
+    start = round(4 * scale)
     return np.clip(wide[:, start : start + shape[1]], 0.0, 1.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -139,10 +140,19 @@ def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Port
         jobs.append((own, lambda s, p, r, x=lamp: radiosity.lamp_light(s, p, x, r or settings.lamp_rays)))
     for done, (where, shine) in enumerate(jobs):
         tell(done / len(jobs))
-        mine = radiosity.reached(lux.unit, lambda i: array(shine(where, subset(lux, i), 4)).sum(1) > 0)
-        if len(mine):
-            e[mine] += array(shine(where, subset(lux, mine), 0))
+        _add_light(e, lux, functools.partial(_shine, lux, where, shine))
     return e
+
+
+def _shine(lux: Luxels, where: Space, shine: Callable, i: np.ndarray, rays: int) -> np.ndarray:
+    return array(shine(where, subset(lux, i), rays))
+
+
+def _add_light(e: np.ndarray, lux: Luxels, shine: Callable[[np.ndarray, int], np.ndarray]) -> None:
+    """Add what one light gives to the luxels that it can reach; 0 rays stands for the settings' number."""
+    mine = radiosity.reached(lux.unit, lambda i: shine(i, 4).sum(1) > 0)
+    if len(mine):
+        e[mine] += shine(mine, 0)
 
 
 def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: int = 24) -> np.ndarray:
@@ -195,12 +205,12 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
         pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
         strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
         extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
-        one = lambda i: radiosity.patch_light(
-            space, subset(lux, i), lux.position[pick], lux.normal[pick], strength, extent)
-        reach = radiosity.reached(lux.unit, lambda i: one(i).sum(1) > 0)
-        if len(reach):
-            e[reach] += one(reach)
+        _add_light(e, lux, functools.partial(_patches, lux, space, pick, strength, extent))
     return share, e
+
+
+def _patches(lux: Luxels, space: Space, pick: np.ndarray, strength: np.ndarray, extent: np.ndarray, i: np.ndarray, rays: int) -> np.ndarray:
+    return radiosity.patch_light(space, subset(lux, i), lux.position[pick], lux.normal[pick], strength, extent)
 
 
 def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell: Callable[[float], None]) -> Radiosity:
@@ -252,11 +262,11 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     soft = ~lux.shell
     near = denoise.neighbours(lux.position, lux.normal, light.good, soft)
     on_page = (atlas, lux.texels, light.good, lux.shell)
-    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)  # noqa: E731
-    mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e  # noqa: E731
+    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
+    mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e
     indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
     indirect = space(denoise.smooth_pages(indirect, *on_page, steps=(1, 2, 4, 8, 16), likeness=0.35), 3, 0.8)
-    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=0.2), 2, 0.45)
+    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4, 8), likeness=0.2), 2, 0.45)
     patches = mend(light.patches)
     total = direct + indirect + patches
     if soft.any():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import cv2
+import numpy as np
 
 from embodied.house import House
 from embodied.light import radiosity
@@ -56,8 +56,8 @@ class World:
 def world_of(bake: Bake, house: House) -> World:
     """Upload a bake."""
     mi = mitsuba()
-    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))  # noqa: E731
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())  # noqa: E731
+    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     lit, own = bake.lit, bake.manifest["own_pages"]
     with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
         gloss = [z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
@@ -157,7 +157,7 @@ def look(world: World, ray, active=True) -> Hit:
     ok = h.is_valid() & active
     f = h.prim_index
     b1, b2 = h.prim_uv.x, h.prim_uv.y
-    at = lambda c: dr.gather(mi.Point2f, world.uv, f * 3 + c, ok)  # noqa: E731
+    at = lambda c: dr.gather(mi.Point2f, world.uv, f * 3 + c, ok)
     q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
     page = dr.gather(mi.UInt32, world.page, f, ok)
     w, height = (mi.Float(dr.gather(mi.UInt32, world.size, page * 2 + c, ok)) for c in (0, 1))

@@ -1,0 +1,259 @@
+"""Light: closed forms of energy, agreement with the path tracer, and what happens when a bake goes wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, box_mesh, furnished
+
+from assets.records import Finish
+from embodied.house import House, Light, Room, Sky, Storey
+from embodied.light import LightError, StaleBake, bake, baking, check, open_bake, radiosity, settings_of, solve
+from embodied.light.atlas import atlas_of, things_of
+from embodied.light.backend import array, find_llvm
+from embodied.light.emitters import lamps_of, portals_of
+from embodied.light.settings import Settings
+from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
+from embodied.light.tone import Exposure, develop
+from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
+from embodied.part import Part
+
+TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)
+DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))
+SRGB_HALF = 0.7353569831
+"""sRGB value of linear 0.5."""
+
+
+def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
+    """A box seen from inside, its luxels and its light."""
+    room = Room("box_1", "hall", ((0, 0), (size, 0), (size, size), (0, size)), *["paint_white/0"] * 4)
+    house = House(0, "box", (Storey(0.0, size),), (room,), (), (), lights)
+    mesh = box_mesh((0, 0, 0), (size, size, size), finish.color)
+    inward = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], normals=-mesh.normals, finish=finish)
+    part = Part("box_1/wall_0", "wall", "box_1", inward, "box")
+    atlas = atlas_of(things_of([part], density=8.0, budget=100, cache=None))
+    lamps = lamps_of(house, atlas)
+    lux = solve.luxels_of(house, atlas, lamps, read=None)
+    settings = dataclasses.replace(TINY, bounces=(8, 8, 8, 8, 8, 8, 64), lamp_rays=24)
+    light = solve.solve(house, atlas, lux, DARK, lamps, settings, lambda name, work: work(), lambda name, done: None)
+    return lux, light
+
+
+def test_in_a_furnace_light_is_emission_over_absorption():
+    """Every wall glows with L and reflects a: e = L + a e everywhere, so e = L / (1 - a)."""
+    _, light = closed_box(2.0, Finish((SRGB_HALF, SRGB_HALF, SRGB_HALF, 1.0), emission=(1.0, 2.0, 0.5)))
+    ambient = solve.AMBIENT / 0.5
+    for channel, emitted in enumerate((1.0, 2.0, 0.5)):
+        assert np.median(light.soft[:, channel]) == pytest.approx(emitted / 0.5 + ambient[channel], rel=0.02)
+        assert np.percentile(light.soft[:, channel], 2) > emitted / 0.5 * 0.93
+
+
+def test_a_closed_box_absorbs_exactly_what_its_lamp_gives():
+    """Sum of (1 - a) E dA over the walls is the lamp's flux, all bounces included."""
+    lumens = 1000.0
+    lamp = Light("l", "box_1", None, (2.0, 2.0, 2.0), (1.0, 1.0, 1.0), lumens)
+    lux, light = closed_box(4.0, Finish((SRGB_HALF, SRGB_HALF, SRGB_HALF, 1.0)), (lamp,))
+    e = light.soft[:, 1] - solve.AMBIENT[1]
+    absorbed = float((lux.area * (1 - lux.albedo[:, 1]) * e).sum() * np.pi * 100)
+    assert absorbed == pytest.approx(lumens, rel=0.03)
+    assert float(lux.area.sum()) == pytest.approx(6 * 16.0, rel=1e-3)
+
+
+def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
+    """Under the middle of a w x w uniform opening at height h, e / L is the textbook configuration factor."""
+    w, h = 2.0, 1.5
+    from embodied.light.emitters import GLASS, Portal
+
+    portal = Portal("p", "r", np.array([-w / 2, -w / 2, h]), np.array([0.0, w, 0.0]), np.array([w, 0.0, 0.0]))
+    assert portal.normal == pytest.approx([0, 0, -1])
+    far_below = box_mesh((-1, -1, -9), (1, 1, -8), (0.5, 0.5, 0.5, 1.0))
+    atlas = atlas_of(things_of([Part("a/b", "wall", "a", far_below, "x")], density=1.0, budget=100, cache=None))
+    from embodied.light.atlas import rasterise
+
+    space = radiosity.space_of(atlas, [rasterise(p, 1) for p in atlas.pages], np.full((64, 128, 3), 3.0, np.float32))
+    up = np.tile([[0.0, 0.0, 1.0]], (64, 1))
+    p = radiosity.points_of(np.zeros((64, 3)), up, up, np.zeros(64, bool))
+    e = array(radiosity.sky_light(space, p, portal, 256)).mean(0) / (3.0 * GLASS)
+    x = (w / 2) / h
+    quarter = 2 * x / np.sqrt(1 + x * x) * np.arctan(x / np.sqrt(1 + x * x)) / (2 * np.pi)  # Siegel & Howell, C-11
+    assert e == pytest.approx(np.full(3, 4 * quarter), rel=0.02)
+
+
+def test_unwrapping_keeps_every_face_and_its_proportions():
+    mesh = box_mesh((0, 0, 0), (0.5, 0.4, 0.8), (0.9, 0.1, 0.1, 1.0))
+    for flat, uneven in ((unwrap_planes([mesh], 40.0), 1e-3), (unwrap_model([mesh], 3000.0), 0.2)):
+        assert len(flat.corners) == 12 and not flat.thin.any()
+        on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
+        assert np.ptp(on_page / areas_of(flat.corners)) / np.mean(on_page / areas_of(flat.corners)) < uneven
+        assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
+
+
+def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():
+    mesh = box_mesh((0, 0, 0), (1, 1, 1), (0.5, 0.5, 0.5, 1.0))
+    inside_out = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1])
+    from embodied.light.unwrap import face_normals
+
+    flat = unwrap_model([inside_out], 1000.0)
+    outward = flat.corners.mean(1) - 0.5
+    assert ((face_normals(flat.corners) * outward).sum(1) > 0).all()
+    sheet = dataclasses.replace(mesh, faces=mesh.faces[:2])
+    assert unwrap_model([sheet], 1000.0).thin.all()
+
+
+def test_packed_rectangles_do_not_overlap():
+    sizes = np.random.default_rng(3).integers(2, 40, (60, 2))
+    places, sheet = pack(sizes)
+    taken = np.zeros(sheet[::-1], int)
+    for (x, y), (w, h) in zip(places, sizes):
+        taken[y : y + h, x : x + w] += 1
+    assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
+
+
+def test_the_sun_rises_in_the_east_stands_south_at_noon_and_is_below_at_midnight():
+    north = np.pi / 2
+    morning, noon = sun_direction(Sky(8.0, "clear", north)), sun_direction(Sky(12.0, "clear", north))
+    assert morning[0] > 0.5 and noon[1] < -0.5 and abs(noon[0]) < 1e-6
+    assert sun_height(0.0) < -0.5 < 0.5 < sun_height(12.0)
+    assert np.linalg.norm(morning) == pytest.approx(1.0)
+
+
+def test_the_outdoors_gets_darker_from_noon_over_dusk_to_night_and_depends_on_the_seed_alone():
+    brightness = [paint(Sky(hour), 1, 128).picture.mean() for hour in (12.0, 18.3, 19.0, 23.0)]
+    assert all(a > 3 * b for a, b in itertools.pairwise(brightness))
+    assert (paint(Sky(12.0), 5, 128).picture == paint(Sky(12.0), 5, 128).picture).all()
+    assert not paint(Sky(12.0, "overcast"), 1, 128).sun.any()
+
+
+def test_exposure_is_smooth_through_a_door_and_brightens_dark_rooms():
+    rooms = (((0, 0), (4, 0), (4, 4), (0, 4)), ((4, 0), (8, 0), (8, 4), (4, 4)))
+    exposure = Exposure(rooms, np.array([[0, 2.6]] * 2), np.array([[1.0] * 3, [8.0] * 3]), np.ones(3))
+    x = np.arange(0.5, 7.5, 0.01)
+    gain = exposure.at(np.stack([x, np.full_like(x, 2.0), np.full_like(x, 1.5)], 1))[:, 0]
+    assert gain[0] == pytest.approx(1.0, rel=0.05) and gain[-1] == pytest.approx(8.0, rel=0.05)
+    assert (np.diff(gain) > -1e-5).all() and (gain[1:] / gain[:-1]).max() < 1.04
+
+
+def test_the_film_curve_rises_and_keeps_black_black():
+    grey = np.repeat(np.linspace(0, 6, 200)[:, None], 3, 1)
+    shown = develop(grey, np.ones(3))
+    assert (np.diff(shown[:, 0]) >= 0).all() and shown[0].max() == 0 and shown[-1].min() > 0.97
+
+
+def test_the_newest_llvm_is_found():
+    assert find_llvm() is None or "LLVM" in find_llvm()
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory):
+    """The furnished two-room house at dusk and noon light, baked tinily: house, catalogue, cache, bake."""
+    lamps = (Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
+             Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0))
+    house = dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
+    cache = tmp_path_factory.mktemp("light")
+    return house, HandCatalogue(), cache, bake(house, HandCatalogue(), cache, TINY)
+
+
+def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
+    report = lit[3].manifest["check"]
+    assert report["luxels"] == check.LUXELS and abs(report["bias"]) < 0.1 and report["scatter"] < 0.1
+
+
+def test_no_valid_texel_is_black_and_every_owner_has_its_mesh(lit):
+    house, _, _, baked = lit
+    pages = baked.lit
+    assert {p.id for p in house.placements} <= {m.owner for m in pages.meshes}
+    for m in pages.meshes:
+        assert m.uv.min() >= -1e-6 and m.uv.max() <= 1 + 1e-6 and m.faces.max() < len(m.vertices)
+        if any(f"/{k}" in m.owner for k in ("wall_", "floor", "ceiling")):
+            h, w = pages.pages[m.page].shape[:2]
+            centre = m.uv[m.faces].mean(1) * [w, h]
+            x, y = centre.astype(int).clip(0, [w - 1, h - 1]).T
+            assert np.median(pages.pages[m.page][y, x].max(-1)) > 60
+
+
+def test_lighting_again_opens_the_same_bake(lit):
+    house, catalogue, cache, baked = lit
+    before = (baked.folder / "manifest.json").stat().st_mtime_ns
+    again = bake(house, catalogue, cache, TINY)
+    assert again.folder == baked.folder and (again.folder / "manifest.json").stat().st_mtime_ns == before
+
+
+def test_a_house_edited_after_its_bake_is_refused_by_name(lit):
+    house, _, _, baked = lit
+    edited = dataclasses.replace(house, sky=Sky(20.0))
+    with pytest.raises(StaleBake, match="edited.*embodied light"):
+        open_bake(baked.folder, edited)
+    with pytest.raises(StaleBake, match="no finished bake"):
+        open_bake(baked.folder.parent / "nothing", house)
+
+
+def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path, monkeypatch):
+    house, catalogue, _, baked = lit
+    monkeypatch.setattr(check, "LUXELS", 2)
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as m:
+        m.setattr(baking, "page_of", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            bake(house, catalogue, tmp_path, TINY)
+    with monkeypatch.context() as m:
+        m.setattr(solve, "direct_light", interrupt)  # must not be needed again
+        m.setattr(solve, "bounce", interrupt)
+        m.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
+        done = bake(house, catalogue, tmp_path, TINY)
+    own = baked.manifest["own_pages"]
+    assert all(np.abs(a.astype(int) - b).max() <= 1 for a, b in zip(done.lit.pages[:own], baked.lit.pages[:own]))
+    (done.folder / "page_000.jpg").write_bytes(b"cut")
+    with pytest.raises(StaleBake, match="damaged"):
+        open_bake(done.folder, house)
+    monkeypatch.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
+    with pytest.warns(RuntimeWarning, match="damaged"):
+        repaired = bake(house, catalogue, tmp_path, TINY)
+    assert open_bake(repaired.folder, house).manifest["files"]["page_000.jpg"] > 100
+
+
+def test_an_unknown_quality_is_refused_with_the_known_ones():
+    with pytest.raises(ValueError, match="draft"):
+        settings_of("beautiful")
+    assert issubclass(LightError, RuntimeError)
+
+
+def test_probes_know_where_the_window_is(lit):
+    """The living room's window is in its south wall, so a face that looks to -y is brighter than one to +y."""
+    cube = lit[3].probe("living_room_1")
+    assert cube.shape == (6, 3) and cube.min() > 0.05 and cube.max() <= 1.0
+    assert cube[3].mean() > cube[2].mean()
+
+
+def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
+    """28 dB and 6 levels at most between the classic renderer's pages and a path-traced picture of the same walls."""
+    import cv2
+
+    from embodied.light.reference import Tracer
+    from embodied.render import Renderer, camera_at
+
+    house, catalogue, _, baked = lit
+    at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)
+    with Renderer(house, catalogue, quality="baked", lit=baked.lit, size=96) as renderer:
+        view = renderer.view(at, yaw, pitch, vfov, size)
+    camera = camera_at(at, yaw, pitch, vfov)
+    traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(at, camera.forward, camera.up, vfov, size)
+    a, b = (cv2.GaussianBlur(x, (0, 0), 1).astype(float) for x in (view.rgb, traced))
+    psnr = 10 * np.log10(255**2 / np.mean((a - b) ** 2))
+    assert psnr > 28 and abs((a - b).mean()) < 6
+    known = np.isfinite(depth) & (ids == view.ids)
+    assert known.mean() > 0.9 and np.median(np.abs(depth - view.depth)[known]) < 0.01
+
+
+def test_windows_are_portals_that_look_into_their_room():
+    house = two_rooms()
+    portals = {p.id: p for p in portals_of(house)}
+    assert sorted(portals) == ["window_1", "window_2"]
+    assert portals["window_1"].normal == pytest.approx([0, 1, 0]) and portals["window_2"].normal == pytest.approx([0, -1, 0])
+    assert portals["window_1"].area == pytest.approx(2.0 * 1.2)
