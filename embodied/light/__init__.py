@@ -5,6 +5,7 @@ from embodied.light.baking import Bake as Bake
 from embodied.light.baking import StaleBake as StaleBake
 from embodied.light.baking import bake as bake
 from embodied.light.baking import open_bake as open_bake
+from embodied.light.baking import progress_bar as progress_bar
 from embodied.light.settings import QUALITIES as QUALITIES
 from embodied.light.settings import Settings as Settings
 from embodied.light.settings import settings_of as settings_of

@@ -13,12 +13,13 @@ import functools
 import json
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from tqdm import tqdm
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.records import Finish
@@ -85,6 +86,24 @@ class Bake:
         sun = cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE)
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
         return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
+
+
+STAGES = {"unwrapping": (0.0, 0.2), "direct light": (0.2, 0.4), "bounces": (0.4, 0.65), "smoothing": (0.65, 0.75),
+          "pages": (0.75, 1.0), "done": (1.0, 1.0)}
+"""Where each stage lies on the progress bar: its rough share of a bake's time."""
+
+
+@contextlib.contextmanager
+def progress_bar() -> Iterator[Progress]:
+    """A bar on stderr for `bake`; silent where stderr is no terminal."""
+    with tqdm(total=100, desc="light", unit="%", disable=None, bar_format="{desc:<20}{percentage:3.0f}%|{bar}| {elapsed}") as bar:
+
+        def tell(stage: str, done: float) -> None:
+            start, end = STAGES[stage]
+            bar.set_description(stage)
+            bar.update(max(0.0, 100 * (start + (end - start) * done) - bar.n))
+
+        yield tell
 
 
 def key_of(house: House, settings: Settings) -> str:

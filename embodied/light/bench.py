@@ -1,0 +1,186 @@
+"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk, and one picture sheet."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from assets.cache import write_bytes, write_json
+from embodied.generate import generate_house
+from embodied.house import House, Sky
+from embodied.light.backend import device
+from embodied.light.baking import Bake, bake
+from embodied.light.reference import Tracer
+from embodied.navgraph import build_graph
+from embodied.render import Renderer, camera_at
+
+WAYS = ("unlit", "baked", "glossy", "diffuse", "reference")
+TIMES = (Sky(10.5, "clear"), Sky(13.0, "overcast"), Sky(18.6, "clear"), Sky(22.0, "clear"))
+"""Morning sun, grey noon, dusk, night; the views are dealt out over them."""
+VFOV = math.radians(65.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One view by one way."""
+
+    room: str
+    hour: float
+    way: str
+    rgb: np.ndarray
+    ms: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """What `embodied bench light` shows."""
+
+    facts: dict
+    text: str
+
+
+def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4, views: int = 3, settings: str = "normal",
+            size: tuple[int, int] = (160, 240), rays: int = 96, progress: Callable[[str], None] = lambda text: None) -> Report:
+    """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.png and `out`/light.json.
+
+    Args:
+      houses: seeds from `seed` on, each at another time of day.
+      size: (height, width) of the pictures.
+      rays: per pixel of the path-traced ways.
+    """
+    shots: list[Shot] = []
+    bakes: list[Bake] = []
+    for k in range(houses):
+        house = generate_house(seed + k, catalogue=catalogue)
+        sky = dataclasses.replace(TIMES[k % len(TIMES)], north=house.sky.north)
+        house = dataclasses.replace(house, sky=sky)
+        progress(f"house {seed + k} at {sky.hour:g} h")
+        bakes.append(bake(house, catalogue, cache, settings))
+        shots += draw(house, catalogue, bakes[-1], viewpoints(house, catalogue, views), size, rays)
+    facts = measure(shots, bakes)
+    out = Path(out)
+    out.mkdir(parents=True, exist_ok=True)
+    write_bytes(out / "light.png", cv2.imencode(".png", sheet(shots)[..., ::-1])[1].tobytes())
+    write_json(out / "light.json", facts, indent=1)
+    return Report(facts, table(facts))
+
+
+def viewpoints(house: House, catalogue, count: int) -> list[tuple[str, np.ndarray, float]]:
+    """Rooms of different kinds, largest first: id, eye, and the yaw with the longest view."""
+    graph = build_graph(house, catalogue)
+    area = {r.id: abs(float(np.ptp(np.array(r.polygon), axis=0).prod())) for r in house.rooms}
+    found, kinds = [], set()
+    for room in sorted(house.rooms, key=lambda r: -area[r.id]):
+        nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
+        if not nodes or room.kind in kinds or len(found) == count:
+            continue
+        kinds.add(room.kind)
+        corner = np.array(max(room.polygon, key=lambda c: min(np.hypot(*(graph.positions[i][:2] - c)) for i in nodes)))
+        eye = max((graph.positions[i] for i in nodes), key=lambda p: float(np.hypot(*(p[:2] - corner))))
+        found.append((room.id, eye, math.atan2(*(corner - eye[:2])[::-1])))
+    return found
+
+
+def draw(house: House, catalogue, baked: Bake, views: Sequence[tuple[str, np.ndarray, float]], size: tuple[int, int], rays: int) -> list[Shot]:
+    """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
+    shots = []
+    for way in WAYS:
+        if way in ("unlit", "baked"):
+            with Renderer(house, catalogue, quality=way, lit=baked.lit if way == "baked" else None, size=256) as r:
+                for room, eye, yaw in views:
+                    rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
+                    ms = _median_ms(lambda at=eye, to=yaw, by=r: by.rgb(camera_at(at, to), (256, 256)))
+                    shots.append(Shot(room, house.sky.hour, way, rgb, ms))
+        else:
+            tracer = Tracer(baked, house, quality=way, rays=16 if way == "glossy" else rays)
+            for room, eye, yaw in views:
+                camera = camera_at(eye, yaw, -0.1, VFOV)
+                start = time.perf_counter()
+                rgb, _, _ = tracer.picture(eye, camera.forward, camera.up, VFOV, size)
+                shots.append(Shot(room, house.sky.hour, way, rgb, 1e3 * (time.perf_counter() - start) * 256 * 256 / (size[0] * size[1])))
+    return shots
+
+
+def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
+    """Medians over all views per way, and what the bakes cost."""
+    by = {(s.room, s.hour, s.way): s for s in shots}
+    views = sorted({(s.room, s.hour) for s in shots})
+    rows = []
+    for way in WAYS:
+        row: dict = {"way": way, "ms_256": float(np.median([by[*v, way].ms for v in views]))}
+        for truth in ("reference", "diffuse"):
+            pairs = [(by[*v, way].rgb, by[*v, truth].rgb) for v in views]
+            row[f"psnr_{truth}"] = None if way == truth else float(np.median([psnr(a, b) for a, b in pairs]))
+            row[f"ssim_{truth}"] = None if way == truth else float(np.median([ssim(a, b) for a, b in pairs]))
+        rows.append(row)
+    pages = [sum(v for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
+    return {
+        "rows": rows, "views": [list(v) for v in views], "device": device(),
+        "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),
+        "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
+        "disk_mb": float(np.median(pages)), "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
+        "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
+    }
+
+
+def table(facts: dict) -> str:
+    """The measures as Markdown."""
+    number = lambda x, form: "" if x is None else format(x, form)
+    lines = ["| way | ms per 256 x 256 | PSNR / SSIM to reference | PSNR / SSIM to diffuse reference |", "|---|---|---|---|"]
+    for r in facts["rows"]:
+        cells = [f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}" for t in ("reference", "diffuse")]
+        lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {cells[0]} | {cells[1]} |")
+    lines.append(
+        f"\nMedians of {len(facts['views'])} views. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
+        f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
+    )
+    return "\n".join(lines)
+
+
+def sheet(shots: Sequence[Shot]) -> np.ndarray:
+    """(h, w, 3) uint8: one row per view, one column per way, labelled."""
+    views = list(dict.fromkeys((s.room, s.hour) for s in shots))
+    by = {(s.room, s.hour, s.way): s.rgb for s in shots}
+    rows = []
+    for room, hour in views:
+        row = [by[room, hour, way].copy() for way in WAYS]
+        cv2.putText(row[0], f"{room} {hour:g} h", (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (20, 20, 20), 1, cv2.LINE_AA)
+        rows.append(np.concatenate(row, axis=1))
+    head = np.full((20, rows[0].shape[1], 3), 255, np.uint8)
+    for k, way in enumerate(WAYS):
+        cv2.putText(head, way, (6 + k * rows[0].shape[1] // len(WAYS), 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+    return np.concatenate([head, *rows])
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    """Peak signal to noise ratio in dB of uint8 pictures, both blurred by one pixel against path-tracing noise."""
+    a, b = (gaussian_filter(x.astype(float), (1, 1, 0)) for x in (a, b))
+    return float(10 * np.log10(255**2 / max(np.mean((a - b) ** 2), 1e-9)))
+
+
+def ssim(a: np.ndarray, b: np.ndarray) -> float:
+    """Mean structural similarity of the luma (Wang et al. 2004, eq. 13, Gaussian window of 1.5 pixels)."""
+    a, b = (cv2.cvtColor(x, cv2.COLOR_RGB2GRAY).astype(float) for x in (a, b))
+    mean = lambda x: gaussian_filter(x, 1.5)
+    ma, mb = mean(a), mean(b)
+    va, vb, cov = mean(a * a) - ma**2, mean(b * b) - mb**2, mean(a * b) - ma * mb
+    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    return float(np.mean((2 * ma * mb + c1) * (2 * cov + c2) / ((ma**2 + mb**2 + c1) * (va + vb + c2))))
+
+
+def _median_ms(draw_: Callable[[], object], times: int = 5) -> float:
+    draw_()
+    took = []
+    for _ in range(times):
+        start = time.perf_counter()
+        draw_()
+        took.append(1e3 * (time.perf_counter() - start))
+    return float(np.median(took))
