@@ -16,6 +16,7 @@ from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
+    from assets.records import Asset
     from embodied.navgraph import NavGraph
 
 CLASS = "person"
@@ -23,6 +24,10 @@ NEAREST, FARTHEST = 0.55, 1.3
 """How far from their node people may stand, metres."""
 BODY = 0.25
 """Radius that a person keeps free of furniture and walls, metres."""
+APART = 0.9
+"""Distance between two people, metres."""
+STANDING = 1.35
+"""Least height of a standing figure, metres."""
 PASSAGE = 0.45
 """Distance that people keep from every edge of the graph, so that nobody blocks the way."""
 
@@ -36,7 +41,7 @@ def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: 
     Args:
       starts: node indices; repeats count once.
     """
-    figures = [a for a in catalogue.of_class(CLASS) if a.support == "floor"]
+    figures = [a for a in catalogue.of_class(CLASS) if stands(a)]
     if not figures:
         return house
     ways = shapely.MultiLineString([graph.positions[list(e), :2].tolist() for e in graph.edges])
@@ -55,6 +60,11 @@ def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: 
             rounded((spot[0], spot[1], house.storey_of(room).elevation)), rounded(yaw_facing(direction)), asset.size,
         ))
     return dataclasses.replace(house, placements=(*house.placements, *people))
+
+
+def stands(asset: Asset) -> bool:
+    """Whether a figure stands on its own feet; those that sit or lie need something to do it on."""
+    return asset.support == "floor" and asset.size[2] >= STANDING and max(asset.size[:2]) <= 2 * STANDING / 3
 
 
 def _spot(eye: np.ndarray, floor: shapely.Polygon, ways, taken: list, *, rng: np.random.Generator) -> tuple[float, float] | None:
@@ -79,4 +89,4 @@ def _footprints(house: House) -> list[shapely.Polygon]:
 
 
 def _disc(position: tuple[float, float, float]) -> shapely.Polygon:
-    return shapely.Point(position[0], position[1]).buffer(BODY)
+    return shapely.Point(position[0], position[1]).buffer(APART - BODY)

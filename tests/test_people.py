@@ -13,7 +13,7 @@ from hand_worlds import grid_world, thing
 from assets.records import Asset
 from embodied.geometry import facing_of, wrap
 from embodied.house import House, check
-from embodied.people import BODY, CLASS, PASSAGE, add_people
+from embodied.people import APART, CLASS, PASSAGE, add_people, stands
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
@@ -41,7 +41,7 @@ def test_nobody_blocks_an_edge_or_stands_in_furniture():
     people = [shapely.Point(p.position[:2]) for p in house.placements if p.object_class == CLASS]
     assert len(people) > 20
     assert all(ways.distance(p) >= PASSAGE - 1e-3 for p in people)
-    assert all(a.distance(b) >= 2 * BODY - 1e-2 for i, a in enumerate(people) for b in people[:i])
+    assert all(a.distance(b) >= APART - 1e-2 for i, a in enumerate(people) for b in people[:i])
     check(house)
 
 
@@ -51,6 +51,12 @@ def test_a_crowded_start_goes_without():
     table = dataclasses.replace(thing("table", 1, "kitchen_1", x, y), size=(3.2, 3.2, 0.7))
     full = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=(table,)))
     assert not [p for p in populated((0,), full)[0].placements if p.object_class == CLASS]
+
+
+def test_only_those_who_stand_are_taken():
+    assert stands(FIGURE)
+    for size in ((0.6, 0.8, 0.76), (0.7, 1.9, 0.57), (1.2, 0.5, 1.7)):
+        assert not stands(dataclasses.replace(FIGURE, size=size))
 
 
 def test_people_are_not_objects_to_look_for():
