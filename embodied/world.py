@@ -54,7 +54,7 @@ class World:
         self._renderer: Renderer | None = None
         self._tracer: Tracer | None = None
         self._file: PanoramaFile | None = None
-        self._refused = False
+        self._refused = self._progress = False
         self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
 
     @property
@@ -72,14 +72,17 @@ class World:
         return owners(self.house)
 
     @functools.cached_property
+    def _origin(self) -> dict[str, object]:
+        """What the world's geometry depends on."""
+        return {"house": self.house.digest, "nodes": digest(self.graph.positions.tolist()),
+                "mujoco": importlib.metadata.version("mujoco"), "code": code_digest()}
+
+    @functools.cached_property
     def fingerprint(self) -> dict[str, object]:
         """All that the panoramas depend on, and what draws them."""
-        return {
-            "house": self.house.digest, "nodes": digest(self.graph.positions.tolist()), "size": self.size,
-            "quality": self.quality, "backend": self.backend,
-            "light": None if self.quality == "unlit" else self.light, "renderer": str(gl.info()), "mujoco": importlib.metadata.version("mujoco"),
-            "code": code_digest(),
-        }
+        light = None if self.quality == "unlit" else self.light
+        return self._origin | {"size": self.size, "quality": self.quality, "backend": self.backend, "light": light,
+                               "renderer": str(gl.info())}
 
     @functools.cached_property
     def path(self) -> Path:
@@ -100,7 +103,13 @@ class World:
     def _bake(self) -> Bake:
         from embodied import light  # late: loads the path tracer
 
-        return light.bake(self.house, self.catalogue, self.cache, self.light)
+        with tqdm(total=1.0, disable=not self._progress, bar_format="light: {desc} {percentage:3.0f}% [{elapsed}]") as bar:
+            def tell(stage: str, done: float) -> None:
+                bar.set_description_str(stage, refresh=False)
+                bar.n = round(done, 2)
+                bar.refresh()
+
+            return light.bake(self.house, self.catalogue, self.cache, self.light, progress=tell)
 
     def _draw(self, position: np.ndarray) -> Panorama:
         if self.quality not in TRACED:
@@ -133,6 +142,7 @@ class World:
 
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
+        self._progress = progress
         if self._open_file() is None:
             write_panoramas(self.path, self._draw_all(progress), self.fingerprint)
             self._refused = False
@@ -181,8 +191,7 @@ class World:
 
     @functools.cached_property
     def _sightings(self) -> SightingTable:
-        depends = {k: self.fingerprint[k] for k in ("house", "nodes", "mujoco", "code")}
-        path = self.cache / "sightings" / f"{digest(depends, FACE)[:32]}.npz"
+        path = self.cache / "sightings" / f"{digest(self._origin, FACE)[:32]}.npz"
         table = load_table(path)
         if table is None:
             with Renderer(self.house, self.catalogue, size=FACE) as renderer:
