@@ -133,7 +133,7 @@ def test_rooms_have_the_proportions_of_rooms_and_corridors_their_width():
             elif r.kind not in ("hall", "toilet", "pantry", "closet"):
                 ratios.append(long / short)
     assert np.median(ratios) < 1.5
-    assert np.quantile(ratios, 0.95) < 2.1
+    assert np.quantile(ratios, 0.95) < 2.2
 
 
 def test_circulation_takes_a_tenth_to_a_sixth_of_most_houses():
@@ -214,7 +214,7 @@ def test_fixed_sky_and_disorder_are_kept():
 @pytest.mark.parametrize("options, message", [
     ({"area": (10, 20)}, "area"), ({"rooms": 30}, "rooms"), ({"shape": "star"}, "shape"), ({"storeys": 2}, "storeys"),
     ({"hour": 25.0}, "hour"), ({"weather": "snow"}, "weather"), ({"disorder": 2.0}, "disorder"), ({"style": "rococo"}, "style"),
-    ({"rooms": 3, "bedrooms": 3}, "bedrooms"), ({"rooms": 12, "area": (40, 60)}, "need at least"),
+    ({"rooms": 3, "bedrooms": 3}, "bedrooms"), ({"rooms": 20, "bedrooms": 2}, "to invent"), ({"rooms": 12, "area": (40, 60)}, "need at least"),
     ({"rooms": 2, "area": (400, 500)}, "fill at most"), ({"area": (200, 100)}, "area"), ({"shape": "U", "area": (40, 60)}, "U"),
 ])
 def test_impossible_wishes_are_refused_at_once(options, message):

@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     house.save(args.out / "house.json")
     to_matterport(graph, args.out / "connectivity.json")
-    save_plan(house, args.out / "plan.png", graph=graph, catalogue=catalogue)
+    save_plan(house, args.out / "plan.png", graph=graph)
     if not args.no_mjcf:
         note("writing house.xml with its meshes and textures")
         export_mjcf(house, catalogue, args.out)

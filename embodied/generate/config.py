@@ -11,6 +11,9 @@ SHAPES = ("rectangle", "L", "T", "U")
 AREAS = (32.0, 700.0)
 """Smallest and largest total area, square metres."""
 
+OTHERS = 14
+"""How many main rooms besides bedrooms a house may have."""
+
 
 @dataclass(frozen=True)
 class HouseConfig:
@@ -60,6 +63,9 @@ class HouseConfig:
         if self.rooms is not None and self.bedrooms is not None and self.bedrooms > self.rooms - 1:
             raise HouseError(f"{self.bedrooms} bedrooms do not fit in {self.rooms} main rooms, one of which is "
                              "the living room; raise rooms or lower bedrooms")
+        if self.rooms is not None and self.bedrooms is not None and self.rooms - self.bedrooms > OTHERS:
+            raise HouseError(f"{self.rooms} main rooms with only {self.bedrooms} bedrooms leave more than {OTHERS} other "
+                             "rooms to invent; lower rooms or raise bedrooms")
         needed = self.least_area()
         if self.area is not None and self.area[1] < needed:
             raise HouseError(f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r} need at least "

@@ -271,6 +271,8 @@ def _outer_doors(plan, outside, free, draft: _Draft, rng: np.random.Generator) -
                            draft.window_leaf, free, draft)
         elif c.kind in ("living_room", "sun_room", "family_room", "dining_room", "library", "main_bedroom"):
             chance = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35}.get(c.kind, 0.12)
+            if c.kind == "main_bedroom" and (x1 - x0) * (y1 - y0) < 15.0:
+                chance = 0.0
             if rng.random() < chance and outside[i] and outside[i][0].high - outside[i][0].low > 2.2:
                 w = outside[i][0]
                 room = w.high - w.low - 0.8

@@ -118,14 +118,16 @@ def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.rando
         if config.rooms is None and free < 7.0:
             return spaces
         if not fits:
-            if config.rooms is None and free < 14.0:
+            if config.rooms is None and free < 0.12 * area:
                 return spaces
             beds = sum(s.kind in BEDROOMS for s in spaces)
             most = 0.5 * config.rooms if config.rooms is not None else area / 62
             seconds = [k for k in ("study", "family_room", "workshop", "playroom", "sun_room", "library")
-                       if sum(s.kind == k for s in spaces) < 2]
-            if (beds < most and config.bedrooms is None) or not seconds:
+                       if sum(s.kind == k for s in spaces) < 2 and (config.rooms is not None or area > 2 * least[k])]
+            if (beds < most and config.bedrooms is None) or (not seconds and config.rooms is not None):
                 spaces.append(Space("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow))
+            elif not seconds:
+                return spaces
             else:
                 kind = str(rng.choice(seconds))
                 spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))

@@ -24,7 +24,9 @@ NEAR = {
 }
 """What a shared wall between two kinds is worth."""
 
-LIMITS = {"hall": 2.4, "toilet": 2.2, "closet": 2.2, "pantry": 2.2, "bathroom": 1.9, "laundry_room": 1.9}
+TIGHT = (*BEDROOMS, "living_room", "bathroom", "kitchen")
+"""Kinds whose furniture does not fit below their usual size."""
+LIMITS = {"hall": 2.4, "toilet": 2.2, "closet": 2.2, "pantry": 2.2, "bathroom": 1.8, "laundry_room": 1.8}
 """Longest side over shortest, 1.65 for other kinds, before it costs."""
 
 
@@ -62,14 +64,14 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
             moving += 0.5 * area
         value -= 0.3 * max(0.0, least * 10 - short) if c.kind != "hall" else 0.5 * max(0, 14 - short)
         if area < low:
-            value -= 5.0 * math.log(low / area)
+            value -= (15.0 if c.kind in TIGHT else 5.0) * math.log(low / area)
         elif area > high:
             value -= 5.0 * math.log(area / high)
         value -= 0.7 * abs(math.log(area / c.area))
         limit = LIMITS.get(c.kind, 1.65)
-        value -= (3.5 if area > 15 else 2.2) * max(0.0, long / short - limit)
-        if c.kind in DAYLIT and outer < max(14, 0.22 * 2 * (w + h) * 0.6):
-            value -= 6.0
+        value -= (4.0 if area > 15 else 3.0) * max(0.0, long / short - limit)
+        if c.kind in DAYLIT and outer < max(16, (0.7 if c.kind == "sun_room" else 0.26) * (w + h)):
+            value -= 12.0 if outer < 16 else 5.0
         if c.kind in ("hall", "garage") and outer < (13 if c.kind == "hall" else 26):
             value -= 12.0
         if c.kind == "garage" and outer > 0.45 * 2 * (w + h):

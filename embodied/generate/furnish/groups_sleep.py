@@ -198,7 +198,7 @@ def child_table(ctx: Context) -> list[Thing] | None:
     w, d = table.size[:2]
     items = [Item(table, 0.0, -d / 2 - 0.35, wobble(ctx.rng, 6), role="child table")]
     for sign in (-1, 1):
-        x = sign * (w / 2 + chair.size[1] / 2 - 0.05)
+        x = sign * (w / 2 + chair.size[1] / 2 + 0.01)
         items.append(Item(chair, x, -d / 2 - 0.35, -sign * math.pi / 2 + wobble(ctx.rng, 15), under=(0,),
                           optional=True, role="child chair"))
     return ctx.put(items, wall_poses(

@@ -30,7 +30,7 @@ def desk(ctx: Context) -> list[Thing] | None:
         w, d = asset.size[:2]
         items = [
             Item(asset, 0.0, -d / 2, role="desk"),
-            Item(chair, wobble(ctx.rng, 5), -d - chair.size[1] / 2 + 0.07, math.pi + wobble(ctx.rng, 25), under=(0,),
+            Item(chair, wobble(ctx.rng, 5), -d - chair.size[1] / 2 - 0.03, math.pi + wobble(ctx.rng, 20), under=(0,),
                  clear=-0.2, role="desk chair"),
         ]
         computer = ctx.pick("laptop") if ctx.chance(0.75) else ctx.pick("computer", most=(0.6, 0.5, 0.6))

@@ -102,8 +102,9 @@ class Tops:
             return thing
         return None
 
-    def allows(self, asset: Asset) -> bool:
-        return self.alike[asset.object_class] < MOST_ALIKE.get(asset.object_class, 2)
+    def allows(self, asset: Asset, most: int = 2) -> bool:
+        """Whether the room may hold one more of its class, of which `most` are few."""
+        return self.alike[asset.object_class] < max(MOST_ALIKE.get(asset.object_class, 2), most)
 
 
 def _reach(size: tuple[float, float, float], yaw: float) -> tuple[float, float]:
@@ -229,17 +230,21 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
     bookish = ctx.kind not in ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
     kx, ky, kz = (a / b for a, b in zip(thing.size, thing.asset.size))
     for board in boards:
-        if books is not None and bookish and ctx.chance(0.8):
+        if books is not None and bookish and board.headroom < 0.45 and ctx.chance(0.8):
             _book_row(tops, thing, board, ctx.pick("row of books", avoid=()), (kx, ky, kz))
         if bookish:
             count, share = int(ctx.rng.integers(1, 4)), 0.75 * density
         else:  # storage is there to be filled
-            count, share = 2 + int(ctx.rng.integers(3) + 3 * (board.x1 - board.x0)), 0.9
+            count, share = 3 + int(ctx.rng.integers(3) + 3 * (board.x1 - board.x0)), 0.95
         for _ in range(count):
             if not ctx.chance(share):
                 continue
-            asset = _resident(tops, thing, board)
-            tops.put(asset, thing, board, "any", 0.3, tries=5)
+            asset, size = None, None
+            if not bookish and ctx.chance(0.4):
+                asset, size = _box_for(ctx, board, (kx, ky, kz))
+            if asset is None:
+                asset = _resident(tops, thing, board, 2 if bookish else 5)
+            tops.put(asset, thing, board, "any", 0.2, size=size, tries=5)
 
 
 SHELVES = ("bookcase", "shelving unit", "wall unit", "storage shelf", "open wall shelf", "clothes rack", "cupboard",
@@ -265,8 +270,18 @@ def _book_row(tops: Tops, thing: Thing, board: SupportSurface, books: Asset, sca
     tops.put(books, thing, at, "centre", 0.0, size=(w, d, h), tries=2)
 
 
-def _resident(tops: Tops, thing: Thing, board: SupportSurface) -> Asset | None:
-    """Something that is kept on such a board in such a room."""
+def _box_for(ctx: Context, board: SupportSurface, scale) -> tuple[Asset | None, tuple[float, float, float] | None]:
+    """A box or basket for a board of a storage shelf, somewhat smaller than its model where it must be."""
+    asset = ctx.pick("storage box" if ctx.chance(0.5) else "box", avoid=())
+    if asset is None:
+        return None, None
+    room = ((board.x1 - board.x0) * scale[0], (board.y1 - board.y0) * scale[1], board.headroom * scale[2])
+    shrink = min(1.0, *(0.92 * r / s for r, s in zip(room, asset.size)))
+    return (asset, tuple(shrink * s for s in asset.size)) if shrink > 0.55 else (None, None)
+
+
+def _resident(tops: Tops, thing: Thing, board: SupportSurface, most_alike: int) -> Asset | None:
+    """Something that is kept on such a board in such a room, of which there are fewer than `most_alike`."""
     ctx = tops.ctx
     most = ((board.x1 - board.x0) * 0.8, board.y1 - board.y0, board.headroom - 0.01)
     fitting = [(a, w) for a, w in resting_on(ctx, thing.asset.object_class)
@@ -274,11 +289,11 @@ def _resident(tops: Tops, thing: Thing, board: SupportSurface) -> Asset | None:
     if fitting and ctx.chance(0.45):
         weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in fitting])
         asset = fitting[int(ctx.rng.choice(len(fitting), p=weights / weights.sum()))][0]
-        return asset if tops.allows(asset) else None
+        return asset if tops.allows(asset, most_alike) else None
     roles = CLUTTER.get(ctx.kind) or CLUTTER["any"]
     role = roles[int(ctx.rng.integers(len(roles)))]
     asset = ctx.pick(role, most=most)
-    return asset if asset is not None and tops.allows(asset) else None
+    return asset if asset is not None and tops.allows(asset, most_alike) else None
 
 
 def _more(tops: Tops, thing: Thing, density: float) -> None:
