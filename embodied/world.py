@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
 from tqdm import tqdm
 
 from assets.cache import digest
@@ -111,14 +110,16 @@ class World:
 
             return light.bake(self.house, self.catalogue, self.cache, self.light, progress=tell)
 
-    def _draw(self, position: np.ndarray) -> Panorama:
+    @property
+    def _source(self) -> Renderer | Tracer:
+        """What draws the panoramas."""
         if self.quality not in TRACED:
-            return self.renderer.panorama(position)
+            return self.renderer
         if self._tracer is None:
             from embodied.light.reference import Tracer  # late: loads the path tracer
 
             self._tracer = Tracer(self._bake, self.house, quality=self.quality, size=self.size)
-        return self._tracer.panorama(position)
+        return self._tracer
 
     def panorama(self, node: int) -> Panorama:
         """The panorama of a node: from the file where it is there, else drawn now."""
@@ -167,11 +168,12 @@ class World:
 
     def _load(self, node: int) -> Panorama:
         file = self._open_file()
-        return self._draw(self.graph.positions[node]) if file is None else file.read(node)
+        return self._source.panorama(self.graph.positions[node]) if file is None else file.read(node)
 
     def _draw_all(self, progress: bool) -> Iterator[Panorama]:
+        source = self._source
         for position in tqdm(self.graph.positions, "panoramas", disable=not progress, unit="node"):
-            yield self._draw(position)
+            yield source.panorama(position)
 
     def _open_file(self) -> PanoramaFile | None:
         """The panorama file, if it is whole and of this very world."""
