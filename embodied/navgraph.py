@@ -23,9 +23,9 @@ CELL = 0.1
 """Grid on which viewpoints are chosen, metres."""
 ENTERED = 0.4
 """Share of a room's free floor that must be reachable for the room to count as entered."""
-APART = 0.8
+APART = 0.85
 """Least distance between viewpoints of one room, in units of the wanted spacing."""
-LOOKS = 16
+LOOKS = 48
 """Candidates per viewpoint whose views of the others are compared."""
 CROWDED = 0.75
 """Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
@@ -243,9 +243,9 @@ def _seen(space, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: floa
         return np.zeros(len(cells))
     xy, others = grid.xy[cells], grid.xy[chosen]
     d = np.hypot(*(xy[:, None] - others[None]).transpose(2, 0, 1))
-    i, j = np.nonzero((d > 0.6 * spacing) & (d < 2.0 * spacing))
+    i, j = np.nonzero((d > 0.6 * spacing) & (d < 2.2 * spacing))
     ok = shapely.covers(space, shapely.linestrings(np.stack([xy[i], others[j]], 1))) if len(i) else np.zeros(0, bool)
-    return np.bincount(i[ok], minlength=len(cells)).astype(float)
+    return np.bincount(i[ok], np.minimum(d[i[ok], j[ok]] / spacing, 1.3), minlength=len(cells))
 
 
 def _thinned(space, grid: Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
