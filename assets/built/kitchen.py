@@ -48,7 +48,7 @@ def _base(
     size, look: Look, finish: FinishOf, doors: list[Shape], grips: list[Shape], top: list[Shape] | None, extra=()
 ) -> list[MeshPart]:
     w, d, h = size
-    body = carcass(-w / 2, w / 2, -d / 2 + 0.022, d / 2, PLINTH[0], h - TOP)
+    body = carcass(-w / 2, w / 2, -d / 2 + 0.022, d / 2, PLINTH[0], h - TOP, top=top is None)
     plinth = box([-w / 2, -d / 2 + 0.022 + PLINTH[1], 0], [w / 2, -d / 2 + 0.04 + PLINTH[1], PLINTH[0]])
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)] if top is None else top
     return parts_of(

@@ -199,15 +199,24 @@ def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = Fal
 
 
 def carcass(
-    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, board: float = 0.018, back: bool = True
+    x0: float,
+    x1: float,
+    y0: float,
+    y1: float,
+    z0: float,
+    z1: float,
+    board: float = 0.018,
+    back: bool = True,
+    top: bool = True,
 ) -> Shape:
-    """Open-fronted box: two sides, bottom, top, back."""
+    """Open-fronted box: two sides, bottom, and unless told otherwise top and back."""
     shapes = [
         box([x0, y0, z0], [x0 + board, y1, z1], 0.001),
         box([x1 - board, y0, z0], [x1, y1, z1], 0.001),
         box([x0 + board, y0, z0], [x1 - board, y1, z0 + board], 0.001),
-        box([x0 + board, y0, z1 - board], [x1 - board, y1, z1], 0.001),
     ]
+    if top:
+        shapes.append(box([x0 + board, y0, z1 - board], [x1 - board, y1, z1], 0.001))
     if back:
         shapes.append(box([x0 + board, y1 - 0.006, z0 + board], [x1 - board, y1, z1 - board]))
     return joined(*shapes)

@@ -214,7 +214,7 @@ def alarm_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     disc = moved(turned(cylinder(r * 0.9, 0, 0.001, 0, 32), np.pi / 2, "x"), 0, d * 0.4 - d * 0.71, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
     bells = [
-        moved(turned(scaled(ball(r * 0.34, 14, 9), 1, 1, 0.75), s * 0.5, "y"), s * r * 0.55, 0, h - r * 0.28)
+        moved(turned(scaled(ball(r * 0.34, 14, 9), 1, 1, 0.75), s * 0.5, "y"), s * r * 0.55, 0, zc + r * 0.98)
         for s in (-1, 1)
     ]
     feet = [tube([(s * r * 0.5, 0, zc - r * 0.7), (s * r * 0.75, 0, 0)], [0.004, 0.006], 7) for s in (-1, 1)]

@@ -250,7 +250,7 @@ def _tiles() -> list[Material]:
                 wall,
                 gloss=0.07,
                 bevel=0.006,
-                tone=0.03,
+                tone=0.018,
                 waviness=1.5e-4,
             )
         )
@@ -376,13 +376,13 @@ def _tiles() -> list[Material]:
             "green slate tiles",
             ("green",),
             ("slate", "stone"),
-            1.6,
-            partial(grid, columns=4, rows=4),
+            2.4,
+            partial(grid, columns=6, rows=6),
             mineral.slate((0.32, 0.36, 0.33)),
             ground,
             gloss=0.55,
             joint=0.005,
-            tone=0.07,
+            tone=0.045,
             grout=(0.45, 0.45, 0.42),
         )
     )

@@ -280,9 +280,9 @@ def _stones() -> list[Material]:
                 f"{name} stone wall",
                 (name,),
                 ("stone",),
-                1.8,
+                2.2,
                 1024,
-                partial(m.rubble, base=c),
+                partial(m.rubble, base=c, across=6),
                 0.2,
             )
         )

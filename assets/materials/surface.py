@@ -33,7 +33,9 @@ def gloss_paint(n: int, tile: float, color, rough: float = 0.35, *, rng: np.rand
     )
 
 
-def plaster(n: int, tile: float, color, relief: float = 1.0, mottle: float = 0.02, *, rng: np.random.Generator) -> Maps:
+def plaster(
+    n: int, tile: float, color, relief: float = 1.0, mottle: float = 0.009, *, rng: np.random.Generator
+) -> Maps:
     """Trowelled lime plaster or roughcast: sweeps, grain, soft clouds."""
     sweep = fbm(n, 5, 90, 1.2, 1.6, rng=rng)
     grain = noise(n, 1.6, 1.6, rng=rng)
