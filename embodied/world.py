@@ -102,12 +102,9 @@ class World:
     def _bake(self) -> Bake:
         from embodied import light  # late: loads the path tracer
 
-        with tqdm(total=1.0, disable=not self._progress, bar_format="light: {desc} {percentage:3.0f}% [{elapsed}]") as bar:
-            def tell(stage: str, done: float) -> None:
-                bar.set_description_str(stage, refresh=False)
-                bar.n = round(done, 2)
-                bar.refresh()
-
+        if not self._progress:
+            return light.bake(self.house, self.catalogue, self.cache, self.light)
+        with light.progress_bar() as tell:
             return light.bake(self.house, self.catalogue, self.cache, self.light, progress=tell)
 
     @property
