@@ -26,11 +26,16 @@ from assets.rows import CatalogueError, check_classes, read_json, read_models
 
 DATA = Path(__file__).parent / "data"
 
+
 class Catalogue:
     """All assets by key, and their meshes on demand."""
 
     def __init__(
-        self, assets: Mapping[str, Asset], recipes: Mapping[str, Recipe], cache: Path, packs: Sequence[Path] = (),
+        self,
+        assets: Mapping[str, Asset],
+        recipes: Mapping[str, Recipe],
+        cache: Path,
+        packs: Sequence[Path] = (),
         own: Mapping[str, OwnModel] = MappingProxyType({}),
     ):
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
@@ -84,8 +89,9 @@ class Catalogue:
         recipe = self._recipes[key]
         if key in self._own:
             return import_own(self._own[key], recipe, self.cache)
-        pack = pack_of(key, self.packs)
-        return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[key].rotation), self.cache)
+        model = recipe.model or key
+        pack = pack_of(model, self.packs)
+        return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[model].rotation), self.cache)
 
     def _scale(self, key: str, size: tuple[float, float, float], params: tuple) -> tuple[MeshPart, ...]:
         if key not in self._recipes:
@@ -115,7 +121,7 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
     for folder in own:
         more, more_recipes, more_models = read_own(Path(folder), classes)
         if twice := sorted(set(more) & set(assets)):
-            raise CatalogueError(f"{folder} has the keys {twice}, which are taken; give it another \"pack\" name")
+            raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
     return Catalogue(assets, recipes, cache or default_cache(), packs, models)
 

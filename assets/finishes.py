@@ -13,11 +13,13 @@ from assets.records import Finish
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
 METAL = re.compile(
     r"metal|chrom|steel|inox|alumin|\balu\b|brass|bronze|copper|gold|silver|iron|nickel|acero|laton|hierro|"
-    r"cromo|zinc|platin", re.IGNORECASE,
+    r"cromo|zinc|platin",
+    re.IGNORECASE,
 )
 CLOTH = re.compile(
     r"cloth|fabric|tissu|tela|textil|cushion|pillow|almohad|coj[ií]n|sheet|sabana|blanket|towel|toalla|carpet|"
-    r"wool|cotton|mattress|colch|coussin|drap|matelas|rug|felt|velvet|shirt|pants|jean|hair|skin|curtain", re.IGNORECASE,
+    r"wool|cotton|mattress|colch|coussin|drap|matelas|rug|felt|velvet|shirt|pants|jean|hair|skin|curtain",
+    re.IGNORECASE,
 )
 GLASS = re.compile(r"glass|vidrio|cristal|verre|glas\b|crystal", re.IGNORECASE)
 SHINY = re.compile(r"ceramic|porcelain|enamel|lacquer|varnish|gloss|plastic|acryl|leather|cuero|cuir", re.IGNORECASE)
@@ -54,8 +56,12 @@ def finish_of(material: Material, has_texture: bool) -> Finish:
             alpha = min(alpha, 0.35)
     elif SHINY.search(name):
         roughness = min(roughness, 0.4)
-    return Finish((*(round(float(c), 4) for c in color), round(max(alpha, 0.1), 3)), roughness=round(roughness, 3),
-                  metallic=metallic, specular=specular)
+    return Finish(
+        (*(round(float(c), 4) for c in color), round(max(alpha, 0.1), 3)),
+        roughness=round(roughness, 3),
+        metallic=metallic,
+        specular=specular,
+    )
 
 
 LOOKS = {
@@ -89,7 +95,7 @@ def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
             change = dict(LOOKS[word])
             keep = keep and "color" not in change
         elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
-            rgb = [int(word[i:i + 2], 16) / 255 for i in (1, 3, 5)]
+            rgb = [int(word[i : i + 2], 16) / 255 for i in (1, 3, 5)]
             change = {"color": (*(round(min(c, WHITEST), 4) for c in rgb), finish.color[3])}
             keep = False
         elif re.fullmatch(r"alpha=[0-9.]+", word):

@@ -56,6 +56,8 @@ class Recipe:
     """Material and the reviewer's words for it (assets.finishes.corrected)."""
     faces: int = 0
     """Face budget; 0 takes FACE_BUDGETS."""
+    model: str = ""
+    """The model that this one is a variant of, where it is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class RawPart:
 def import_model(pack: Pack, recipe: Recipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
     """The parts of a library's model (the OBJ entry `obj`, that of the recipe's key if None), from
     the cache if it is there and sound."""
-    obj = obj or pack.entries[recipe.key].model
+    obj = obj or pack.entries[recipe.model or recipe.key].model
     return cached(recipe, pack.digest, cache, lambda: read_obj(pack.read, obj, f"{pack.path.name}: {obj}"))
 
 
@@ -87,7 +89,8 @@ def cached(recipe: Recipe, source: str, cache: Path, read: Callable[[], tuple[Ra
       source: digest of the pack or file that `read` reads.
     """
     folder = Path(cache) / "assets" / source[:16]
-    stem = recipe.key.replace("/", "__") + "-" + digest(VERSION, asdict(recipe))[:12]
+    told = {k: v for k, v in asdict(recipe).items() if k != "model" or v}
+    stem = recipe.key.replace("/", "__") + "-" + digest(VERSION, told)[:12]
     parts = _load(folder, stem)
     if parts is None:
         _save(folder, stem, finish_parts(read(), recipe))
@@ -156,7 +159,9 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPar
         if total > budget and len(faces) > 40:
             points, faces, uv = decimate(points, faces, uv, max(40, round(len(faces) * budget / total)))
         if part.name in recipe.two_sided or "*" in recipe.two_sided:
-            out.append(_part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe))
+            out.append(
+                _part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe)
+            )
         out.append(_part(part, points, faces, uv, recipe))
     return _to_size(out, recipe.size)
 
@@ -292,5 +297,3 @@ def scaled(parts: tuple[MeshPart, ...], ratio: tuple[float, float, float]) -> tu
 def bounds(parts: tuple[MeshPart, ...]) -> np.ndarray:
     """(2, 3) lowest and highest corner, metres."""
     return np.array([np.min([p.vertices.min(0) for p in parts], 0), np.max([p.vertices.max(0) for p in parts], 0)])
-
-

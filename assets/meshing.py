@@ -30,7 +30,9 @@ def weld(vertices: np.ndarray, faces: np.ndarray, tolerance: float) -> tuple[np.
 def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(m,) bool: False for slivers without area and for repeats of an earlier face (same winding)."""
     area = np.linalg.norm(face_normals(vertices, faces), axis=1)
-    longest = np.max([np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0)
+    longest = np.max(
+        [np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0
+    )
     keep = area > 1e-6 * np.maximum(longest, 1e-9) ** 2
     start = np.argmin(faces, axis=1)
     turned = np.take_along_axis(faces, (start[:, None] + [0, 1, 2]) % 3, axis=1)
@@ -55,7 +57,9 @@ def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREA
     counts = np.bincount(corner_vertex, minlength=len(vertices))
     starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
     mine = np.repeat(np.arange(len(corner_vertex)), counts[corner_vertex])
-    rank = np.arange(len(mine)) - np.repeat(np.cumsum(counts[corner_vertex]) - counts[corner_vertex], counts[corner_vertex])
+    rank = np.arange(len(mine)) - np.repeat(
+        np.cumsum(counts[corner_vertex]) - counts[corner_vertex], counts[corner_vertex]
+    )
     other = order[starts[corner_vertex[mine]] + rank]
     cosine = np.einsum("ij,ij->i", unit[corner_face[mine]], unit[corner_face[other]])
     smooth = cosine > np.cos(crease)
@@ -106,8 +110,12 @@ def _collapse(vertices, faces, fins, fin_faces, target: int, keep_rims: bool) ->
     fenced = np.concatenate([vertices, fins]) * (WORKING_SIZE / extent)
     fenced_faces = np.concatenate([faces, fin_faces]).astype(np.int32)
     _, _, collapses = fast_simplification.simplify(
-        fenced, fenced_faces, target_count=round(target * len(fenced_faces) / len(faces)), agg=AGGRESSIVENESS,
-        return_collapses=True, preserve_border=keep_rims,
+        fenced,
+        fenced_faces,
+        target_count=round(target * len(fenced_faces) / len(faces)),
+        agg=AGGRESSIVENESS,
+        return_collapses=True,
+        preserve_border=keep_rims,
     )
     points, _, image = fast_simplification.replay_simplification(fenced, fenced_faces, collapses)
     image = np.asarray(image, dtype=np.int64)[: len(vertices)]
@@ -166,9 +174,9 @@ def project_uv(vertices, faces, uv, points, small) -> np.ndarray:
     source = rows[tree.query(query.reshape(-1, 6))[1]]
     out = _affine_uv(vertices[faces[source]], uv[source], corners.reshape(-1, 3)).reshape(-1, 3, 2)
     middle = rows[tree.query(np.concatenate([centre[:, 0], 0.1 * size * own], axis=1))[1]]
-    whole = _affine_uv(
-        vertices[faces[np.repeat(middle, 3)]], uv[np.repeat(middle, 3)], corners.reshape(-1, 3)
-    ).reshape(-1, 3, 2)
+    whole = _affine_uv(vertices[faces[np.repeat(middle, 3)]], uv[np.repeat(middle, 3)], corners.reshape(-1, 3)).reshape(
+        -1, 3, 2
+    )
     torn = np.ptp(out, axis=1).max(axis=1) > 3.0 * np.ptp(whole, axis=1).max(axis=1) + 0.02
     out[torn] = whole[torn]
     return out

@@ -80,9 +80,7 @@ def parse_obj(text: str, where: str) -> Obj:
             libraries.append(rest.strip())
     points = _numbers(vertices, 3, where)
     coords = _numbers(uvs, 2, where)
-    groups = tuple(
-        _group(name, polygons, points, len(coords), where) for name, polygons in faces.items() if polygons
-    )
+    groups = tuple(_group(name, polygons, points, len(coords), where) for name, polygons in faces.items() if polygons)
     groups = tuple(g for g in groups if len(g.corners))
     if not groups:
         raise MeshError(f"{where} has no faces; the model is empty or damaged")

@@ -50,6 +50,9 @@ def read_own(
     rows, own = {}, {}
     for name, row in models.items():
         key, row = f"{pack}/{name}", dict(row)
+        if row.get("of") in models:
+            base = models[row["of"]]
+            row = {"file": base.get("file"), "model": base.get("model", ""), **row, "of": f"{pack}/{row['of']}"}
         own[key] = _model(folder, str(path), name, row.pop("file", None), row.pop("model", ""))
         row.setdefault("creator", body.get("creator", ""))
         if own[key].entry and "size" not in row:
@@ -105,7 +108,8 @@ def _glb_part(path: Path, i: int, mesh: trimesh.Trimesh) -> RawPart:
         image, corner_uv = None, None
     rough, metal = (getattr(material, f, None) for f in ("roughnessFactor", "metallicFactor"))
     finish = Finish(
-        tuple(round(float(c), 4) for c in color), roughness=0.7 if rough is None else float(rough),
+        tuple(round(float(c), 4) for c in color),
+        roughness=0.7 if rough is None else float(rough),
         metallic=0.0 if metal is None else float(metal),
     )
     return RawPart(name, vertices, faces, corner_uv, finish, image)
@@ -132,7 +136,9 @@ def _model(folder: Path, where: str, name: str, file: object, entry: str) -> Own
     if path.suffix.lower() == ".sh3f":
         entries = open_pack(path).entries
         if entry not in entries:
-            raise CatalogueError(f"{where}: model {name!r} should have a \"model\" out of {sorted(entries)}, got {entry!r}")
+            raise CatalogueError(
+                f'{where}: model {name!r} should have a "model" out of {sorted(entries)}, got {entry!r}'
+            )
         return OwnModel(path, entry)
     return OwnModel(path)
 

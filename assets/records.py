@@ -8,10 +8,29 @@ from dataclasses import dataclass, field
 import numpy as np
 
 ROOM_KINDS = (
-    "living_room", "kitchen", "dining_room", "main_bedroom", "bedroom", "kids_room",
-    "guest_room", "bathroom", "toilet", "hall", "corridor", "study", "laundry_room",
-    "pantry", "closet", "library", "playroom", "gym", "garage", "family_room",
-    "sun_room", "workshop", "stairwell",
+    "living_room",
+    "kitchen",
+    "dining_room",
+    "main_bedroom",
+    "bedroom",
+    "kids_room",
+    "guest_room",
+    "bathroom",
+    "toilet",
+    "hall",
+    "corridor",
+    "study",
+    "laundry_room",
+    "pantry",
+    "closet",
+    "library",
+    "playroom",
+    "gym",
+    "garage",
+    "family_room",
+    "sun_room",
+    "workshop",
+    "stairwell",
 )
 """Every room kind a house may hold; catalogue weights and generators use these keys only."""
 

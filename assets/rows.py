@@ -3,20 +3,41 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-
-import numpy as np
 
 from assets.importer import Recipe
 from assets.records import ROOM_KINDS, SUPPORTS, Asset, SupportSurface
 
 CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
 MODEL_FIELDS = (
-    "class", "name", "size", "support", "rooms", "synonyms", "on", "clearance", "tags", "elevation",
-    "colours", "materials", "surfaces", "emits", "yaw", "creator", "licence", "lamp",
-    "glow", "two_sided", "flipped", "dropped", "looks", "faces",
+    "class",
+    "name",
+    "size",
+    "support",
+    "rooms",
+    "synonyms",
+    "on",
+    "clearance",
+    "tags",
+    "elevation",
+    "colours",
+    "materials",
+    "surfaces",
+    "emits",
+    "yaw",
+    "creator",
+    "licence",
+    "lamp",
+    "glow",
+    "two_sided",
+    "flipped",
+    "dropped",
+    "looks",
+    "faces",
+    "of",
 )
 """What a line of catalogue.json may hold; the last row and `yaw` go into the importer's Recipe."""
 
@@ -61,6 +82,8 @@ def read_models(
     for key, row in rows.items():
         where = f"{file}: model {key!r}"
         _check_row(where, row, MODEL_FIELDS)
+        if "of" in row:
+            row = _variant(where, row, rows)
         if row.get("class") not in classes:
             raise CatalogueError(f"{where} has the unknown class {row.get('class')!r}; use one of data/classes.json")
         pack = packs.get(key.split("/")[0], {})
@@ -69,23 +92,43 @@ def read_models(
     return assets, recipes
 
 
+def _variant(where: str, row: Mapping, rows: Mapping[str, dict]) -> dict:
+    """`row` filled up from the model it is a variant of; surfaces and lamp follow its size."""
+    base = rows.get(row["of"])
+    if base is None or "of" in base:
+        raise CatalogueError(f"{where} should be a variant `of` a model in the same file, got {row['of']!r}")
+    _check_row(where, base, MODEL_FIELDS)
+    merged = {**base, **row, "looks": {**base.get("looks", {}), **row.get("looks", {})}}
+    x, y, z = (n / o for n, o in zip(_size(where, merged), _size(where, base)))
+    merged["surfaces"] = row.get("surfaces") or [
+        [s[0], *(round(v * f, 4) for v, f in zip(s[1:6], (z, x, y, x, y))), s[6] if s[6] >= 9 else round(s[6] * z, 4)]
+        for s in base.get("surfaces", ())
+    ]
+    if base.get("lamp"):
+        merged["lamp"] = row.get("lamp") or [v * f for v, f in zip(base["lamp"], (x, y, z))]
+    return merged
+
+
 def _recipe(asset: Asset, row: Mapping) -> Recipe:
     lists = {name: tuple(row.get(name, ())) for name in ("two_sided", "flipped", "glow", "dropped")}
     return Recipe(
-        asset.key, asset.size, yaw=float(row.get("yaw", 0.0)), emits=asset.emits, faces=int(row.get("faces", 0)),
-        looks=tuple(sorted(row.get("looks", {}).items())), **lists,
+        asset.key,
+        asset.size,
+        yaw=float(row.get("yaw", 0.0)),
+        emits=asset.emits,
+        faces=int(row.get("faces", 0)),
+        looks=tuple(sorted(row.get("looks", {}).items())),
+        model=row.get("of", ""),
+        **lists,
     )
 
 
 def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -> Asset:
-    size = row.get("size")
-    if not isinstance(size, list) or len(size) != 3 or not all(np.isfinite(s) and 0 < s < 30 for s in size):
-        raise CatalogueError(f"{where} should have a size of three lengths in metres, got {size!r}")
     return Asset(
         key=key,
         object_class=row["class"],
         name=row.get("name", row["class"]),
-        size=tuple(float(s) for s in size),
+        size=_size(where, row),
         support=row["support"],
         rooms=MappingProxyType({k: float(row["rooms"][k]) for k in ROOM_KINDS if k in row.get("rooms", {})}),
         synonyms=tuple(row.get("synonyms", ())),
@@ -102,6 +145,16 @@ def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -
         creator=row.get("creator", ""),
         licence=row.get("licence", pack.get("licence", "")),
     )
+
+
+def _size(where: str, row: Mapping) -> tuple[float, float, float]:
+    size = row.get("size")
+    if (
+        not isinstance(size, list) or len(size) != 3
+        or not all(isinstance(s, (int, float)) and math.isfinite(s) and 0 < s < 30 for s in size)
+    ):
+        raise CatalogueError(f"{where} should have a size of three lengths in metres, got {size!r}")
+    return float(size[0]), float(size[1]), float(size[2])
 
 
 def _check_row(where: str, row: object, fields: tuple[str, ...]) -> None:

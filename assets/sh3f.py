@@ -181,9 +181,15 @@ def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Ent
         if len(rotation) != 9 or not all(math.isfinite(x) for x in rotation):
             raise PackError(f"{where} should have a modelRotation of nine numbers, got {row['modelRotation']!r}")
     return Entry(
-        key=key_of(model), name=row.get("name", ""), model=model, size=(width, depth, height),
-        elevation=_number(where, row, "elevation", 0.0) / 100.0, rotation=rotation,
-        category=row.get("category", ""), creator=row.get("creator", ""), licence=row.get("license", licence),
+        key=key_of(model),
+        name=row.get("name", ""),
+        model=model,
+        size=(width, depth, height),
+        elevation=_number(where, row, "elevation", 0.0) / 100.0,
+        rotation=rotation,
+        category=row.get("category", ""),
+        creator=row.get("creator", ""),
+        licence=row.get("license", licence),
         tags=tuple(t.strip() for t in row.get("tags", "").split(",") if t.strip()),
         lights=_lights(row, (width, depth, height)),
     )

@@ -68,11 +68,17 @@ def find_surfaces(parts: Sequence[MeshPart], step: float = 0.01, limit: int = 12
             for i0, j0, i1, j1 in _rectangles(free, step):
                 inside = chosen & (line // len(ys) >= i0) & (line // len(ys) < i1)
                 inside &= (line % len(ys) >= j0) & (line % len(ys) < j1)
-                found.append(SupportSurface(
-                    "", float(np.median(z[inside])), float(low[0] + i0 * step + 0.002), float(low[1] + j0 * step + 0.002),
-                    float(min(low[0] + i1 * step, high[0]) - 0.002), float(min(low[1] + j1 * step, high[1]) - 0.002),
-                    float(room[inside].min()),
-                ))
+                found.append(
+                    SupportSurface(
+                        "",
+                        float(np.median(z[inside])),
+                        float(low[0] + i0 * step + 0.002),
+                        float(low[1] + j0 * step + 0.002),
+                        float(min(low[0] + i1 * step, high[0]) - 0.002),
+                        float(min(low[1] + j1 * step, high[1]) - 0.002),
+                        float(room[inside].min()),
+                    )
+                )
                 chosen &= ~inside
     found = [s for s in found if s.headroom == OPEN or reach(parts, s) > 0.6]
     found = sorted(found, key=lambda s: -(s.x1 - s.x0) * (s.y1 - s.y0))[:limit]
@@ -120,7 +126,7 @@ def _above(line: np.ndarray, z: np.ndarray, nz: np.ndarray) -> tuple[np.ndarray,
     sheet = np.append(pair, False) | np.insert(pair, 0, False)
     for k in range(1, 60):
         same = np.zeros(len(z), dtype=bool)
-        same[:-k or None] = line[k:] == line[:-k]
+        same[: -k or None] = line[k:] == line[:-k]
         if not same.any():
             break
         gap = np.zeros(len(z))
@@ -142,8 +148,8 @@ def _levels(z: np.ndarray, cell: float) -> list[float]:
         best = int(np.argmax(last - first))
         if (last[best] - first[best]) * cell < MIN_AREA:
             break
-        levels.append(float(np.median(left[first[best]:last[best]])))
-        left = np.concatenate([left[:first[best]], left[last[best]:]])
+        levels.append(float(np.median(left[first[best] : last[best]])))
+        left = np.concatenate([left[: first[best]], left[last[best] :]])
     return levels
 
 

@@ -23,7 +23,7 @@ from assets.surfaces import contact, find_surfaces
 
 SOME = (
     "scopia/bed1", "blendswap-cc-0/oakTable", "blendswap-cc-by/bookcase", "scopia/tubular_chair", "scopia/toaster",
-    "katorlegaz/office-chair", "blendswap-cc-by/beer_bottle", "scopia/saloon_lamp",
+    "katorlegaz/office-chair", "blendswap-cc-by/beer_bottle", "scopia/saloon_lamp", "scopia/table4+console",
 )
 """A handful of models to import; every one would take minutes."""
 
@@ -95,7 +95,7 @@ def test_surfaces_lie_within_their_model():
 def test_every_model_of_the_packs_is_used_or_excluded_for_a_reason(catalogue):
     excluded = json.loads((DATA / "excluded.json").read_text())
     known = {key for path in find_packs() for key in open_pack(path).entries}
-    used = {k for k in catalogue.assets if not k.startswith("built/")}
+    used = {k.split("+")[0] for k in catalogue.assets if not k.startswith("built/")}
     assert not used & set(excluded)
     assert used | set(excluded) == known
     assert all(reason for reason in excluded.values())
@@ -105,7 +105,7 @@ def test_attribution_names_every_maker(catalogue):
     text = attribution(catalogue)
     for a in catalogue.assets.values():
         if not a.key.startswith("built/"):
-            assert a.creator in text and a.key.split("/", 1)[1] in text
+            assert a.creator in text and a.key.split("/", 1)[1].split("+")[0] in text
 
 
 def test_attribution_file_is_up_to_date(catalogue):
@@ -285,11 +285,25 @@ def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
     assert catalogue.assets["mine/a"].creator == "Me" and catalogue.assets["mine/a"].licence == "CC0-1.0"
 
 
+def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
+    base = {"file": "a.obj", "class": "side table", "size": [0.4, 0.3, 0.2], "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]]}
+    red = {"of": "a", "class": "coffee table", "size": [0.8, 0.3, 0.1], "looks": {"": "#ff0000"}}
+    own = write_own(tmp_path / "own", {"a": base, "red": red})
+    (own / "a.obj").write_text(CUBE)
+    catalogue = load_catalogue(tmp_path, own=[own])
+    (part,) = catalogue.mesh("mine/red")
+    assert part.finish.color[:3] == (0.92, 0.0, 0.0) and catalogue.assets["mine/red"].object_class == "coffee table"
+    np.testing.assert_allclose(np.ptp(part.vertices, axis=0), (0.8, 0.3, 0.1), atol=1e-5)
+    (top,) = catalogue.assets["mine/red"].surfaces
+    assert (top.x0, top.x1, top.z) == pytest.approx((-0.4, 0.4, 0.1))
+
+
 @pytest.mark.parametrize(("row", "match"), [
     ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
     ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
     ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
     ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
+    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "of": "nothing"}, "variant"),
     ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
     ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "unknown support"),
     ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
