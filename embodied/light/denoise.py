@@ -15,14 +15,13 @@ from scipy.spatial import cKDTree
 from embodied.light.atlas import Atlas, Texels
 from embodied.light.backend import array, constant, mitsuba, vector
 
-STEPS = (1, 2, 4, 8)
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 """B3 spline, as in Dammertz et al."""
 
 
 def smooth_pages(
     e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
-    steps: Sequence[int] = STEPS, likeness: float = 0.25,
+    steps: Sequence[int] = (1, 2, 4, 8, 16), likeness: Sequence[float] = (3.0, 1.6, 0.9, 0.5, 0.3),
 ) -> np.ndarray:
     """A-trous smoothing within planes.
 
@@ -30,8 +29,8 @@ def smooth_pages(
       e: (n, 3) float32.
       good: (n,) bool, luxels whose value counts.
       chosen: (n,) bool, luxels to smooth.
-      likeness: standard deviation of log brightness that still counts as the same light; wider
-        in the first steps, when noise is still there, stricter in the coarse ones.
+      likeness: for each step, the standard deviation of log brightness that still counts as the
+        same light; wide while there is noise, stricter when edges are all that is left.
     """
     mi = mitsuba()
     import drjit as dr
@@ -41,12 +40,12 @@ def smooth_pages(
         return e
     trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
     out = np.array(e, np.float32)
-    for step in steps:
+    for step, like in zip(steps, likeness):
         values = mi.Float(out.ravel())
         own = dr.gather(mi.Color3f, values, grid.own)
         shade = dr.log(_brightness(own) + 1e-4)
         total, weight = mi.Color3f(0.0), mi.Float(0.0)
-        tight = constant(1.0 / (likeness * {1: 2.2, 2: 1.4}.get(step, 0.8)))
+        tight = constant(1.0 / like)
         for i, j, q, inside in grid.around(step):
             other = dr.gather(mi.Color3f, values, q, inside)
             far = (dr.log(_brightness(other) + 1e-4) - shade) * tight

@@ -265,8 +265,8 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
     mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e
     indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
-    indirect = space(denoise.smooth_pages(indirect, *on_page, steps=(1, 2, 4, 8, 16), likeness=0.35), 3, 0.8)
-    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4, 8), likeness=0.2), 2, 0.45)
+    indirect = space(denoise.smooth_pages(indirect, *on_page), 3, 1.2)
+    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=(0.9, 0.4, 0.2)), 2, 0.6)
     patches = mend(light.patches)
     total = direct + indirect + patches
     if soft.any():

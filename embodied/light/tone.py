@@ -17,8 +17,8 @@ from scipy.ndimage import map_coordinates
 from embodied.house import House
 from embodied.light.atlas import gamma
 
-TARGET = 0.8
-"""Linear value (before the curve) that a white sheet in a room's middle light is brought to."""
+TARGET = 0.9
+"""Linear value (before the curve) that a white sheet in a room's fuller light (70th percentile) is brought to."""
 ADAPT = 0.9
 """How far exposure follows a room's own light rather than the house's."""
 BALANCE = 0.62
@@ -27,7 +27,7 @@ BLEND = 0.45
 """Metres over which one room's gain turns into the next one's."""
 DARKEST = 2e-3
 """Light of a room (100 cd/m2) below which exposure follows no more: by moonlight rooms stay dark."""
-WHITE = 4.0
+WHITE = 5.0
 """Value that the curve brings to full white."""
 
 
@@ -76,7 +76,7 @@ def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> E
     """Set the gains.
 
     Args:
-      light: room id to (3,) middle e of its walls and floor.
+      light: room id to (3,) 70th percentile of e on its walls, floor and ceiling.
       outside: (3,) middle radiance of what windows show.
     """
     e = np.array([light[r.id] for r in house.rooms])
