@@ -89,7 +89,10 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
         name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups)
         for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
     }
-    for name, f in (("mistake repeat", metrics.mistake_repeats), ("request repeat", metrics.request_repeats)):
+    repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
+    if episodes[0].task.kind == "vnla":  # where turning on the spot is no mistake
+        del repeats["mistake repeat"]
+    for name, f in repeats.items():
         values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups)
     return Row(agent, split, seed, len(episodes), len(set(groups)), values)
 
