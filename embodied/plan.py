@@ -349,4 +349,6 @@ def _legend(sheet: _Sheet, house: House, titles: bool) -> None:
     if titles:
         floor = sum(house.floor(r).area for r in house.rooms)
         text = f"{house.name}  ·  {floor:.0f} m² floor  ·  seed {house.seed}"
+        while sheet.draw.textlength(text, font=face) > width - 1.0 * s and face.size > 7:
+            face = font(face.size - 1)
         sheet.draw.text((0.6 * s, 0.25 * s), text, font=face, fill=INK)

@@ -22,8 +22,9 @@ from embodied.generate.stages import Draft
 from embodied.house import DOORS, House, HouseError, Placement, Room, check
 from embodied.navgraph import unreachable_rooms
 from embodied.seeds import stream
+from embodied.walkable import inward
 
-SEEDS = 30
+SEEDS = 24
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 PRIVATE = (*BEDROOMS, "bathroom", "toilet", "closet", "pantry")
 
@@ -182,6 +183,15 @@ def test_asked_rooms_are_counted_as_in_advertisements():
         assert sum(r.kind not in minor for r in house.rooms) == rooms
     house = generate_house(12, HouseConfig(bedrooms=4), stages=BARE)
     assert sum(r.kind in BEDROOMS for r in house.rooms) == 4
+
+
+def test_living_rooms_mostly_look_south():
+    south = 0
+    for house in houses():
+        glass = [o for o in house.openings if o.rooms[1] is None and o.rooms[0].startswith("living_room")]
+        widest = max(glass, key=lambda o: math.dist(o.a, o.b) * (o.head - o.sill))
+        south += float(np.dot(-inward(house, widest), [-math.cos(house.sky.north), -math.sin(house.sky.north)])) > 0
+    assert south > 0.75 * SEEDS
 
 
 def test_palettes_use_known_materials_and_one_style_per_house():

@@ -18,9 +18,11 @@ from embodied.generate.furnish import furnish
 from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
 from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
+from embodied.geometry import wrap
 from embodied.house import House, HouseError, Room, Sky, Storey, check
 from embodied.navgraph import unreachable_rooms
 from embodied.seeds import stream
+from embodied.walkable import inward
 
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
@@ -114,16 +116,22 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
 
 def finishes(draft: Draft) -> Draft:
     """What every room wears, and the weather outside."""
-    sky = draw_sky(draft.config, stream(draft.seed, "house", "sky"))
+    sky = draw_sky(draft.config, draft.house, stream(draft.seed, "house", "sky"))
     house = dressed(draft.house, draft.palette, rng=stream(draft.seed, "house", "finishes"))
     return dataclasses.replace(draft, house=dataclasses.replace(house, sky=sky))
 
 
-def draw_sky(config: HouseConfig, rng) -> Sky:
-    """Daytime mostly; `config` may fix hour and weather."""
+def draw_sky(config: HouseConfig, house: House, rng: np.random.Generator) -> Sky:
+    """Daytime mostly, the living room's largest window more or less to the south; `config` may fix hour and weather."""
     hour = config.hour if config.hour is not None else round(float(rng.triangular(8.0, 12.0, 18.0)), 2)
     weather = config.weather or str(rng.choice(["clear", "hazy", "overcast"], p=[0.55, 0.25, 0.2]))
-    return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4))
+    living = [o for o in house.openings if o.rooms[1] is None and house.room_by_id[o.rooms[0]].kind == "living_room"]
+    if not living:
+        return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4))
+    widest = max(living, key=lambda o: (math.dist(o.a, o.b) * (o.head - o.sill), o.id))
+    into = inward(house, widest)
+    north = math.atan2(into[1], into[0]) + float(rng.normal(0, 0.8))
+    return Sky(hour, weather, round(float(wrap(north)), 4))
 
 
 def furnishing(draft: Draft) -> Draft:
