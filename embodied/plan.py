@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import math
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
 
+from assets.cache import write_bytes
 from embodied.geometry import rectangle
 from embodied.house import House, Opening, Placement, Room
 
@@ -69,8 +71,10 @@ def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, 
 
 
 def save_plan(house: House, path: Path, **options) -> None:
-    """Write the plan of the ground floor as a PNG; options as for `draw_plan`."""
-    draw_plan(house, **options).save(path, format="PNG")
+    """Write the plan of the ground floor as a PNG, atomically; options as for `draw_plan`."""
+    data = io.BytesIO()
+    draw_plan(house, **options).save(data, format="PNG")
+    write_bytes(Path(path), data.getvalue())
 
 
 def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
