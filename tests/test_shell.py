@@ -160,6 +160,20 @@ def test_floors_and_ceilings_have_the_area_of_the_room_less_the_stair_well(house
             assert got == pytest.approx(house.floor(room).area - missing * well, abs=1e-4), (room.id, piece)
 
 
+def rim_rays(opening: Opening, floor: float, eye: np.ndarray, *, rng: np.random.Generator, n: int = 60) -> np.ndarray:
+    """Directions (n, 3) from the eye to points on the rim of an opening's hole, in the middle of the wall."""
+    a, b = np.array(opening.a), np.array(opening.b)
+    t, level = rng.random(n), rng.random(n)
+    side = rng.integers(4, size=n)
+    t, level = (
+        np.where(side == 0, 0.0, np.where(side == 1, 1.0, t)),
+        np.where(side == 2, 0.0, np.where(side == 3, 1.0, level)),
+    )
+    at = a + t[:, None] * (b - a)
+    d = np.column_stack([at, floor + opening.sill + level * (opening.head - opening.sill)]) - eye
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
 @pytest.mark.parametrize("name", HOUSES)
 def test_no_ray_from_inside_a_room_leaves_the_house_but_through_a_pane(houses, name):
     house, parts = houses[name]
@@ -178,6 +192,7 @@ def test_no_ray_from_inside_a_room_leaves_the_house_but_through_a_pane(houses, n
         aim = corners[rng.integers(len(corners), size=80)]
         target = np.column_stack([aim, z.elevation + rng.choice([0.0, z.height], 80)]) + rng.normal(0, 0.004, (80, 3))
         d[:80] = (target - eye) / np.linalg.norm(target - eye, axis=1, keepdims=True)
+        d = np.concatenate([d, *[rim_rays(o, z.elevation, eye, rng=rng) for o in house.openings if room.id in o.rooms]])
         hit, which = first_hits(triangles, np.tile(eye, (len(d), 1)), d)
         assert np.isfinite(hit).all(), f"{room.id}: {np.isinf(hit).sum()} rays leave the house"
         backs = ((normals[which] * d).sum(1) > 1e-9) & ~np.char.endswith(owner[which], "/glass")
