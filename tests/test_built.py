@@ -217,3 +217,10 @@ def test_a_curtain_hangs_in_folds_and_a_mirror_is_one():
     for m in mirrors:
         glass = [p for p in m.make(m.asset.size, (), finish) if p.finish.mirror]
         assert len(glass) == 1 and (glass[0].normals[:, 1] < -0.99).all(), "the glass looks along -y"
+
+
+@pytest.mark.parametrize("key", builders())
+def test_what_glows_is_known_as_a_lamp_and_lamps_glow(key):
+    maker = MAKERS[key]
+    glows = any(p.finish.emission is not None for p in maker.make(maker.asset.size, (), finish))
+    assert glows == (maker.asset.emits is not None)

@@ -299,7 +299,7 @@ def hood(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return parts_of(
         (metal(look, finish), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), quads(np.array(sides)), shaft]),
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
-        (plain((0.95, 0.93, 0.88), 0.3, 0.0, (8.0, 7.0, 5.6)), lamps),
+        (plain((0.95, 0.93, 0.88), 0.3), lamps),
     )
 
 
