@@ -9,7 +9,7 @@ import pytest
 from hand_worlds import grid_world, line_world, room, thing
 
 from embodied import metrics
-from embodied.assistants.descriptions import Describer, DescriberConfig, frequent_classes
+from embodied.assistants.descriptions import Describer, DescriberConfig, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.env import ActionError
 from embodied.hari_env import Costs, HariEnv, shaped_costs
@@ -64,6 +64,17 @@ def test_at_most_twenty_objects_and_none_from_behind_the_wall():
     behind = dataclasses.replace(world, house=other)
     assert len(Describer(()).dense(behind, 0)) == 1
     assert len(Describer((), DescriberConfig(same_room=False)).dense(behind, 0)) == 2
+
+
+def test_pre_training_drops_features_and_varies_goals_as_appendix_e_says():
+    rng, rows = np.random.default_rng(0), tuple(Feature("object", f"thing {i}") for i in range(9))
+    kept = [dropped(rows, rng=rng) for _ in range(300)]
+    assert {len(k) for k in kept} == {5, 6, 7, 8, 9} and all(list(k) == sorted(k, key=rows.index) for k in kept)
+    assert dropped(rows[:3], rng=rng) == rows[:3]
+    world, say = line_world(), Describer(())
+    goals = {say.pretraining_goal(world, 3, 0, "mug", rng=rng) for _ in range(50)}
+    assert goals == {say.dense(world, 3, goal=True)}, "with one object near, dense and sparse say the same"
+    assert say.step(world, 2, 3) in {say.pretraining_goal(world, 3, 2, "mug", rng=rng) for _ in range(50)}
 
 
 def test_the_stack_pushes_describes_pops_and_ends():

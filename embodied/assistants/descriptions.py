@@ -60,6 +60,20 @@ class Describer:
             world.graph.positions)[node]
         return (Feature("action", "go", *_bins(offset)),)
 
+    def pretraining_goal(
+        self, world: World, node: int, start: int, object_class: str, *, rng: np.random.Generator
+    ) -> Description:
+        """The goal description of a pre-training task (appendix E, second "For d_t^s", read as d_t^g: X24).
+
+        Dense, or the target object and the room's name, each with probability 1/2; next to the goal
+        or at it, the next action is a third possibility of 1/3.
+        """
+        target = tuple(f for f in self._near(world, node, True) if f.name == object_class)[:1]
+        choices = [self.dense(world, node, goal=True), (self._room(world, node), *target)]
+        if start == node or int(world.graph.next_hop[start, node]) == node:
+            choices.append(self.step(world, start, node))
+        return choices[int(rng.integers(len(choices)))]
+
     def _room(self, world: World, node: int) -> Feature:
         return Feature("room", world.house.room_by_id[world.graph.room_of_node[node]].kind)
 
@@ -69,6 +83,17 @@ class Describer:
         if key not in self._objects:
             self._objects[key] = near_objects(world, node, radius, self._config)
         return self._objects[key]
+
+
+def dropped(description: Description, *, rng: np.random.Generator) -> Description:
+    """A dense state description with feature sets dropped for pre-training (appendix E).
+
+    Of its M + 1 feature sets (M objects and the room) m are kept, m ~ Uniform(min(5, M + 1), M + 1),
+    both ends included, in their order.
+    """
+    n = len(description)
+    m = int(rng.integers(min(5, n), n + 1))
+    return tuple(description[i] for i in sorted(rng.choice(n, m, replace=False)))
 
 
 def near_objects(world: World, node: int, radius: float, config: DescriberConfig) -> Description:
