@@ -22,7 +22,7 @@ from embodied.geometry import wrap
 from embodied.house import House, Placement, Room, rounded
 from embodied.seeds import stream
 
-ATTEMPTS = 4
+ATTEMPTS = 6
 
 
 def furnish(draft: House, catalogue, *, seed: int) -> House:

@@ -146,6 +146,16 @@ def sofa_group(ctx: Context) -> list[Thing] | None:
     return None
 
 
+def lone_sofa(ctx: Context) -> list[Thing] | None:
+    """Where nothing more fits: a sofa at a wall."""
+    for longest in (2.3, 1.9, 1.75):
+        found = ctx.against_wall(ctx.pick("sofa", most=(longest, 1.0, 1.2)), "seating", clear=0.5, window=-0.3, centre=0.5,
+                                 role="sofa")
+        if found:
+            return found
+    return None
+
+
 def conversation(ctx: Context, chair_role: str = "easy chair") -> list[Thing] | None:
     """Two chairs turned to one another over a small table."""
     chair = ctx.pick(chair_role, most=(1.1, 1.1, 1.3))
@@ -200,27 +210,29 @@ def reading_corner(ctx: Context) -> list[Thing] | None:
 
 def dining(ctx: Context, table_role: str = "dining table", chair_role: str = "dining chair",
            most: float = 2.5) -> list[Thing] | None:
-    """A table with chairs in pairs around it, tucked in and a little askew."""
-    for limit in sorted({most, 1.75, 1.45, 1.15, 0.85} & {m for m in (most, 1.75, 1.45, 1.15, 0.85) if m <= most},
-                        reverse=True):
-        table = ctx.pick(table_role, least=(min(0.7 * limit, 1.4), 0, 0.6), most=(limit, 1.25, 0.95), avoid=()) or ctx.pick(
-            table_role, most=(limit, 1.25, 0.95), avoid=())
-        chair = ctx.pick(chair_role, most=(0.62, 0.72, 1.25))
-        if table is None or chair is None:
-            continue
-        yaws = (0.0, math.pi / 2)
-        for against in ((False, True) if limit < 1.5 else (False,)):
-            items = table_items(ctx, table, chair, wall=against)
-            if against:
-                poses = wall_poses(
-                    ctx.space, table.size[0] + 0.3, score=lambda w, s, table=table: _table_wall_score(ctx, w, s, table),
-                )
-            else:
-                poses = floor_poses(ctx.space, score=lambda x, y, yaw: _table_score(ctx, x, y, yaw), yaws=yaws)
-            found = ctx.put(items, poses, "dining", tries=24)
-            if found:
-                return found
+    """A table with chairs in pairs around it, tucked in and a little askew; at a wall where it must be small."""
+    limits = [most, *(m for m in (1.75, 1.45, 1.15, 0.85) if m < most)]
+    for pairs in (True, False):
+        for limit in limits:
+            table = ctx.pick(table_role, least=(min(0.7 * limit, 1.4), 0, 0.6), most=(limit, 1.25, 0.95), avoid=())
+            table = table or ctx.pick(table_role, most=(limit, 1.25, 0.95), avoid=())
+            chair = ctx.pick(chair_role, most=(0.62, 0.72, 1.25))
+            if table is not None and chair is not None:
+                found = _dining(ctx, table, chair, pairs, at_wall=limit < 1.5)
+                if found:
+                    return found
     return None
+
+
+def _dining(ctx: Context, table: Asset, chair: Asset, pairs: bool, at_wall: bool) -> list[Thing] | None:
+    """The table free on the floor or, failing that, at a wall."""
+    free = table_items(ctx, table, chair, pairs=pairs)
+    poses = floor_poses(ctx.space, score=lambda x, y, yaw: _table_score(ctx, x, y, yaw), yaws=(0.0, math.pi / 2))
+    found = ctx.put(free, poses, "dining", tries=24)
+    if found or not at_wall:
+        return found
+    poses = wall_poses(ctx.space, table.size[0] + 0.3, score=lambda w, s: _table_wall_score(ctx, w, s, table))
+    return ctx.put(table_items(ctx, table, chair, wall=True, pairs=pairs), poses, "dining", tries=24)
 
 
 def _table_score(ctx: Context, x: float, y: float, yaw: float) -> float:
@@ -238,8 +250,12 @@ def _table_wall_score(ctx: Context, wall: Wall, s: float, table: Asset) -> float
     return 0.8 * at_window(wall, s, table.size[0]) + 0.5 * centred(wall, s) + 0.4 * ctx.rng.random()
 
 
-def table_items(ctx: Context, table: Asset, chair: Asset, wall: bool = False) -> list[Item]:
-    """Table (at the origin, or with its back to the wall at y = 0) and its chairs."""
+def table_items(ctx: Context, table: Asset, chair: Asset, *, wall: bool = False, pairs: bool = True) -> list[Item]:
+    """Table (at the origin, or with its back to the wall at y = 0) and its chairs.
+
+    Args:
+      pairs: whether it must have chairs on both of its free sides.
+    """
     rng = ctx.rng
     w, d = table.size[:2]
     y0 = -d / 2 if wall else 0.0
@@ -267,7 +283,7 @@ def table_items(ctx: Context, table: Asset, chair: Asset, wall: bool = False) ->
             x = (k + 0.5) * pitch - w / 2
             y = y0 + sign * (d / 2 + cd / 2 - tuck + _pulled(rng))
             yaw = (0.0 if sign > 0 else math.pi) + wobble(rng, 7)
-            items.append(Item(chair, x, y, yaw, under=(0,), clear=-0.3, optional=k > 0 or sign > 0,
+            items.append(Item(chair, x, y, yaw, under=(0,), clear=-0.3, optional=k > 0 or (sign > 0 and not pairs),
                               role="dining chair"))
     if d > 0.7 and (wall or w > 1.35) and ctx.chance(0.6):
         for sign in (-1, 1):

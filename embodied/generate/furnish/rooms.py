@@ -29,13 +29,15 @@ def coverage(ctx: Context) -> float:
 
 
 def lacks(ctx: Context) -> int:
-    """How many of the pieces that make the room what it is found no place."""
-    return sum(not ctx.roles(*roles) for roles in NEEDS.get(ctx.kind, ()))
+    """What is missing of the pieces that make the room what it is; each counts more than all that follow it."""
+    needs = NEEDS.get(ctx.kind, ())
+    return sum(2 ** (len(needs) - 1 - k) for k, roles in enumerate(needs) if not ctx.roles(*roles))
 
 
 def living_room(ctx: Context) -> None:
     area = ctx.space.area
-    seated = living.seating(ctx) or living.sofa_group(ctx) or living.conversation(ctx)
+    seated = (living.seating(ctx) or living.sofa_group(ctx) or living.lone_sofa(ctx)
+              or living.conversation(ctx))
     if "dining_room" not in ctx.kinds and area > 20 and ctx.kind == "living_room":
         living.dining(ctx)
     for _ in range(1 + (area > 22) + (area > 32)):
@@ -80,9 +82,10 @@ def dining_room(ctx: Context) -> None:
 
 def kitchen(ctx: Context) -> None:
     area = ctx.space.area
-    if ctx.attempt >= 1:
+    first = ctx.attempt in (1, 2, 4)
+    if first:
         wet.lone_fridge(ctx)
-    wet.kitchen_line(ctx, fridge=ctx.attempt < 1)
+    wet.kitchen_line(ctx, fridge=not first)
     if not ctx.roles("fridge"):
         wet.lone_fridge(ctx)
     if area > 13 and ctx.chance(0.6):
@@ -432,7 +435,7 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "study": (("desk",),),
     "laundry_room": (("washing machine",),),
 }
-"""Room kind to the roles it should not lack; any one of a tuple will do."""
+"""Room kind to the roles it should not lack, most important first; any one of a tuple will do."""
 
 def _piece(role: str, **limits) -> Callable[[Context], object]:
     """A filler that puts one piece of storage at a wall."""

@@ -246,7 +246,9 @@ def room_space(house: House, room: Room) -> RoomSpace:
     floor = shapely.orient_polygons(floor)
     openings = tuple(o for o in house.openings if room.id in o.rooms)
     walls = _walls(floor, openings, house.inner_wall)
-    radius = 0.3 if floor.area > 6.5 else 0.25 if floor.area > 4.0 else 0.2
+    x0, y0, x1, y1 = floor.bounds
+    roomy = floor.area > 6.5 and min(x1 - x0, y1 - y0) > 2.75
+    radius = 0.3 if roomy else 0.25 if floor.area > 4.0 else 0.2
     keepouts: list[Box] = []
     entries: list[tuple[float, float]] = []
     for wall in walls:
@@ -259,7 +261,6 @@ def room_space(house: House, room: Room) -> RoomSpace:
         for b in _stair_keepouts(stair, storey.elevation, storey.height)
     ]
     keepouts.extend(flights)
-    x0, y0, x1, y1 = floor.bounds
     origin = (x0 - CELL, y0 - CELL)
     shape = (int((y1 - y0) / CELL) + 3, int((x1 - x0) / CELL) + 3)
     walk = np.zeros(shape, np.uint8)
@@ -330,7 +331,7 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     if o.kind == "window":
         return [before(s0 - 0.05, s1 + 0.05, 0.3, o.sill, o.head)]
     swings_here = o.rooms[0] == room.id and o.kind in ("door", "front_door", "back_door")
-    depth = {"passage": 0.6, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6 if area > 3.0 else 0.4)
+    depth = {"passage": 0.6 if area > 9.0 else 0.4, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6 if area > 3.0 else 0.4)
     if o.kind in ("front_door",):
         depth = 1.0
     if swings_here:

@@ -108,7 +108,11 @@ def ceiling_lamps(ctx: Context) -> None:
 
 
 def detectors(ctx: Context) -> None:
-    """A smoke detector on the ceiling of halls, corridors and bedrooms."""
+    """A smoke detector on the ceiling of halls, corridors and bedrooms; now and then a fan between the lamps."""
+    if ctx.kind in ("living_room", "sun_room", "main_bedroom", "family_room") and ctx.chance(0.12):
+        fan = ctx.pick("ceiling fan")
+        if fan is not None:
+            _ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y, None)
     if ctx.kind not in ("hall", "corridor", "main_bedroom", "kids_room") or not ctx.chance(0.6):
         return
     asset = ctx.pick("smoke detector")
@@ -127,7 +131,7 @@ def _ceiling_lamp(ctx: Context) -> Asset | None:
         if found is not None:
             return found
     if ctx.kind in ("living_room", "study", "kitchen", "gym") and ctx.chance(0.12):
-        found = ctx.pick("track light" if ctx.chance(0.6) else "ceiling fan", most=(1.3, 1.3, 0.45), avoid=())
+        found = ctx.pick("track light", most=(1.3, 1.3, 0.45), avoid=())
         if found is not None:
             return found
     low = ctx.kind in (*WET, "corridor", "pantry", "closet", "laundry_room", "toilet", "gym", "stairwell")
