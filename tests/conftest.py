@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from embodied.house import House, Opening, Placement, Room, Storey
@@ -24,6 +26,12 @@ def two_rooms() -> House:
     )
     rug = Placement("rug_1", "built/rug", "rug", "living_room_1", (2.5, 2.0, 0.0), 0.0, (2.0, 1.4, 0.012))
     return House(0, "two rooms", (Storey(0.0, 2.6),), (living, bedroom), openings, (rug,), ())
+
+
+@pytest.fixture(scope="session")
+def shared_cache(request) -> Path:
+    """One cache folder for all tests and workers, kept between runs; its files are atomic and checked."""
+    return request.config.cache.mkdir("embodied")
 
 
 @pytest.fixture

@@ -6,6 +6,15 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from embodied.house import House
+from embodied.interface import Ask, Episode
+
+
+def blueprint_of(house: House, episode: Episode) -> rrb.Blueprint:
+    """The layout for a finished episode: shows an assistant's image and probabilities where it has them."""
+    asked = any(isinstance(s.action, Ask) for s in episode.steps)
+    pictured = any(s.reply is not None and s.reply.image is not None for s in episode.steps)
+    thought = any(s.action.thought is not None and s.action.thought.asks for s in episode.steps)
+    return episode_blueprint(house, dialogue=asked or episode.task.kind != "find", target=pictured, probabilities=thought)
 
 
 def episode_blueprint(house: House, *, dialogue: bool = True, target: bool = False, probabilities: bool = False) -> rrb.Blueprint:

@@ -59,12 +59,19 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
         if outputs and not sinks.serve:
             recording.set_sinks(*outputs, default_blueprint=blueprint)
         recording.send_recording_name(name)
-        recording.send_property("fingerprint", rr.AnyValues(**properties))
+        if properties:
+            recording.send_property("fingerprint", rr.AnyValues(**properties))
         yield recording
         recording.flush()
         if sinks.serve:
             _keep_serving()
         recording.disconnect()
+
+
+def open_viewer(rrd: Path) -> None:
+    """Open a recording in the native viewer."""
+    rr.init(APPLICATION, spawn=True)
+    rr.log_file_from_path(rrd)
 
 
 def _keep_serving() -> None:

@@ -108,14 +108,14 @@ def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
 
 def record_episode(args: argparse.Namespace, world, episode, number: int) -> str:
     """Record one episode to where the options say; returns the file's name or the viewer's."""
-    from viz.blueprint import episode_blueprint
+    from viz.blueprint import blueprint_of
     from viz.recording import record
     from viz.sinks import open_recording
 
     sinks = sinks_of(args)
     if sinks.rrd is not None:
         sinks = type(sinks)(numbered(sinks.rrd, number, args.episodes), sinks.spawn, sinks.connect, sinks.serve)
-    with open_recording(sinks, episode_blueprint(world.house), name=episode.task.request, properties=texts(world.fingerprint)) as r:
+    with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
         for _ in record(r, world, episode.task, episode.steps):
             pass
     return str(sinks.rrd or sinks.connect or "viewer")

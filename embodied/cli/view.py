@@ -1,22 +1,76 @@
-"""Open a recording in the Rerun viewer, or list the episodes of a run."""
+"""Look at what happened: open a recording, or the episodes of a run.
+
+RUN is a .rrd file, which opens in the Rerun viewer, or a folder that `embodied eval`, `judge` or
+`rollout` wrote: its episodes are listed, --page writes one HTML page about them, and --episode N
+makes the recording of one (with --data, the data set its houses come from) and opens it.
+"""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.recording import add_sinks, sinks_of
+
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("run_folder", type=Path, metavar="RUN", help="a .rrd file, or a folder with episodes.jsonl")
+    parser.add_argument("folder", type=Path, metavar="RUN", help="a .rrd file, or a folder with episodes*.jsonl")
+    parser.add_argument("--episode", type=int, metavar="N", help="record episode N of the list and open it")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="data set of the run, for --episode")
+    parser.add_argument("--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings")
+    parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how --episode draws the house (default: unlit)")
+    add_sinks(parser)
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    import rerun as rr
+    if args.folder.suffix == ".rrd":
+        return open_file(args)
+    from viz.report import load_run, summary_line, write_page
 
-    if args.run_folder.suffix == ".rrd":
-        if not args.run_folder.exists():
-            raise FileNotFoundError(f"{args.run_folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`")
-        rr.init("embodied", spawn=True)
-        rr.log_file_from_path(args.run_folder)
+    found = load_run(args.folder)
+    if args.episode is not None:
+        return record_one(args, found)
+    if args.page:
+        page = write_page(args.folder, found)
+        show(args, {"page": str(page), "episodes": len(found)}, f"wrote {page}")
         return 0
-    raise ValueError(f"{args.run_folder} is neither a .rrd file nor a run folder")
+    rows = [summary_line(i, e) for i, e in enumerate(found)]
+    show(args, {"episodes": [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]}, "\n".join(rows))
+    return 0
+
+
+def open_file(args: argparse.Namespace) -> int:
+    """Open a .rrd file in the native viewer."""
+    if not args.folder.exists():
+        raise FileNotFoundError(f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`")
+    from viz.sinks import open_viewer
+
+    open_viewer(args.folder)
+    return 0
+
+
+def record_one(args: argparse.Namespace, found) -> int:
+    """Draw one episode of a run again, into a recording."""
+    from embodied.cli.demo import texts
+    from embodied.datasets.store import Dataset
+    from viz.blueprint import blueprint_of
+    from viz.recording import record
+    from viz.sinks import open_recording
+
+    if not 0 <= args.episode < len(found):
+        raise ValueError(f"--episode {args.episode} does not exist; this run has the episodes 0 to {len(found) - 1}")
+    if args.data is None:
+        raise ValueError("--episode needs --data DIR, the data set that the run was made on: its houses are drawn again")
+    episode = found[args.episode].episode
+    sinks = sinks_of(args, args.folder / "recordings" / f"{args.episode}.rrd")
+    with Dataset(args.data).open_world(episode.task.world, catalogue_of(args), args.cache, quality=args.quality, size=384) as world:
+        with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
+            for _ in record(r, world, episode.task, episode.steps):
+                pass
+    note(f"recorded {episode.task.id}")
+    show(args, {"recording": str(sinks.rrd)}, f"wrote {sinks.rrd}; open it with: embodied view {sinks.rrd}")
+    return 0

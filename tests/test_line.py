@@ -1,0 +1,130 @@
+"""The line from a seed to a recording, end to end, and what the commands do with wrong input."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from assets.catalogue import load_catalogue
+from embodied.cli import main
+from embodied.env import HelpEnv
+from embodied.generate import HouseConfig, generate_house
+from embodied.house import House
+from embodied.language import People
+from embodied.metrics import spl, success
+from embodied.policies import RandomWalk, Shortest
+from embodied.rollout import play, rollout
+from embodied.tasks.find import find_pool, find_task
+from embodied.world import open_world
+from viz.blueprint import episode_blueprint
+from viz.recording import Pictures, camera_axes, record
+from viz.sinks import Sinks, open_recording
+from viz.video import camera_track, write_video
+
+SMALL = HouseConfig(area=(38.0, 46.0))
+
+
+@pytest.fixture(scope="module")
+def world(shared_cache):
+    catalogue = load_catalogue(shared_cache)
+    house = generate_house(2, SMALL, catalogue)
+    with open_world(house, catalogue, shared_cache, size=64) as world:
+        yield world
+
+
+def tasks_of(world, count):
+    pool = find_pool(world, seed=1)
+    return [find_task(pool, i, seed=1, language=People(tries=1)) for i in range(min(count, len(pool)))]
+
+
+def test_a_seed_becomes_a_house_a_walk_and_a_recording(world, tmp_path):
+    task = tasks_of(world, 1)[0]
+    rrd = tmp_path / "episode.rrd"
+    frames = list(rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0))
+    with open_recording(Sinks(rrd), episode_blueprint(world.house), name="test", properties={"renderer": "any"}) as recording:
+        passed_on = list(record(recording, world, task, (f.step for f in frames), pictures=Pictures((48, 64), 32)))
+    assert [s.pose for s in passed_on] == [f.step.pose for f in frames]
+    assert success(frames[-1].episode, world.graph) == 1.0
+    assert 10_000 < rrd.stat().st_size < 60 * 2**20
+
+
+def test_the_expert_finds_everything_and_a_random_walker_little(world):
+    tasks = tasks_of(world, 40)
+    make = lambda: HelpEnv({world.name: world})
+    expert = play(make, Shortest(), tasks, seed=0)
+    lost = play(make, RandomWalk(), tasks, seed=0)
+    assert all(success(e, world.graph) == 1.0 and spl(e, world.graph) == pytest.approx(1.0) for e in expert)
+    assert np.mean([success(e, world.graph) for e in lost]) < 0.6
+
+
+def test_a_broken_recording_leaves_no_file(world, tmp_path):
+    rrd = tmp_path / "episode.rrd"
+    with pytest.raises(RuntimeError, match="stopped half-way"), open_recording(
+        Sinks(rrd), episode_blueprint(world.house), name="test", properties={}
+    ):
+        raise RuntimeError("stopped half-way")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_film_starts_and_ends_where_the_walk_does_and_never_jumps(world, tmp_path):
+    task = tasks_of(world, 1)[0]
+    episode = play(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)[0]
+    poses = [task.start, *(s.next_pose for s in episode.steps)]
+    track = camera_track(world.graph.positions, poses)
+    assert track[0, :3] == pytest.approx(world.graph.positions[poses[0].node])
+    assert track[-1, :3] == pytest.approx(world.graph.positions[poses[-1].node])
+    assert np.linalg.norm(np.diff(track[:, :3], axis=0), axis=1).max() < 0.1
+    frames = (np.full((48, 64, 3), i, np.uint8) for i in range(10))
+    assert write_video(tmp_path / "film.mp4", frames, (48, 64)) == 10
+    with pytest.raises(ValueError, match="even height and width"):
+        write_video(tmp_path / "odd.mp4", iter(()), (47, 64))
+
+
+def test_the_camera_in_the_recording_looks_where_the_agent_looks():
+    axes = camera_axes(np.pi / 2, 0.0)
+    assert axes[:, 2] == pytest.approx([0, 1, 0])  # forward
+    assert axes[:, 0] == pytest.approx([1, 0, 0])  # right
+    assert axes[:, 1] == pytest.approx([0, 0, -1])  # down
+    assert np.linalg.det(camera_axes(0.7, 0.3)) == pytest.approx(1.0)
+
+
+def test_house_command_writes_what_it_says(shared_cache, tmp_path, capsys):
+    out = tmp_path / "house"
+    assert main(["house", "--seed", "2", "--area", "38", "46", "--no-mjcf", "--json", "--out", str(out), "--cache", str(shared_cache)]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    house = House.load(out / "house.json")
+    assert house.digest == facts["digest"] and facts["objects"] == len(house.placements)
+    assert {p.name for p in out.iterdir()} >= {"house.json", "connectivity.json", "plan.png"}
+
+
+def test_doctor_knows_the_renderer_and_the_furniture(shared_cache, capsys):
+    assert main(["doctor", "--json", "--cache", str(shared_cache)]) == 0
+    findings = {f["name"]: f for f in json.loads(capsys.readouterr().out)["findings"]}
+    assert findings["renderer"]["ok"] and findings["furniture"]["ok"] and "mujoco" in findings["versions"]["text"]
+
+
+def test_doctor_fails_with_the_remedy_when_the_furniture_is_missing(shared_cache, tmp_path, capsys):
+    assert main(["doctor", "--pack", str(tmp_path / "none.sh3f"), "--cache", str(shared_cache)]) != 0
+    said = capsys.readouterr()
+    assert "none.sh3f" in said.out + said.err
+
+
+@pytest.mark.parametrize(("command", "complaint"), [
+    (["house", "--seed", "1", "--area", "900", "950", "--out", "x"], "area should be"),
+    (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
+    (["render", "nowhere"], "house.json"),
+    (["render", "nowhere", "--node", "3"], "--equirect"),
+    (["light", "nowhere", "--time", "tea"], "nowhere"),
+    (["view", "nowhere.rrd"], "nowhere.rrd"),
+    (["rollout", "--episodes", "0"], "--episodes"),
+    (["assets", "list", "--class", "unicorn"], "unicorn"),
+    (["bench", "nonsense"], "nonsense"),
+])
+def test_wrong_input_gives_one_clear_line(command, complaint, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command, "--cache", str(tmp_path)] if command[0] != "view" else command) == 2
+    said = capsys.readouterr().err.strip()
+    assert complaint in said and said.startswith("error: ") and len(said.splitlines()) == 1
+    assert not (tmp_path / "x").exists()

@@ -1,0 +1,102 @@
+"""A run as one HTML page: how often, how far, how many requests, and every episode with its recording."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from assets.cache import write_bytes
+from embodied.interface import Ask, Episode
+from embodied.records import load_lines
+
+matplotlib.use("Agg")
+STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;color:#222}
+table{border-collapse:collapse;width:100%}td,th{padding:.3rem .6rem;border-bottom:1px solid #ddd;text-align:left}
+img{max-width:100%}.q{color:#555;font-style:italic}.n{text-align:right}"""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One episode of a run folder."""
+
+    agent: str
+    """From the name of its file: 'shortest path'."""
+    episode: Episode
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it stopped at a goal node; the tables judge by distance, this is for orientation."""
+        return self.episode.nodes[-1] in self.episode.task.goal_nodes
+
+
+def load_run(folder: Path) -> list[Listed]:
+    """All episodes of a run, file by file in the order of their names.
+
+    Raises:
+      FileNotFoundError: no episodes there.
+    """
+    folder = Path(folder)
+    files = sorted(folder.glob("episodes*.jsonl"))
+    if not files:
+        raise FileNotFoundError(f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd file")
+    found = []
+    for path in files:
+        name = path.stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
+        found += [Listed(name, e) for e in load_lines(path, Episode)]
+    return found
+
+
+def summary_line(number: int, listed: Listed) -> str:
+    """One line of the list."""
+    e = listed.episode
+    mark = "ok  " if listed.arrived else "miss"
+    return f"{number:4}  {mark} {len(e.steps):3} steps {e.requests:2} requests  {listed.agent:<28} {e.task.id:<28} {e.task.request}"
+
+
+def write_page(folder: Path, found: Sequence[Listed]) -> Path:
+    """Write folder/index.html, plots included; returns its path."""
+    agents = sorted({x.agent for x in found})
+    rows = []
+    for number, x in enumerate(found):
+        recording = Path("recordings") / f"{number}.rrd"
+        link = f'<a href="{recording}">recording</a>' if (Path(folder) / recording).exists() else f"embodied view … --episode {number}"
+        asked = next((s.instruction for s, before in zip(x.episode.steps[1:], x.episode.steps) if isinstance(before.action, Ask)), "")
+        rows.append(
+            f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td><td>{html.escape(x.episode.task.request)}"
+            f"<div class=q>{html.escape(asked)}</div></td><td>{'arrived' if x.arrived else x.episode.ended}</td>"
+            f"<td class=n>{len(x.episode.steps)}</td><td class=n>{x.episode.requests}</td><td>{link}</td></tr>"
+        )
+    page = (
+        f"<!doctype html><meta charset=utf-8><title>{html.escape(Path(folder).name)}</title><style>{STYLE}</style>"
+        f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(found)} episodes of {len(agents)} agents.</p>"
+        f'<img alt="steps and requests by agent" src="data:image/png;base64,{_plots(found, agents)}">'
+        "<table><tr><th>#<th>agent<th>request, and the first instruction heard<th>end<th>steps<th>requests<th></tr>"
+        + "".join(rows) + "</table>"
+    )
+    path = Path(folder) / "index.html"
+    write_bytes(path, page.encode())
+    return path
+
+
+def _plots(found: Sequence[Listed], agents: Sequence[str]) -> str:
+    """Arrivals, steps and requests per agent, as a PNG in base64."""
+    figure = Figure(figsize=(11, 0.6 + 0.45 * len(agents)), layout="constrained")
+    axes = figure.subplots(1, 3, sharey=True)
+    of = {a: [x for x in found if x.agent == a] for a in agents}
+    axes[0].barh(agents, [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f")
+    axes[0].set(title="ended at a goal node, %", xlim=(0, 100))
+    axes[1].boxplot([[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
+    axes[1].set(title="steps")
+    axes[2].boxplot([[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
+    axes[2].set(title="requests for help")
+    axes[0].set_yticks(range(len(agents)), agents)
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=110)
+    return base64.b64encode(data.getvalue()).decode()
