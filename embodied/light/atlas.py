@@ -182,6 +182,15 @@ def _straight_down(scene, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
     return np.asarray(ok), np.asarray(f).astype(np.int32), np.asarray(u), np.asarray(v)
 
 
+def nearest(mask: np.ndarray) -> np.ndarray:
+    """(h, w) int64: flat position of the nearest true pixel of a mask that has any."""
+    _, labels = cv2.distanceTransformWithLabels((~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    at = np.zeros(int(labels.max()) + 1, np.int64)
+    flat = np.nonzero(mask.ravel())[0]
+    at[labels.ravel()[flat]] = flat
+    return at[labels]
+
+
 def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:
     """Barycentric mean of per-corner values (m, 3, c) at n points: (n, c) float32."""
     values = corners[face]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes.util
 import dataclasses
 import math
 import time
@@ -22,7 +23,8 @@ from embodied.light.reference import Tracer
 from embodied.navgraph import build_graph
 from embodied.render import Renderer, camera_at
 
-WAYS = ("unlit", "baked", "glossy", "diffuse", "reference")
+DRAWN = ("unlit", "baked", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
+WAYS = (*DRAWN, "glossy", "diffuse", "reference")
 TIMES = (Sky(10.5, "clear"), Sky(13.0, "overcast"), Sky(18.6, "clear"), Sky(22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
 VFOV = math.radians(65.0)
@@ -93,8 +95,10 @@ def draw(house: House, catalogue, baked: Bake, views: Sequence[tuple[str, np.nda
     """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
     shots = []
     for way in WAYS:
-        if way in ("unlit", "baked"):
-            with Renderer(house, catalogue, quality=way, lit=baked.lit if way == "baked" else None, size=256) as r:
+        if way in DRAWN:
+            quality, backend = ("unlit", "classic") if way == "unlit" else ("baked", "filament" if way == "filament" else "classic")
+            lit = None if way == "unlit" else baked.lit
+            with Renderer(house, catalogue, quality=quality, backend=backend, lit=lit, size=256) as r:
                 for room, eye, yaw in views:
                     rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
                     ms = _median_ms(lambda at=eye, to=yaw, by=r: by.rgb(camera_at(at, to), (256, 256)))

@@ -10,7 +10,7 @@ from embodied.light.emitters import portals_of
 from embodied.light.solve import AMBIENT, subset
 from embodied.seeds import stream
 
-LUXELS, PATHS = 20, 4000
+LUXELS, PATHS = 20, 6000
 LIMIT = 0.10
 """Largest relative difference that passes, for the median of the signed differences (a bias) and for the
 median of their sizes less twice the path tracer's own standard error (a scatter). Medians, because a

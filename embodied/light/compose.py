@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt
 
 from embodied.house import House
 from embodied.light import radiosity
-from embodied.light.atlas import Atlas, Texels, albedo, gamma, rasterise
+from embodied.light.atlas import Atlas, Texels, albedo, gamma, nearest, rasterise
 from embodied.light.backend import array, constant, mitsuba, r2, vector
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Space, points_of
@@ -58,10 +57,12 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     radiance = colour * (e + sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32))
     _add_metal(radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
     radiance += glow_of(house, atlas, page, t, lamps)
-    picture = spread(t.index, display(radiance, exposure.at(t.position)), t.shape)
+    shown_by = sources(t.index, t.shape)
+    page_like = lambda values: values[shown_by].reshape(*t.shape, -1) if len(t.index) else np.zeros((*t.shape, values.shape[1]), values.dtype)
+    picture = page_like(display(radiance, exposure.at(t.position)))
     whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
     whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
-    shown = spread(t.index, (gamma(colour) * 255 + 0.5).astype(np.uint8), t.shape)
+    shown = page_like((gamma(colour) * 255 + 0.5).astype(np.uint8))
     glow = lux.glow[mine]
     glow = spread(coarse.index, glow, coarse.shape) if glow.any() else np.zeros((0, 0, 3))
     half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
@@ -110,16 +111,22 @@ def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels
     radiance[i] = radiance[i] * (1 - share) + np.minimum(array(total) / rays, limit) * tint * share
 
 
+def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(h * w,) int64: which of the n covered texels at flat positions `index` each texel of a page shows: its own or the nearest."""
+    if not len(index):
+        return np.zeros(shape[0] * shape[1], np.int64)
+    mask = np.zeros(shape[0] * shape[1], bool)
+    mask[index] = True
+    number = np.zeros(len(mask), np.int64)
+    number[index] = np.arange(len(index))
+    return number[nearest(mask.reshape(shape)).ravel()]
+
+
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Values (n, c) at flat positions of a page, and beyond them the nearest one's: (h, w, c)."""
-    out = np.zeros((shape[0] * shape[1], values.shape[1]), values.dtype)
-    out[index] = values
     if not len(index):
-        return out.reshape(*shape, -1)
-    mask = np.ones(shape[0] * shape[1], bool)
-    mask[index] = False
-    y, x = distance_transform_edt(mask.reshape(shape), return_distances=False, return_indices=True)
-    return out.reshape(*shape, -1)[y, x]
+        return np.zeros((*shape, values.shape[1]), values.dtype)
+    return values[sources(index, shape)].reshape(*shape, -1)
 
 
 def _sharp_sun(page, t: Texels, share: np.ndarray, space: Space, portals: Sequence[Portal], outdoors: Outdoors,

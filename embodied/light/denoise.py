@@ -21,7 +21,8 @@ KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 
 def smooth_pages(
     e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
-    steps: Sequence[int] = (1, 2, 4, 8, 16), likeness: Sequence[float] = (3.0, 1.6, 0.9, 0.5, 0.3),
+    steps: Sequence[int] = (1, 2, 4, 8, 16), likeness: Sequence[float] = (0.15, 0.12, 0.1, 0.1, 0.1),
+    variance: np.ndarray | None = None,
 ) -> np.ndarray:
     """A-trous smoothing within planes.
 
@@ -30,7 +31,9 @@ def smooth_pages(
       good: (n,) bool, luxels whose value counts.
       chosen: (n,) bool, luxels to smooth.
       likeness: for each step, the standard deviation of log brightness that still counts as the
-        same light; wide while there is noise, stricter when edges are all that is left.
+        same light.
+      variance: (n,) of each luxel's brightness; where given, likeness is widened by the noise that is
+        left, as in SVGF (Schied et al. 2017, sec. 4.4): noise goes, contact shadows stay.
     """
     mi = mitsuba()
     import drjit as dr
@@ -40,21 +43,48 @@ def smooth_pages(
         return e
     trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
     out = np.array(e, np.float32)
+    noise = np.zeros(len(e), np.float32)
+    if variance is not None:
+        noise[grid.mine] = _relative_noise(grid, out, variance)
     for step, like in zip(steps, likeness):
-        values = mi.Float(out.ravel())
-        own = dr.gather(mi.Color3f, values, grid.own)
+        values, noises = mi.Float(out.ravel()), mi.Float(noise)
+        own, own_noise = dr.gather(mi.Color3f, values, grid.own), dr.gather(mi.Float, noises, grid.own)
         shade = dr.log(_brightness(own) + 1e-4)
-        total, weight = mi.Color3f(0.0), mi.Float(0.0)
-        tight = constant(1.0 / like)
+        total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
+        tight = 1 / (constant(like**2) + dr.square(NOISES * own_noise))
         for i, j, q, inside in grid.around(step):
             other = dr.gather(mi.Color3f, values, q, inside)
-            far = (dr.log(_brightness(other) + 1e-4) - shade) * tight
-            w = dr.select(inside, dr.exp(-0.5 * dr.square(far)), 0.0)
+            far = dr.log(_brightness(other) + 1e-4) - shade
+            w = dr.select(inside, dr.exp(-0.5 * dr.square(far) * tight), 0.0)
             w *= KERNEL[i + 2] * KERNEL[j + 2] * dr.gather(mi.Float, trust, q, inside)
             total += other * w
             weight += w
-        out[grid.mine] = array(dr.select(weight > 1e-12, total / dr.maximum(weight, 1e-12), own))
+            squares += dr.square(w)
+        safe = dr.maximum(weight, 1e-12)
+        mean, left = dr.select(weight > 1e-12, total / safe, own), own_noise * dr.sqrt(squares) / safe
+        dr.eval(mean, left)
+        out[grid.mine] = array(mean)
+        noise[grid.mine] = np.asarray(left)
     return out
+
+
+NOISES = 2.5
+"""How many standard deviations of noise still count as the same light."""
+
+
+def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """(m,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are."""
+    mi = mitsuba()
+    import drjit as dr
+
+    values, squares = mi.Float(e.mean(1)), mi.Float(np.asarray(variance, np.float32))
+    mean, spread, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
+    for _, _, q, inside in grid.around(1):
+        mean += dr.gather(mi.Float, values, q, inside)
+        spread += dr.gather(mi.Float, squares, q, inside)
+        count += dr.select(inside, 1.0, 0.0)
+    n = dr.maximum(count, 1.0)
+    return np.minimum(np.asarray(dr.sqrt(spread / n) / dr.maximum(mean / n, 1e-5)), 1.5)
 
 
 def cap_sparks(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,

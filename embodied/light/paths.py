@@ -17,7 +17,7 @@ from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
 from embodied.light.solve import AMBIENT, Luxels
 
-DEEPEST = 9
+DEEPEST = 14
 """Diffuse bounces followed; Russian roulette begins at the third."""
 
 

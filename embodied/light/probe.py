@@ -29,7 +29,7 @@ def ambient_cube(solved, space: radiosity.Space, room: Room, *, rays: int = 256)
     position, normal = np.repeat(spots, 6, axis=0), np.tile(AXES, (len(spots), 1))
     points = radiosity.points_of(position, normal, normal, np.zeros(len(position), bool))
     seen = lux.albedo * (light.soft + AMBIENT) + lux.glow
-    e, _ = radiosity.gather(space, points, seen, rays)
+    e, _, _ = radiosity.gather(space, points, seen, rays)
     e = e + AMBIENT
     for portal in portals_of(house):
         e = e + array(radiosity.sky_light(space, points, portal, 16))

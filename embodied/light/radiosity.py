@@ -13,9 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
-from embodied.light.atlas import Atlas, Texels
+from embodied.light.atlas import Atlas, Texels, nearest
 from embodied.light.backend import array, constant, mitsuba, r2, scene_of, vector
 from embodied.light.emitters import GLASS, Lamp, Portal
 from embodied.light.unwrap import face_normals
@@ -114,8 +113,7 @@ def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | Non
         mask[t.index[chosen]] = True
         mask = mask.reshape(page.height, page.width)
         if mask.any():
-            y, x = distance_transform_edt(~mask, return_distances=False, return_indices=True)
-            number = number.reshape(mask.shape)[y, x].ravel()
+            number = number[nearest(mask).ravel()]
         out.append(number)
         start += n
     return np.concatenate(out)
@@ -249,7 +247,7 @@ def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarra
     return array(total)
 
 
-def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean of what cosine-distributed rays meet.
 
     Args:
@@ -257,13 +255,14 @@ def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: 
       first: index of the first point of the R2 sequence, so that rounds differ.
 
     Returns:
-      (n, 3) e, and (n,) share of rays that met a back face or something nearer than 12 mm.
+      (n, 3) e, (n,) share of rays that met a back face or something nearer than 12 mm, and (n,)
+      variance of the mean brightness.
     """
     mi = mitsuba()
     import drjit as dr
 
     b = mi.Float(np.ascontiguousarray(radiosity, np.float32).ravel())
-    total, bad = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
+    total, bad, square = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n), dr.zeros(mi.Float, p.n)
     for k in range(samples):
         u0, u1 = (constant(x) for x in r2(k + first))
         u = mi.Point2f(p.turn0 + u0, p.turn1 + u1)
@@ -273,10 +272,14 @@ def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: 
         rise = dr.dot(d, out)
         d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
         luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position + out * LIFT, d))
-        total += dr.gather(mi.Color3f, b, luxel, hit & front)
+        seen = dr.gather(mi.Color3f, b, luxel, hit & front)
+        total += seen
+        square += dr.square((seen.x + seen.y + seen.z) * (1.0 / 3.0))
         bad += dr.select(hit & (~front | near), 1.0, 0.0)
-        dr.eval(total, bad)
-    return array(total) / samples, np.asarray(bad) / samples
+        dr.eval(total, bad, square)
+    mean = array(total) / samples
+    variance = np.maximum(np.asarray(square) / samples - mean.mean(1) ** 2, 0.0) / max(samples - 1, 1)
+    return mean, np.asarray(bad) / samples, variance
 
 
 def hit_luxel(space: Space, ray, active=True):

@@ -63,6 +63,8 @@ class Radiosity:
     """All other bounces."""
     good: np.ndarray
     """(n,) bool; false inside or behind things."""
+    variance: np.ndarray
+    """(n,) of the brightness of `indirect` before it is smoothed."""
 
     @property
     def soft(self) -> np.ndarray:
@@ -222,8 +224,8 @@ def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell
     for samples in settings.bounces:
         tell(first / total)
         seen = _tamed(lux, lux.albedo * (light.soft + AMBIENT) + glow)
-        e, bad = radiosity.gather(space, everywhere, seen, samples, first)
-        light = replace(light, indirect=e, good=bad < 0.5)
+        e, bad, variance = radiosity.gather(space, everywhere, seen, samples, first)
+        light = replace(light, indirect=e, good=bad < 0.5, variance=variance)
         first += samples
     return light
 
@@ -265,8 +267,8 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
     mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e
     indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
-    indirect = space(denoise.smooth_pages(indirect, *on_page), 3, 1.2)
-    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=(0.9, 0.4, 0.2)), 2, 0.6)
+    indirect = space(denoise.smooth_pages(indirect, *on_page, variance=light.variance), 3, 0.9)
+    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=(0.5, 0.3, 0.15)), 2, 0.6)
     patches = mend(light.patches)
     total = direct + indirect + patches
     if soft.any():
@@ -294,14 +296,14 @@ def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Se
         "e": direct_light(lux, atlas, space, portals, lamps, settings, outdoors.picture, lambda x: tell("direct light", x)),
         "outer": outer_light(house, lux, atlas, space)})
     sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
-    light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool))
+    light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool), np.zeros(n, np.float32))
 
     def gathered() -> dict:
         done = bounce(lux, space, light, settings, lambda x: tell("bounces", x))
-        return {"e": done.indirect, "good": done.good}
+        return {"e": done.indirect, "good": done.good, "variance": done.variance}
 
     bounced = stage("bounces", gathered)
-    light = replace(light, indirect=bounced["e"], good=bounced["good"])
+    light = replace(light, indirect=bounced["e"], good=bounced["good"], variance=bounced["variance"])
     tell("smoothing", 0.0)
     light = smooth(lux, atlas, light)
     return replace(light, indirect=light.indirect + direct["outer"])

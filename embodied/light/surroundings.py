@@ -22,7 +22,7 @@ RADIUS = 70.0
 """Metres to the dome."""
 DOME = "outdoor/sky"
 """Owner of the dome; no instance id belongs to it."""
-LUXELS = 400_000
+LUXELS = 200_000
 """Luxels for all outer parts together, at most."""
 
 
@@ -66,7 +66,7 @@ def _flat(part):
     return dataclasses.replace(part, kind="wall") if flat else part
 
 
-def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 32) -> np.ndarray:
+def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 24) -> np.ndarray:
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
     mi = mitsuba()
     import drjit as dr
