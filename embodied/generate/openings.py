@@ -120,13 +120,24 @@ def _passage(plan: Plan, link, draft: _Draft, height: float, open_plan: bool, rn
     else:
         width = min(room, max(1.4, round(float(rng.uniform(0.65, 0.95)) * room, 1)) if open_plan
                     else float(rng.choice([0.9, 1.2, 1.6])))
+    tight = any(c.kind == "kitchen" and _area(c) < 9.5 for c in (a, b))  # its units need the wall
+    if tight:
+        width = min(width, 1.2)
     slack = room - width
-    start = low + NIB + (slack / 2 if kinds <= {"hall", "corridor"} or open_plan else slack * float(rng.choice([0, 0.5, 1])))
+    where = float(rng.choice([0, 0.5, 1]))
+    middle = (kinds <= {"hall", "corridor"} or open_plan) and not tight
+    start = low + NIB + slack * (0.5 if middle else round(where) if tight else where)
     p, q = _jambs(a, axis, across, start, start + width)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
     draft.zones += _fronts(axis, across, start, start + width)
     draft.openings.append(Opening(draft.name("passage"), "passage", (draft.names[link.child], draft.names[link.parent]),
                                   rounded(p), rounded(q), 0.0, head, None))
+
+
+def _area(cell) -> float:
+    """Of a cell of the plan, square metres."""
+    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
+    return (x1 - x0) * (y1 - y0)
 
 
 def _swing(axis: str, across: float, low: float, high: float, side: int) -> tuple[float, float, float, float]:
