@@ -17,7 +17,7 @@ from assets.records import Finish
 from embodied.house import House
 from embodied.lit import LitPages
 from embodied.parts import Part, house_parts
-from embodied.scene import build_spec, load_texture
+from embodied.scene import build_spec, compile_spec, load_texture
 
 MESHES, TEXTURES = "meshes", "textures"
 """Folders beside house.xml."""
@@ -35,7 +35,7 @@ def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] =
     """
     folder = Path(folder)
     spec = build_spec(house, catalogue, free=free, lit=lit)
-    spec.compile()
+    compile_spec(spec)
     (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
     for name, pattern in ((MESHES, "*.msh"), (TEXTURES, "*.png")):
         (folder / name).mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ import numpy as np
 
 from embodied.house import House
 from embodied.lit import LitPages
-from embodied.scene import build_spec
+from embodied.scene import build_spec, compile_spec
 
 EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""
@@ -100,7 +100,7 @@ def emissive_model(house: House, catalogue, lit: LitPages) -> mujoco.MjModel:
     # any light with an intensity switches Filament's own lighting off; this one is too faint and far to be seen
     light = spec.worldbody.add_light(name="faint", pos=[0, 0, -50], dir=[0, 0, -1], castshadow=False)
     light.intensity = 1e-3
-    return spec.compile()
+    return compile_spec(spec)
 
 
 @functools.cache

@@ -22,7 +22,7 @@ from embodied import visibility
 from embodied.house import House
 from embodied.lit import LitPages
 from embodied.panorama import FACES, Panorama
-from embodied.scene import COLLISION, VISUAL, Scene, compile_scene
+from embodied.scene import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
 QUALITIES = ("unlit", "baked")
 BACKENDS = ("classic", "filament")
@@ -166,6 +166,7 @@ class Renderer:
             gl.make_current()
             self._mjr.free()
             self._mjr = None
+            give_memory_back()
 
     def __enter__(self) -> Self:
         return self

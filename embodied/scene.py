@@ -5,6 +5,7 @@ Visual geoms are in group 2 and touch nothing; collision boxes are in group 3 an
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import math
 import re
@@ -69,7 +70,9 @@ def compile_scene(house: House, catalogue, *, free: Iterable[str] = (), collisio
     """
     parts = house_parts(house, catalogue) if lit is None else ()
     spec = build_spec(house, catalogue, free=frozenset(free), collisions=collisions, lit=lit, parts=parts)
-    model, names = spec.compile(), owners(house)
+    model, names = compile_spec(spec), owners(house)
+    del spec
+    give_memory_back()
     number = {name: i + 1 for i, name in enumerate(names)}
     labels = {p.owner: (p.kind, p.room) for p in (parts if lit is None else lit.meshes)}
     owned, kinds, rooms = np.zeros(model.ngeom, np.int32), [], []
@@ -80,6 +83,19 @@ def compile_scene(house: House, catalogue, *, free: Iterable[str] = (), collisio
         kinds.append(kind if model.geom_group[g] == VISUAL else "collision")
         rooms.append(room)
     return Scene(model, names, owned, tuple(kinds), tuple(rooms), tuple(sorted(free)))
+
+
+def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile, without MuJoCo's asset cache: it would keep half a gigabyte of the meshes of houses long gone."""
+    mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), 0)
+    return spec.compile()
+
+
+def give_memory_back() -> None:
+    """Return freed memory to the system where the C library can: compiling frees about a kilobyte per triangle."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def owner_of_name(geom: str) -> str:
