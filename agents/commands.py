@@ -38,6 +38,8 @@ from embodied.tables import as_json, markdown, save
 from embodied.teachers.hanna import HannaTeacher
 
 Note = Callable[[str], None]
+WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
+"""Agents of embodied.evaluate that are judged beside the learned one; they need no pictures."""
 FACES = 192
 """Side of the cube faces from which features are made: the strip's resolution."""
 
@@ -189,7 +191,7 @@ def run_eval(args: argparse.Namespace, note: Note = print) -> int:
 
 
 def _without_learning():
-    return {name: agent_without_learning("hanna", name) for name in AGENTS["hanna"]}
+    return {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
 
 
 def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:

@@ -103,6 +103,17 @@ def test_the_curiosity_loss_pushes_past_mistakes_down_even_beside_masked_actions
     assert logits.grad[0, 2] == 0
 
 
+def test_below_its_floor_the_curiosity_loss_lets_a_mistake_be():
+    logits = torch.log(torch.tensor([[0.989, 0.001, 0.01]])).requires_grad_()
+    label, both = torch.tensor([0]), torch.tensor([[False, True, True]])
+    loss = curiosity(logits, label, both, floor=0.005)
+    assert loss.item() == pytest.approx((math.log(0.005) + math.log(0.01)) / 2, rel=1e-4)
+    loss.sum().backward()
+    free = curiosity(logits, label, torch.tensor([[False, False, True]])) / 2
+    alone = torch.autograd.grad(free.sum(), logits)[0]
+    assert torch.allclose(logits.grad, alone, atol=1e-6)
+
+
 def test_the_help_loss_is_that_of_equation_4_14():
     ask = torch.log(torch.tensor([[0.25, 0.75], [0.5, 0.5]]))
     labels = torch.tensor([1, IGNORE])

@@ -125,8 +125,13 @@ def action_index(action: Move | Stop) -> int:
     return 0 if isinstance(action, Stop) else action.candidate + 1
 
 
-def imitation_loss(said: Said, wanted: Targets, alpha: float, episodes: int) -> tuple[Tensor, Tensor]:
-    """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes."""
-    navigation = navigation_loss(said.moves, wanted.moves, wanted.negatives, alpha).sum() / episodes
+def imitation_loss(
+    said: Said, wanted: Targets, alpha: float, episodes: int, floor: float = 0.0
+) -> tuple[Tensor, Tensor]:
+    """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes.
+
+    `floor` as in losses.curiosity.
+    """
+    navigation = navigation_loss(said.moves, wanted.moves, wanted.negatives, alpha, floor).sum() / episodes
     asking = help_loss(said.asks, wanted.asks, said.reasons, wanted.reasons).sum() / episodes
     return navigation, asking

@@ -6,6 +6,8 @@ one loss per pair, zero where a label says that the step is not to be learned fr
 
 from __future__ import annotations
 
+import math
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor
@@ -27,26 +29,31 @@ def negative_log_likelihood(logits: Tensor, labels: Tensor) -> Tensor:
     return F.cross_entropy(logits, labels, ignore_index=IGNORE, reduction="none")
 
 
-def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor) -> Tensor:
+def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor, floor: float = 0.0) -> Tensor:
     """Mean log-likelihood of the mistakes made before in this situation: second term of Eq 4.13.
 
     Args:
       logits: (N, A).
       labels: (N,) int64.
       negatives: (N, A) bool, the set A^main-otimes of Eq 4.12.
+      floor: a mistake less likely than this is not pushed down any further; 0 is the equation as
+        printed, which has no lower bound: at learning rates above the authors' it runs away.
 
     Returns:
       (N,), zero where there are no mistakes.
     """
-    log_p = logits.log_softmax(-1).masked_fill(~negatives, 0.0)
+    log_p = logits.log_softmax(-1)
+    if floor > 0:
+        log_p = log_p.clamp(min=math.log(floor))
+    log_p = log_p.masked_fill(~negatives, 0.0)
     mean = log_p.sum(-1) / negatives.sum(-1).clamp(min=1)
     return mean * (labels != IGNORE)
 
 
-def navigation_loss(logits: Tensor, labels: Tensor, negatives: Tensor, alpha: float) -> Tensor:
-    """L_main of Eq 4.13, (N,)."""
+def navigation_loss(logits: Tensor, labels: Tensor, negatives: Tensor, alpha: float, floor: float = 0.0) -> Tensor:
+    """L_main of Eq 4.13, (N,); `floor` as in `curiosity`."""
     loss = negative_log_likelihood(logits, labels)
-    return loss + alpha * curiosity(logits, labels, negatives) if alpha else loss
+    return loss + alpha * curiosity(logits, labels, negatives, floor) if alpha else loss
 
 
 def reason_loss(logits: Tensor, reasons: Tensor, labels: Tensor) -> Tensor:

@@ -159,7 +159,7 @@ def learn_once(
                     training.make_env, learner, tasks, teacher, training.worlds, seed=seed_of(config.seed, update)
                 )
             with clock.on("backward"):
-                losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch)
+                losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor)
                 optimizer.zero_grad(set_to_none=True)
                 (losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]).backward()
                 parallel.add_gradients(agent.network.parameters())

@@ -1,0 +1,108 @@
+"""The commands that learn, end to end on a hand-made data set: features, training, resuming, judging."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+import numpy as np
+import pytest
+import torch
+from test_datasets import build
+
+from agents import commands, options
+from agents.evaluate import failures, hanna_policies, predictions, request_share
+from agents.hanna.agent import load_agent
+from agents.vision.encoder import SHIPPED, load_encoder, random_encoder
+from agents.vision.features import feature_path, save_features
+from embodied.evaluate import evaluate
+
+torch.set_num_threads(1)
+SMALL = ["--hidden-size", "16", "--navigation-embedding", "16", "--ask-embedding", "8", "--self-heads", "2", "--text-heads",
+         "2", "--batch", "4", "--training-steps", "6", "--evaluation-steps", "8", "--validation-tasks", "3",
+         "--validate-every", "1", "--threads", "1", "--network", "random"]
+
+
+def parsed(add, *words):
+    parser = argparse.ArgumentParser()
+    add(parser)
+    return parser.parse_args([str(w) for w in words])
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """A tiny data set on grids, with features of the untrained encoder that are not computed but drawn."""
+    folder = tmp_path_factory.mktemp("line")
+    data = build(folder / "data", folder / "cache")
+    encoder = random_encoder(seed=0)
+    rng = np.random.default_rng(0)
+    for name in {n for s in data.splits for n in data.names(s)}:
+        place = data.place(name)
+        features = rng.normal(size=(len(place.graph.positions), 36, encoder.size))
+        save_features(feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest)
+    return data
+
+
+def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
+    lines = []
+    run = lambda updates: commands.run_train_hanna(
+        parsed(options.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL, "--iterations", updates),
+        lines.append,
+    )
+    assert run(2) == 0
+    assert run(3) == 0
+    assert any("continuing after update 2" in line for line in lines)
+    assert len((tmp_path / "validation.jsonl").read_text().splitlines()) == 3
+    said = []
+    judge = parsed(
+        options.add_eval, "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random",
+        "--tasks", 4, "--out", tmp_path / "table", "--threads", 1,
+    )
+    assert commands.run_eval(judge, said.append) == 0
+    table = (tmp_path / "table" / "table.md").read_text()
+    for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
+        assert f"| {row} |" in table
+    behaviour = json.loads((tmp_path / "table" / "behaviour.json").read_text())
+    assert 0 <= behaviour["behaviour"]["test_unseen"]["request share"] <= 1
+    assert len(list((tmp_path / "table").glob("episodes_*.jsonl"))) == table.count("| test_unseen |")
+
+
+def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
+    """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
+    config = commands.chosen(parsed(options.add_train_hanna, "--data", ".", "--out", ".", *SMALL), options.SCALES["mini"])
+    bank = commands.split_of(data, "test_unseen", random_encoder(seed=0)).bank
+    agent = commands.new_agent(config, commands.vocabulary_of(data), bank.digest, bank.size)
+    agent.network.eval()
+    agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
+    policies = hanna_policies(agent, bank)
+    episodes = []
+    evaluate(data, "test_unseen", {"p": policies["learned, perfect interpretation"]}, seed=0, batch=4,
+             keep=lambda name, played: episodes.extend(played))
+    worlds = data.places("test_unseen")
+    assert failures(episodes, worlds).departed_wrong == 0.0
+    assert request_share(episodes) > 0.2
+    assert [p.reason for p in predictions(episodes, worlds)] == ["lost", "uncertain_wrong", "never_asked"]
+
+
+def test_missing_features_and_wrong_rows_are_named(data, tmp_path):
+    arguments = parsed(options.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL[:-2])
+    if SHIPPED.exists():
+        with pytest.raises(FileNotFoundError, match="embodied features"):
+            commands.run_train_hanna(arguments, lambda line: None)
+    with pytest.raises(ValueError, match="unknown network 'resnet1'"):
+        commands.encoder_of(parsed(options.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1"))
+
+
+def _empty(folder):
+    path = folder / "weights.pth"
+    torch.save({}, path)
+    return path
+
+
+def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():
+    encoder, agent = load_encoder(), load_agent()
+    assert agent.encoder_digest == encoder.digest
+    assert agent.feature_size == encoder.size
+    assert sum(p.stat().st_size for p in options.WEIGHTS.iterdir()) < 15e6
+    look = encoder.encode_strips(np.zeros((1, 192, 576, 3), np.uint8))
+    assert look.shape == (1, 36, encoder.size) and np.isfinite(look).all()
