@@ -26,9 +26,9 @@ from assets.records import Finish
 from embodied.house import House
 from embodied.light import tone
 from embodied.light.atlas import Atlas, albedo, atlas_of, linear, rasterise, read_colours, things_of  # noqa: F401
-from embodied.light.backend import LightError, device, warn
+from embodied.light.backend import LightError, device, scene_of, warn
 from embodied.light.compose import Ingredients, page_of
-from embodied.light.emitters import lamps_of, portals_of
+from embodied.light.emitters import in_the_open, lamps_of, portals_of
 from embodied.light.radiosity import space_of
 from embodied.light.settings import VERSION, Settings, settings_of
 from embodied.light.sky import outdoors as outdoors_of
@@ -208,6 +208,8 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
     clock("outdoors")
     lamps = lamps_of(house, atlas)
     lux = luxels_of(house, atlas, lamps, read)
+    solid = scene_of(np.concatenate([p.corners for p in atlas.pages if not p.glass]))
+    lamps = tuple(in_the_open(x, solid) for x in lamps)
     clock("luxels")
     stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))
     light = solve(house, atlas, lux, outdoors, lamps, settings, stage, progress)
@@ -256,7 +258,7 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
                             **{f"g{i}": g for i, g in enumerate(gloss)})
     with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
         np.savez_compressed(f, **{f"{k}{i}": np.asarray(getattr(x, k)) for i, x in enumerate(s.lamps)
-                                  for k in ("points", "normals", "radiance", "area")})
+                                  for k in ("points", "normals", "radiance", "area", "weights")})
     clock("meshes")
     for name in ("direct", "sun", "bounces"):
         (folder / f"stage_{name}.npz").unlink(missing_ok=True)

@@ -72,6 +72,26 @@ NOISES = 2.5
 """How many standard deviations of noise still count as the same light."""
 
 
+def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> np.ndarray:
+    """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
+    mi = mitsuba()
+    import drjit as dr
+
+    grid, out = _Grid(atlas, luxels, chosen), np.zeros(len(e), np.float32)
+    if not len(grid.mine):
+        return out
+    values = mi.Float(np.ascontiguousarray(e.mean(1), np.float32))
+    mean, square, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
+    for _, _, q, inside in grid.around(1):
+        v = dr.gather(mi.Float, values, q, inside)
+        mean += v
+        square += dr.square(v)
+        count += dr.select(inside, 1.0, 0.0)
+    n = dr.maximum(count, 1.0)
+    out[grid.mine] = np.asarray(dr.maximum(square / n - dr.square(mean / n), 0.0))
+    return out
+
+
 def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """(m,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are."""
     mi = mitsuba()

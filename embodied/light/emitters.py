@@ -5,6 +5,7 @@ All intensities are radiosities or radiances in units of 100 cd/m2 (see sky.py).
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from embodied.house import House, Opening
 from embodied.light.atlas import Atlas
+from embodied.light.backend import constant, mitsuba, r2, vector
 from embodied.light.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
@@ -58,6 +60,8 @@ class Lamp:
     """Glowing square metres; 1 for a bare bulb."""
     owner: str | None
     """Placement whose own faces do not stand in a bare bulb's way."""
+    weights: np.ndarray
+    """(k,) how many times its even share of the surface each point stands for; 1 where points are spread evenly."""
 
 
 def portals_of(house: House) -> tuple[Portal, ...]:
@@ -115,12 +119,39 @@ def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ..
                 if light is not near[0]:
                     continue
             at, n = _spread(corners, area, points)
-            lamps.append(Lamp(light.id, light.room, at, n, radiance, total, None))
+            lamps.append(Lamp(light.id, light.room, at, n, radiance, total, None, np.ones(points)))
         else:
             intensity = color * light.power / _luminance(color) / (4 * np.pi) / UNIT
             shell = np.array([_ball(k, 24) for k in range(24)]) * 0.05 + np.asarray(light.position)
-            lamps.append(Lamp(light.id, light.room, shell, np.zeros((24, 3)), intensity, 1.0, light.placement))
+            lamps.append(Lamp(light.id, light.room, shell, np.zeros((24, 3)), intensity, 1.0, light.placement, np.ones(24)))
     return tuple(lamps)
+
+
+def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lamp:
+    """The same lamp with its points drawn by how freely they shine out of their fitting.
+
+    Most of a shaded lamp's surface is hidden by the shade; points spread evenly would leave each
+    luxel with one lucky ray in ten and speckle the walls. The mean stays what it was.
+    """
+    if not lamp.normals.any():
+        return lamp
+    mi = mitsuba()
+    import drjit as dr
+
+    n = vector(lamp.normals)
+    origin, frame, free = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n), dr.zeros(mi.Float, len(lamp.points))
+    for k in range(rays):
+        d = frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(*(constant(x) for x in r2(k)))))
+        free += dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0)
+        dr.eval(free)
+    share = np.asarray(free) / rays
+    if not share.any():
+        return lamp
+    chance = np.where(share > 0, np.maximum(share, 0.1), 0.0)
+    chance /= chance.sum()
+    count = len(share)
+    pick = np.minimum(np.searchsorted(np.cumsum(chance), (np.arange(count) + 0.5) / count), count - 1)
+    return dataclasses.replace(lamp, points=lamp.points[pick], normals=lamp.normals[pick], weights=1 / (count * chance[pick]))
 
 
 def glowing_faces(atlas: Atlas) -> dict[str, np.ndarray]:

@@ -42,6 +42,8 @@ class Lights:
     points: object
     normals: object
     """(k * POINTS * 3) of lamps."""
+    weights: object
+    """(k * POINTS)."""
     bare: object
     lamp: object
     """(k,) bool: a bare bulb; any lamp."""
@@ -101,6 +103,7 @@ def lights_of(atlas, lux: Luxels, space: Space, portals: Sequence[Portal], lamps
         flat([zero] * len(portals) + [x.radiance for x in lamps]),
         flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
         flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
+        flat([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
         mi.Bool([False] * len(portals) + [not x.normals.any() for x in lamps]),
         mi.Bool([False] * len(portals) + [True] * len(lamps)), tuple(spaces), mi.UInt32(index or [0]), scene,
         outdoors.sun_direction, outdoors.sun * radiosity.GLASS,
@@ -157,6 +160,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
     for i, world in enumerate(lights.spaces):
         blocked |= world.scene.ray_test(ray, active & (which == i))
     g = cos * leaving / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4)) * dr.gather(mi.Float, lights.strength, pick)
+    g *= dr.select(lamp, dr.gather(mi.Float, lights.weights, spot), 1.0)
     light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space, d, active)))
     return mi.Color3f(dr.select(active & ~blocked, light * dr.minimum(g, dr.select(bare, 400.0, 4.0)) / chance, 0.0))
 

@@ -178,6 +178,7 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
     count = len(lamp.points)
     at = mi.Float(np.ascontiguousarray(lamp.points, np.float32).ravel())
     out = mi.Float(np.ascontiguousarray(lamp.normals, np.float32).ravel())
+    weights = mi.Float(np.ascontiguousarray(lamp.weights, np.float32))
     strength = constant(lamp.area / np.pi / samples)
     total = dr.zeros(mi.Float, p.n)
     for k in range(samples):
@@ -193,6 +194,7 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
             leaving = -dr.dot(dr.gather(mi.Vector3f, out, i), d)
             active &= leaving > 0
             g = cos * leaving / dr.maximum(dr.square(far), 1e-4)
+        g *= dr.gather(mi.Float, weights, i)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - (4 * LIFT if not bare else 0.06), 0.0, [])
         active &= ray.maxt > 0
         total += dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), constant((4.0 if not bare else 400.0) / samples))

@@ -268,7 +268,10 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e
     indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
     indirect = space(denoise.smooth_pages(indirect, *on_page, variance=light.variance), 3, 0.9)
-    direct = space(denoise.smooth_pages(mend(light.direct), *on_page, steps=(1, 2, 4), likeness=(0.5, 0.3, 0.15)), 2, 0.6)
+    direct = mend(light.direct)
+    grain = denoise.spatial_variance(direct, atlas, lux.texels, lux.shell) * 0.3
+    direct = denoise.smooth_pages(direct, *on_page, steps=(1, 2, 4), likeness=(0.3, 0.2, 0.12), variance=grain)
+    direct = space(direct, 2, 0.6)
     patches = mend(light.patches)
     total = direct + indirect + patches
     if soft.any():

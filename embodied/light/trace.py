@@ -123,7 +123,7 @@ def world_of(bake: Bake, house: House) -> World:
 def _lamps(bake: Bake) -> tuple[Lamp, ...]:
     with np.load(bake.folder / "lamps.npz", allow_pickle=False) as z:
         return tuple(
-            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), None)
+            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), None, z[f"weights{i}"])
             for i, x in enumerate(bake.manifest["lamps"])
         )
 
