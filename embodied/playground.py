@@ -20,8 +20,8 @@ from embodied.datasets.store import Dataset
 from embodied.env import HelpEnv
 from embodied.environments import environment_maker
 from embodied.features import semantic_features
-from embodied.interface import Task
-from embodied.language.plain import PlainLanguage
+from embodied.interface import Language, Task
+from embodied.language import People, PlainLanguage
 from embodied.world import World, open_world
 
 if TYPE_CHECKING:
@@ -85,8 +85,11 @@ def _npy(array: np.ndarray) -> bytes:
 def _flat(
     kind: str, seed: int, cache: Path, catalogue: Catalogue, worlds: Mapping[str, World] | None
 ) -> tuple[Mapping[str, World], tuple[Task, ...], Callable[[], HelpEnv]]:
-    """One world (generated unless given), tasks in it, and a maker of environments."""
-    language = PlainLanguage()
+    """One world (generated unless given), tasks in it, and a maker of environments.
+
+    In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
+    """
+    language: Language = PlainLanguage() if worlds is not None else People(tries=1)
     if worlds is None:
         name = f"flat_{seed}"
         house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
