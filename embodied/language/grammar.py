@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,7 +28,7 @@ from embodied.language.clauses import (
     Turn,
 )
 from embodied.language.lexicon import ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
-from embodied.language.templates import FILLERS, HEDGES, LINKS, NUMBERS, SLIPS, TEMPLATES, Template
+from embodied.language.templates import FILLERS, HEDGES, LINKS, NUMBERS, SLIPS, SOON, TEMPLATES, VERBS, Template
 
 if TYPE_CHECKING:
     from embodied.language.speakers import Speaker
@@ -81,7 +81,10 @@ def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Genera
 
 
 def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: np.random.Generator) -> str:
-    slots = {}
+    slots = {
+        "walk": VERBS[0] if rng.random() < speaker.plainness else VERBS[int(rng.integers(len(VERBS)))],
+        "soon": SOON[int(rng.integers(len(SOON)))],
+    }
     rooms = [p.clause.kind for p in phrases if hasattr(p.clause, "kind")]
     for name, kind in zip(("room", "other"), rooms):
         nouns = ROOM_NOUNS[kind]
@@ -179,9 +182,9 @@ def _longest(text: str, lexicon: Lexicon) -> tuple[re.Match | None, Template]:
 @functools.lru_cache(maxsize=4)
 def _patterns(lexicon: Lexicon) -> tuple[tuple[re.Pattern, str, Template], ...]:
     """(pattern, first word or '', template) for every template."""
-    rooms = "|".join(re.escape(n) for n in sorted(ROOM_OF_NOUN, key=lambda n: (-len(n), n)))
+    rooms = _any(ROOM_OF_NOUN)
     slots = {"side": "(?P<side>left|right)", "room": f"(?P<room>{rooms})", "other": f"(?P<other>{rooms})",
-             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "thing": f"the (?P<thing>{lexicon.noun_pattern})"}
+             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "thing": f"the (?P<thing>{lexicon.noun_pattern})", "walk": f"(?:{_any(VERBS)})", "soon": f"(?:{_any(SOON)})"}
     found = []
     for t in TEMPLATES:
         pattern = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
@@ -190,6 +193,11 @@ def _patterns(lexicon: Lexicon) -> tuple[tuple[re.Pattern, str, Template], ...]:
         first = t.text.split(" ", 1)[0].lower()
         found.append((re.compile(pattern + r"(?![\w-])"), "" if first.startswith("{") else first, t))
     return tuple(found)
+
+
+def _any(words: Iterable[str]) -> str:
+    """A pattern that matches any of the words, the longest that fits."""
+    return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
 def _clauses(template: Template, match: re.Match, lexicon: Lexicon) -> list[Clause]:

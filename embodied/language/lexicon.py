@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.language.clauses import Thing
+from embodied.language.templates import PRAISE, SIZES
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -50,6 +51,25 @@ UNFIT = frozenset({
 """Classes that nobody would steer by."""
 
 
+EMPTY = frozenset({*PRAISE, *SIZES})
+"""Adjectives that a listener passes over."""
+
+
+def sizes_of(asset: Asset) -> list[str]:
+    """The words of SIZES that are true of an asset."""
+    w, d, h = asset.size
+    found = []
+    if w * d > 1.4:
+        found += ["large", "big"] + ["huge"] * (w * d > 3)
+    if max(w, d, h) < 0.45:
+        found += ["small", "little"] + ["tiny"] * (max(w, d, h) < 0.2)
+    if h > 1.6:
+        found += ["tall", "high"]
+    if max(w, d) > 1.8:
+        found += ["long", "wide"]
+    return found + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h)
+
+
 @dataclass(frozen=True)
 class Word:
     """One way to name a thing."""
@@ -79,7 +99,7 @@ class Lexicon:
                     nouns_of[asset.object_class].append(noun)
         self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
         self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
-        self.adjectives = tuple(sorted(adjectives))
+        self.adjectives = tuple(sorted(adjectives - EMPTY))
 
     def thing(self, word: Word) -> Thing:
         """What a word may stand for.
@@ -87,22 +107,28 @@ class Lexicon:
         Raises:
           KeyError: no such noun.
         """
-        return Thing(self.classes_of[word.noun], tuple(sorted(word.adjectives)))
+        return Thing(self.classes_of[word.noun], tuple(sorted(w for w in word.adjectives if w not in EMPTY)))
 
-    def words_for(self, asset: Asset, rng: np.random.Generator, *, adjectives: int) -> Word:
-        """A noun for an asset, the plain one most often, with up to `adjectives` of its colour and material words."""
+    def words_for(self, asset: Asset, rng: np.random.Generator, *, adjectives: int, ornament: float = 0.0) -> Word:
+        """A noun for an asset, with up to `adjectives` of its colour and material words.
+
+        Args:
+          ornament: probability of one more adjective, of size or of praise, that tells nothing apart.
+        """
         nouns = self.nouns_of[asset.object_class]
         own = [n for n in nouns if n == asset.object_class or n in {s.lower() for s in asset.synonyms}] or list(nouns)
-        noun = own[0] if len(own) == 1 or rng.random() < 0.6 else own[int(rng.integers(1, len(own)))]
+        noun = own[0] if len(own) == 1 or rng.random() < 0.5 else own[int(rng.integers(1, len(own)))]
         spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
-        return Word(noun, tuple(spare[:adjectives]))
+        extra = [*sizes_of(asset), *(PRAISE[int(rng.integers(len(PRAISE)))] for _ in range(3))]
+        more = [extra[int(rng.integers(len(extra)))]] if rng.random() < ornament else []
+        return Word(noun, tuple([*more, *spare[:adjectives]]))
 
     @functools.cached_property
     def noun_pattern(self) -> str:
         """Regular expression of a thing: adjectives, then the longest noun that fits."""
         nouns = "|".join(re.escape(n) for n in sorted(self.classes_of, key=lambda n: (-len(n), n)))
-        words = "|".join(re.escape(w) for w in sorted(self.adjectives, key=lambda w: (-len(w), w)))
-        return rf"(?:(?:{words}) ){{0,2}}(?:{nouns})"
+        words = "|".join(re.escape(w) for w in sorted({*self.adjectives, *EMPTY}, key=lambda w: (-len(w), w)))
+        return rf"(?:(?:{words}) ){{0,3}}(?:{nouns})"
 
     def heard(self, text: str) -> Thing:
         """The thing that a text of `noun_pattern` means; the longest noun at its end wins."""
@@ -110,14 +136,14 @@ class Lexicon:
         for i in range(len(tokens)):
             noun, words = " ".join(tokens[i:]), self._adjectives_of(tokens[:i])
             if noun in self.classes_of and words is not None:
-                return Thing(self.classes_of[noun], tuple(sorted(words)))
+                return Thing(self.classes_of[noun], tuple(sorted(w for w in words if w not in EMPTY)))
         raise ValueError(f"{text!r} names nothing of the catalogue; expected adjectives and one of its nouns")
 
     def _adjectives_of(self, tokens: list[str]) -> list[str] | None:
         """Tokens as adjectives, the longest first ('dark brown', 'wood'); None if they are none."""
         words = []
         while tokens:
-            n = next((n for n in range(len(tokens), 0, -1) if " ".join(tokens[:n]) in self.adjectives), None)
+            n = next((n for n in range(len(tokens), 0, -1) if " ".join(tokens[:n]) in self.adjectives or " ".join(tokens[:n]) in EMPTY), None)
             if n is None:
                 return None
             words.append(" ".join(tokens[:n]))

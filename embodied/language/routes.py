@@ -217,7 +217,7 @@ def _name(thing: SeenThing, view: Seen, lexicon: Lexicon, speaker: Speaker, rng:
     """
     wanted = int(rng.random() < speaker.colours)
     for adjectives in range(wanted, 3):
-        word = lexicon.words_for(thing.asset, rng, adjectives=adjectives)
+        word = lexicon.words_for(thing.asset, rng, adjectives=adjectives, ornament=speaker.ornament)
         if not says(thing.asset, meant := lexicon.thing(word)):
             continue
         others = [t for t in view.things if t.placement != thing.placement and says(t.asset, meant) and t.asset.key != thing.asset.key]
@@ -228,7 +228,7 @@ def _name(thing: SeenThing, view: Seen, lexicon: Lexicon, speaker: Speaker, rng:
 
 def _ranked(things: Sequence[SeenThing], rng: np.random.Generator) -> list[SeenThing]:
     """Things in the order somebody would think of them: large ones mostly first."""
-    weights = {t.placement: math.log(t.pixels + 1) * (1 + 0.5 * float(rng.random())) for t in sorted(things, key=lambda t: t.placement)}
+    weights = {t.placement: math.log(t.pixels + 1) * (1 + 1.2 * float(rng.random())) for t in sorted(things, key=lambda t: t.placement)}
     return sorted(things, key=lambda t: (-weights[t.placement], t.placement))
 
 

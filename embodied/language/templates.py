@@ -1,6 +1,6 @@
 """How clauses sound. A template speaks for one or two clauses at once and is read back by the parser.
 
-Slots: {side} left or right, {room} a room noun, {thing} 'the red sofa', {n} a number. A slot is
+Slots: {side} left or right, {room} a room noun, {thing} 'the red sofa', {n} a number, {walk} a verb, {soon} an adverb. A slot is
 filled by the first clause of the template that has such a field. Weights: how much each habit of
 speech likes a template; a habit that is not named uses 1.
 """
@@ -32,41 +32,42 @@ def _all(kinds: str, *lines: str) -> list[Template]:
 TEMPLATES: tuple[Template, ...] = tuple([
     *_all("turn", "turn {side}", "take a {side}", "turn to your {side}", "make a {side} turn", "terse: go {side}",
           "chatty: hang a {side}", "formal: rotate ninety degrees to the {side}", "face {side}", "turn to the {side}",
-          "chatty: you want to turn {side}", "swing {side}", "chatty: make a {side}"),
+          "chatty: you want to turn {side}", "swing {side}", "chatty: make a {side}", "turn {side} {soon}",
+          "turn {side} {soon}", "{soon} turn {side}", "go {side} {soon}"),
     *_all("slight", "turn slightly {side}", "bear {side}", "veer {side}", "keep {side}", "turn a little to the {side}",
           "chatty: turn just a bit to your {side}", "go slightly to the {side}", "formal: rotate slightly to the {side}",
           "angle {side}", "turn half {side}", "drift {side}"),
     *_all("around", "turn around", "turn back", "turn all the way around", "chatty: do a complete turnaround",
           "face the other way", "terse: about face", "formal: rotate one hundred and eighty degrees",
           "chatty: do a full one eighty", "reverse direction", "turn right around", "make a u-turn"),
-    *_all("exit", "leave the {room}", "exit the {room}", "walk out of the {room}", "go out of the {room}", "step out of the {room}",
+    *_all("exit", "leave the {room}", "exit the {room}", "{walk} out of the {room}", "go out of the {room}", "step out of the {room}",
           "head out of the {room}", "chatty: get out of the {room}", "terse: out of the {room}", "formal: depart from the {room}",
           "walk out the door of the {room}", "go through the door and out of the {room}", "come out of the {room}"),
-    *_all("enter", "enter the {room}", "walk into the {room}", "go into the {room}", "step into the {room}", "head into the {room}",
+    *_all("enter", "enter the {room}", "{walk} into the {room}", "go into the {room}", "step into the {room}", "head into the {room}",
           "go through the doorway into the {room}", "walk through the door to the {room}", "terse: into the {room}",
           "continue into the {room}", "chatty: make your way into the {room}", "formal: proceed into the {room}",
           "move into the {room}", "walk straight into the {room}", "pass through the doorway to the {room}",
           "chatty: pop into the {room}", "cross the threshold into the {room}", "come into the {room}",
           "go through the opening to the {room}", "advance into the {room}", "chatty: wander into the {room}"),
-    *_all("cross", "walk through the {room}", "cross the {room}", "continue along the {room}", "go across the {room}",
+    *_all("cross", "{walk} through the {room}", "cross the {room}", "continue along the {room}", "go across the {room}",
           "keep walking through the {room}", "head down the {room}", "follow the {room}", "formal: traverse the {room}",
           "stay in the {room} and keep going", "walk the length of the {room}", "terse: along the {room}", "proceed along the {room}"),
-    *_all("forward", "walk straight ahead", "go straight", "walk forward", "continue straight", "keep going straight", "move ahead",
+    *_all("forward", "{walk} straight ahead", "go straight", "walk forward", "continue straight", "keep going straight", "move ahead",
           "head straight on", "terse: straight", "chatty: just keep going", "formal: proceed straight ahead", "carry on ahead",
           "continue forward", "go ahead", "walk on", "keep on walking", "chatty: keep heading the same way", "stride ahead"),
-    *_all("metres", "walk {n} meters", "go forward about {n} meters", "walk straight for {n} meters", "move ahead {n} meters",
+    *_all("metres", "{walk} {n} meters", "go forward about {n} meters", "walk straight for {n} meters", "move ahead {n} meters",
           "take {n} big steps forward", "terse: {n} meters ahead", "chatty: go on for maybe {n} meters or so",
           "formal: proceed approximately {n} meters", "continue for {n} meters", "go roughly {n} meters"),
-    *_all("to", "walk to {thing}", "go to {thing}", "walk up to {thing}", "head for {thing}", "head towards {thing}", "walk toward {thing}",
+    *_all("to", "{walk} to {thing}", "go to {thing}", "{walk} up to {thing}", "head for {thing}", "head towards {thing}", "{walk} toward {thing}",
           "continue until you reach {thing}", "go over to {thing}", "move to {thing}", "terse: to {thing}", "terse: toward {thing}", "go straight to {thing}",
           "chatty: make your way over to {thing}", "formal: proceed to {thing}", "keep going until you get to {thing}",
           "walk until you are beside {thing}", "approach {thing}", "aim for {thing}", "chatty: you will see {thing} so walk over to it",
           "go as far as {thing}", "walk straight to {thing}", "advance to {thing}", "step over to {thing}",
           "walk in the direction of {thing}", "chatty: look for {thing} and go there"),
-    *_all("past", "walk past {thing}", "go past {thing}", "pass {thing}", "continue past {thing}", "walk by {thing}", "pass by {thing}",
+    *_all("past", "{walk} past {thing}", "go past {thing}", "pass {thing}", "continue past {thing}", "{walk} by {thing}", "pass by {thing}",
           "terse: past {thing}", "go around {thing}", "chatty: you will go past {thing}", "formal: proceed past {thing}",
           "move past {thing}", "walk alongside {thing}", "head past {thing}", "keep going beyond {thing}"),
-    *_all("past_side", "walk past {thing} on your {side}", "pass {thing} on the {side}", "go past {thing} on your {side}",
+    *_all("past_side", "{walk} past {thing} on your {side}", "pass {thing} on the {side}", "go past {thing} on your {side}",
           "keep {thing} on your {side}", "walk along with {thing} to your {side}", "continue past {thing} on the {side}",
           "chatty: you will have {thing} on your {side} as you walk", "formal: proceed with {thing} on the {side}",
           "leave {thing} to your {side}", "terse: past {thing} on {side}", "stroll by {thing} on your {side}"),
@@ -123,4 +124,19 @@ SLIPS = {
     "entrance": "enterance", "immediately": "immediatly", "table": "tabel", "chair": "chiar", "cabinet": "cabnet", "mirror": "miror",
 }
 """Harmless slips of the keyboard."""
+VERBS = (
+    "walk", "stroll", "stride", "step", "move", "continue", "proceed", "head", "go", "travel", "wander", "amble", "saunter", "march",
+    "carry on", "progress", "venture", "make your way", "journey", "advance", "pace", "trot", "tread", "navigate", "cruise", "mosey", "drift",
+    "press on", "keep on", "scoot", "shuffle", "hike",
+)
+"""What {walk} may be, the plainest first."""
+SOON = ("immediately", "right away", "at once", "straight away", "promptly", "directly", "sharply", "instantly", "quickly", "here", "again", "carefully")
+"""What {soon} may be."""
+PRAISE = (
+    "nice", "lovely", "pretty", "fancy", "cozy", "comfy", "stylish", "neat", "old", "modern", "simple", "elegant", "beautiful", "shiny", "sturdy",
+    "charming", "plain", "tidy", "funny", "interesting", "classy", "vintage", "handsome", "gorgeous", "ordinary", "cute", "rustic", "sleek",
+)
+"""Adjectives that say nothing which could be checked; chatty people like them."""
+SIZES = ("large", "big", "huge", "small", "little", "tiny", "tall", "high", "long", "wide", "low", "narrow")
+"""Adjectives of size; they are true when said, and nobody relies on them."""
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
