@@ -16,6 +16,8 @@ import warnings
 
 import numpy as np
 
+from embodied.errors import UnableError
+
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*",
     "/usr/local/lib/libLLVM*.so*", "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
@@ -23,7 +25,7 @@ _LLVM_PLACES = (
 OLDEST_LLVM = 15
 
 
-class LightError(RuntimeError):
+class LightError(UnableError):
     """Light cannot be computed: says what was expected, what came and what to do."""
 
 

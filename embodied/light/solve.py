@@ -219,12 +219,12 @@ def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell
     """All further bounces, by Jacobi rounds of gathering."""
     everywhere = subset(lux, np.arange(len(lux.position)))
     glow = np.where(lux.sampled[:, None], 0.0, lux.glow)
-    light = replace(light, indirect=_endless(lux, light, glow))
     first, total = 0, sum(settings.bounces)
     for samples in settings.bounces:
         tell(first / total)
         seen = _tamed(lux, lux.albedo * (light.soft + AMBIENT) + glow)
         e, bad, variance = radiosity.gather(space, everywhere, seen, samples, first)
+        e = e if first else e + _endless(lux, e, bad < 0.5)
         light = replace(light, indirect=e, good=bad < 0.5, variance=variance)
         first += samples
     return light
@@ -242,20 +242,22 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     return out
 
 
-def _endless(lux: Luxels, light: Radiosity, glow: np.ndarray) -> np.ndarray:
-    """First guess (n, 3) of all bounces: each room as a white box's sphere, e * rho / (1 - rho).
+def _endless(lux: Luxels, once: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """First guess (n, 3) of all bounces after the first one `once`: each room as a sphere, e * rho / (1 - rho).
 
-    Jacobi rounds from nothing would miss a fifth of a white room's light after four of them.
+    Jacobi rounds from nothing would miss a fifth of a white room's light after four of them. The
+    brightest luxels count at most three times the middle one: what lies between window and closed
+    curtain does not light the room.
     """
-    out = np.zeros_like(light.direct)
-    openings = 0.06  # share of a room's walls that lets light out
+    out = np.zeros_like(once)
+    openings = 0.03  # share of a room's walls that lets light out
     for unit in np.unique(lux.unit):
-        mine = np.nonzero((lux.unit == unit) & lux.shell)[0]
+        mine = np.nonzero((lux.unit == unit) & lux.shell & good)[0]
         if len(mine):
             weight = lux.area[mine, None] / lux.area[mine].sum()
             rho = (lux.albedo[mine] * weight).sum(0) * (1 - openings)
-            sent = (lux.albedo[mine] * (light.direct[mine] + light.patches[mine]) + glow[mine]) * weight
-            out[lux.unit == unit] = sent.sum(0) / (1 - rho)
+            arrived = np.minimum(once[mine], 3 * np.median(once[mine], axis=0))
+            out[lux.unit == unit] = (arrived * weight).sum(0) * rho / (1 - rho)
     return out
 
 
