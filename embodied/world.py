@@ -14,6 +14,7 @@ from tqdm import tqdm
 from assets.cache import digest
 from embodied import gl, navgraph
 from embodied.house import House
+from embodied.lit import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.parts import Part, house_parts, owners
@@ -87,6 +88,11 @@ class World:
     def path(self) -> Path:
         """Where the panoramas of this world are, or will be, on disk."""
         return self._path or self.cache / "panoramas" / f"{digest(self.fingerprint)[:32]}.pano"
+
+    @property
+    def lit(self) -> LitPages | None:
+        """The house with its baked light painted on; None for unlit worlds. Bakes on first use."""
+        return None if self.quality == "unlit" else self._bake.lit
 
     @property
     def renderer(self) -> Renderer:

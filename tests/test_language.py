@@ -115,7 +115,7 @@ def test_a_walk_carries_out_its_own_description_better_than_anothers(world, spok
     for i, (text, path, yaw) in enumerate(spoken):
         own.append(cost(world, parse(text, lexicon), path, yaw))
         others.append(cost(world, parse(spoken[(i + 7) % len(spoken)][0], lexicon), path, yaw))
-    assert np.median(own) < 4.0 < np.median(others)
+    assert np.mean(np.array(own) < np.array(others)) >= 0.85 and np.median(own) < 0.6 * min(np.median(others), 1e3)
 
 
 def test_instructions_are_as_long_as_those_of_people_and_all_different(spoken):

@@ -10,15 +10,17 @@ import cv2
 import fast_simplification
 import numpy as np
 import rerun as rr
+from scipy.spatial import cKDTree
 
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
+from embodied.lit import LitMesh, LitPages
 from embodied.parts import Part
 
 BUDGET = 500
 """Triangles kept per mesh of an object; the shell is left as it is."""
-SHELL_CELL = 0.12
-"""Side in metres of the grid on which a lit wall or floor carries its colours."""
+PICTURE = 160
+"""Longest side in pixels of the picture of a lit wall or floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +39,26 @@ class LightMesh:
     """(n, 3) float32, or None where the colours already hold the light."""
 
 
-def light_meshes(parts: Sequence[Part], budget: int = BUDGET) -> tuple[LightMesh, ...]:
-    """One mesh per owner that can be seen from above: ceilings and the outdoors are left out."""
+@dataclass(frozen=True, eq=False)
+class LitSurface:
+    """A wall or floor with its light as a picture."""
+
+    path: str
+    positions: np.ndarray
+    """(n, 3) float32, metres, world."""
+    faces: np.ndarray
+    """(m, 3) uint32."""
+    uv: np.ndarray
+    """(n, 2) float32, v down."""
+    picture: np.ndarray
+    """(h, w, 3) uint8 sRGB."""
+
+
+def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset(), budget: int = BUDGET) -> tuple[LightMesh, ...]:
+    """One mesh per owner that can be seen from above: ceilings, the outdoors and the `hidden` owners are left out."""
     by_owner: dict[tuple[str, str], list[Part]] = {}
     for part in parts:
-        if part.kind not in ("ceiling", "outdoor"):
+        if part.kind not in ("ceiling", "outdoor") and part.owner not in hidden:
             by_owner.setdefault((part.room, part.owner), []).append(part)
     reduced: dict[tuple[str, int], tuple] = {}
     meshes = []
@@ -57,9 +74,16 @@ def light_meshes(parts: Sequence[Part], budget: int = BUDGET) -> tuple[LightMesh
     return tuple(meshes)
 
 
-def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> None:
+def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh | LitSurface]) -> None:
     """Log the house once, for all times."""
     for mesh in meshes:
+        if isinstance(mesh, LitSurface):
+            recording.log(
+                mesh.path,
+                rr.Mesh3D(vertex_positions=mesh.positions, triangle_indices=mesh.faces, vertex_texcoords=mesh.uv, albedo_texture=mesh.picture),
+                static=True,
+            )
+            continue
         recording.log(
             mesh.path,
             rr.Mesh3D(
@@ -70,38 +94,81 @@ def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> Non
         )
 
 
+def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET) -> tuple[LightMesh | LitSurface, ...]:
+    """The same from baked pages: objects with colours in their vertices, walls and floors with their light as a picture."""
+    by_owner: dict[tuple[str, str, bool], list[LitMesh]] = {}
+    for mesh in lit.meshes:
+        if mesh.kind not in ("ceiling", "outdoor") and mesh.owner not in hidden:
+            by_owner.setdefault((mesh.room, mesh.owner, mesh.kind in ("floor", "wall")), []).append(mesh)
+    small = [cv2.resize(page, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA) for page in lit.pages]
+    found: list[LightMesh | LitSurface] = []
+    for (room, owner, flat), group in by_owner.items():
+        path = f"house/{room or 'shared'}/{owner.split('/')[-1]}"
+        if flat:
+            found += [_surface(f"{path}/{i}" if i else path, m, lit.pages[m.page]) for i, m in enumerate(group)]
+        else:
+            pieces = [_lit_piece(m, small[m.page], budget // len(group)) for m in group]
+            found.append(_joined(path, pieces, shaded=False))
+    return tuple(found)
+
+
+def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LitSurface:
+    """A wall or floor with its own part of the page, at most PICTURE pixels wide or high."""
+    height, width = page.shape[:2]
+    low = np.floor(mesh.uv.min(axis=0) * [width, height]).astype(int).clip(0)
+    high = np.maximum(np.ceil(mesh.uv.max(axis=0) * [width, height]).astype(int), low + 1)
+    part = page[low[1]:high[1], low[0]:high[0]]
+    scale = min(PICTURE / max(part.shape[:2]), 1.0)
+    size = tuple(max(round(n * scale), 1) for n in part.shape[1::-1])
+    uv = (mesh.uv * [width, height] - low) / (high - low)
+    return LitSurface(path, mesh.vertices, mesh.faces.astype(np.uint32), uv.astype(np.float32), cv2.resize(part, size, interpolation=cv2.INTER_AREA))
+
+
+def _lit_piece(mesh: LitMesh, page: np.ndarray, budget: int) -> tuple:
+    """Vertices, normals, colours and faces of one mesh with the light of its page in the colours."""
+    height, width = page.shape[:2]
+    column = (mesh.uv[:, 0] * width).astype(int).clip(0, width - 1)
+    row = (mesh.uv[:, 1] * height).astype(int).clip(0, height - 1)
+    colors = np.full((len(mesh.vertices), 4), round(255 * mesh.alpha), np.uint8)
+    colors[:, :3] = page[row, column]
+    normals = np.zeros_like(mesh.vertices)
+    points, normals, colors, faces = _simplified(mesh.vertices, normals, colors, mesh.faces, budget)
+    return points, normals, colors, faces
+
+
 def _placed(positions: np.ndarray, normals: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
     turn = np.eye(3, dtype=np.float32)
     turn[:2, :2] = rotation(part.yaw)
     return positions @ turn.T + np.asarray(part.position, np.float32), normals @ turn.T
 
 
-def _joined(path: str, pieces: Sequence[tuple]) -> LightMesh:
+def _joined(path: str, pieces: Sequence[tuple], shaded: bool = True) -> LightMesh:
     starts = np.cumsum([0, *(len(p[0]) for p in pieces[:-1])])
     faces = np.concatenate([p[3] + s for p, s in zip(pieces, starts)]).astype(np.uint32)
     positions, normals, colors = (np.concatenate([p[i] for p in pieces]) for i in range(3))
-    return LightMesh(path, positions.astype(np.float32), faces, colors, normals.astype(np.float32))
+    return LightMesh(path, positions.astype(np.float32), faces, colors, normals.astype(np.float32) if shaded else None)
 
 
 def _reduce(mesh: MeshPart, budget: int | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, normals, colours and faces with at most about `budget` triangles."""
     colors = vertex_colors(mesh)
-    if budget is None or len(mesh.faces) <= max(budget, 12):
+    if budget is None:
         return mesh.vertices, mesh.normals, colors, mesh.faces
-    points, faces = fast_simplification.simplify(
-        np.ascontiguousarray(mesh.vertices, np.float32), np.ascontiguousarray(mesh.faces, np.int32),
-        target_count=max(budget, 12), agg=5.0,
+    return _simplified(mesh.vertices, mesh.normals, colors, mesh.faces, budget)
+
+
+def _simplified(vertices: np.ndarray, normals: np.ndarray, colors: np.ndarray, faces: np.ndarray, budget: int) -> tuple:
+    """A mesh with at most about `budget` triangles; new vertices take normal and colour of the nearest old one."""
+    budget = max(budget, 12)
+    if len(faces) <= budget:
+        return vertices, normals, colors, faces
+    points, fewer = fast_simplification.simplify(
+        np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32), target_count=budget, agg=5.0,
     )
-    if len(faces) == 0:
-        return mesh.vertices, mesh.normals, colors, mesh.faces
-    nearest = _nearest(mesh.vertices, points)
-    return points, mesh.normals[nearest], colors[nearest], faces
-
-
-def _nearest(points: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    from scipy.spatial import cKDTree
-
-    return cKDTree(points).query(queries)[1]
+    if len(fewer) == 0:
+        return vertices, normals, colors, faces
+    nearest = cKDTree(vertices).query(points)[1]
+    return points, normals[nearest], colors[nearest], fewer
 
 
 def vertex_colors(mesh: MeshPart) -> np.ndarray:

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
 from embodied.world import World
-from viz.house3d import light_meshes, log_house
+from viz.house3d import light_meshes, lit_meshes, log_house
 
 PALETTE = {
     "graph": (120, 130, 150), "path": (31, 119, 255), "route": (255, 160, 30),
@@ -76,7 +76,8 @@ def record(
 def log_world(recording: rr.RecordingStream, world: World) -> None:
     """The house without ceilings, and its navigation graph, for all times."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    log_house(recording, light_meshes(world.parts))
+    hung = frozenset(p.id for p in world.house.placements if world.catalogue.assets[p.asset].support == "ceiling")
+    log_house(recording, light_meshes(world.parts, hung) if world.lit is None else lit_meshes(world.lit, hung))
     floor = world.graph.positions - [0, 0, 1.45]
     recording.log("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]), static=True)
     strips = floor[np.asarray(world.graph.edges)]
@@ -165,7 +166,7 @@ def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float
         camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.9, color=PALETTE["agent"],
     ), encoded(view, pictures.jpeg))
     equirect = panorama.equirect(pictures.panorama)
-    shift = int(round(yaw / (2 * np.pi) * equirect.shape[1]))
+    shift = round(yaw / (2 * np.pi) * equirect.shape[1])
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), pictures.jpeg))
     eye = world.graph.positions[node]
     recording.log("agent/body", rr.Capsules3D(lengths=1.0, radii=0.2, translations=[eye - [0, 0, 1.3]], colors=(*PALETTE["agent"], 200)))
