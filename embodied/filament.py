@@ -17,6 +17,7 @@ gl.prepare()
 import mujoco
 import numpy as np
 
+from embodied.errors import UnableError
 from embodied.house import House
 from embodied.lit import LitPages
 from embodied.scene import build_spec, compile_spec
@@ -26,7 +27,7 @@ EXPOSURE = 0.73
 REMEDY = "install Vulkan (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers), or use backend 'classic'"
 
 
-class VulkanError(RuntimeError):
+class VulkanError(UnableError):
     """Filament cannot draw here; says what to do."""
 
 

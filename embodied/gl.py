@@ -14,7 +14,11 @@ import functools
 import os
 from dataclasses import dataclass
 
+from embodied.errors import UnableError
+
 BACKENDS = ("egl", "osmesa")
+ELSEWHERE = ("", "glfw", "glx", "cgl", "wgl", "enable", "enabled", "on", "true", "1", "disable", "disabled", "off", "false", "0")
+"""Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
     "or OSMesa (apt-get install libosmesa6) and set MUJOCO_GL=osmesa"
@@ -23,7 +27,7 @@ SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
 """Words by which a device name tells that no graphics hardware is used."""
 
 
-class GLError(RuntimeError):
+class GLError(UnableError):
     """No OpenGL context can be had; says why and what to do."""
 
 
@@ -49,7 +53,7 @@ def choose() -> str:
     Raises:
       GLError: MUJOCO_GL names something that draws on a screen, or neither EGL nor OSMesa is there.
     """
-    asked = os.environ.get("MUJOCO_GL", "").lower()
+    asked = os.environ.get("MUJOCO_GL", "").lower().strip()
     if asked and asked not in BACKENDS:
         raise GLError(f"MUJOCO_GL is {asked!r}; off-screen rendering needs one of {BACKENDS}, or unset it")
     backend = asked or _first_available()
@@ -59,7 +63,13 @@ def choose() -> str:
 
 
 def prepare() -> None:
-    """Set MuJoCo's switch before mujoco is imported; that nothing can draw is said only when asked to draw."""
+    """Set MuJoCo's switch before mujoco is imported; that nothing can draw is said only when asked to draw.
+
+    Raises:
+      GLError: MUJOCO_GL is a word with which mujoco cannot even be imported.
+    """
+    if os.environ.get("MUJOCO_GL", "").lower().strip() not in (*BACKENDS, *ELSEWHERE):
+        choose()
     with contextlib.suppress(GLError):
         choose()
 

@@ -36,6 +36,7 @@ from agents.imitation.losses import IGNORE
 from agents.vision.bank import FeatureBank
 from embodied import metrics
 from embodied.env import HelpEnv
+from embodied.errors import UnableError
 from embodied.interface import Ask, Episode, Task, Teacher
 from embodied.rollout import play
 from embodied.seeds import stream
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 Note = Callable[[str], None]
 
 
-class TrainingError(RuntimeError):
+class TrainingError(UnableError):
     """Training cannot go on; the last checkpoint is intact."""
 
 
@@ -103,7 +104,7 @@ def train(
         note(f"continuing after update {progress.update}")
     if parallel.rank() == 0:
         (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
-    learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0])
+    learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout)
     report = Report(folder, config.iterations, progress, note if parallel.rank() == 0 else lambda line: None)
     began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
 

@@ -7,51 +7,89 @@ This is the one place of the package where everything meets: subcommands may imp
 from __future__ import annotations
 
 import argparse
+import ast
+import errno
 import importlib
+import os
 import sys
+import warnings
 from collections.abc import Sequence
+from pathlib import Path
+
+from embodied.errors import UnableError
 
 COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features",
             "train", "eval", "judge", "bench")
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
+REMEDIES = {
+    errno.ENOSPC: "the disk is full; free some space, or put --cache and --out on another disk. What is whole is kept",
+    errno.EDQUOT: "your share of the disk is used up; free some space, or put --cache and --out on another disk",
+    errno.EACCES: "it may not be read or written by you; choose another --out or --cache",
+    errno.EPERM: "it may not be read or written by you; choose another --out or --cache",
+    errno.EROFS: "this disk is read-only; choose another --out or --cache",
+    errno.EEXIST: "a file stands where a folder is needed; move it away or choose another name",
+    errno.ENOTDIR: "a file stands where a folder is needed; move it away or choose another name",
+    errno.EISDIR: "a folder stands where a file is needed; move it away or choose another name",
+    errno.ENOENT: "there is no such file or folder, and it cannot be made; check the path",
+}
+"""What to do about an error of the operating system."""
 
-class UserError(Exception):
-    """A mistake of the caller; the message is all that is shown."""
 
-
-def parser() -> argparse.ArgumentParser:
-    """The whole argument parser."""
+def parser(chosen: str | None = None) -> argparse.ArgumentParser:
+    """The argument parser; of the subcommands, only `chosen` gets its options (and is imported)."""
     top = argparse.ArgumentParser(
         prog="embodied",
         description="Generated houses in MuJoCo, panoramas, and agents that ask people for help.",
         epilog="Start with `embodied doctor`, then `embodied demo`. `embodied COMMAND --help` explains each.",
     )
+    top.add_argument("--traceback", action="store_true", help="show where in the code an error comes from (before COMMAND)")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = importlib.import_module(f"embodied.cli.{name}")
-        summary = module.__doc__.splitlines()[0].rstrip(".")
+        text = ast.get_docstring(ast.parse((Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")))
+        summary = text.splitlines()[0].rstrip(".")
         sub = commands.add_parser(
             name,
             help=summary[0].lower() + summary[1:],
-            description=module.__doc__,
+            description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add(sub)
-        sub.set_defaults(run=module.run)
+        if name == chosen:
+            module = importlib.import_module(f"embodied.cli.{name}")
+            module.add(sub)
+            sub.set_defaults(run=module.run)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one subcommand; returns the exit status (2: wrong input, 130: Ctrl-C)."""
-    args = parser().parse_args(argv)
+    """Run one subcommand; returns the exit status (2: wrong input or an unable machine, 130: Ctrl-C)."""
+    argv = sys.argv[1:] if argv is None else list(argv)
     try:
-        return args.run(args) or 0
+        args = parser(next((a for a in argv if a in COMMANDS), None)).parse_args(argv)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            return args.run(args) or 0
     except KeyboardInterrupt:
         print("\nstopped; finished parts are kept and the same command goes on from there", file=sys.stderr)
         return 130
-    except (UserError, ValueError, OSError) as e:
-        if getattr(args, "traceback", False):
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except (ValueError, OSError, UnableError) as e:
+        if "--traceback" in argv:
             raise
-        print(f"error: {e}", file=sys.stderr)
+        print(f"error: {message_of(e)}", file=sys.stderr)
         return 2
+
+
+def message_of(error: Exception) -> str:
+    """What is shown of an error: one line, with the remedy."""
+    if isinstance(error, OSError) and error.errno in REMEDIES and error.strerror:
+        where = f"{error.filename}: " if error.filename else ""
+        return f"{where}{error.strerror}: {REMEDIES[error.errno]}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+    """Warnings as one line, without a piece of source."""
+    print(f"warning: {message}", file=sys.stderr)

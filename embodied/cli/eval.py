@@ -38,14 +38,13 @@ def run(args: argparse.Namespace) -> int:
 
     from assets.cache import write_bytes
     from embodied import tables
-    from embodied.cli import UserError
     from embodied.datasets.store import Dataset
     from embodied.evaluate import AGENTS, LOOKING, agent, evaluate
     from embodied.records import fingerprint, save_lines
 
     data = Dataset(args.data)
     if data.kind != args.kind:
-        raise UserError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
+        raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names = args.agent or list(AGENTS[args.kind])
     rows = []
     for split in args.split:

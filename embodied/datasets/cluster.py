@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from embodied.errors import UnableError
+
 RETRIES = 5
 """How often a unit is begun again on another node when the one it ran on dies."""
 
@@ -19,12 +21,12 @@ def run_on_ray(job: Callable[..., str], work: Sequence[Any], arguments: tuple, a
       address: of the cluster, or 'local' for one on this machine.
 
     Raises:
-      ImportError: Ray is not installed.
+      UnableError: Ray is not installed.
     """
     try:
         import ray
     except ImportError as e:
-        raise ImportError("--ray needs Ray; install it with: pip install 'embodied[ray]', or use --workers") from e
+        raise UnableError("--ray needs Ray; install it with: pip install 'embodied[ray]', or use --workers") from e
     started = not ray.is_initialized()
     if started:
         ray.init(address=None if address == "local" else address, log_to_driver=False, include_dashboard=False)
