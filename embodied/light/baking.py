@@ -321,14 +321,14 @@ def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clo
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
-    """70th percentile of e (without the sun's own) on the shell of every room."""
+    """85th percentile of e (without the sun's own) on the shell of every room."""
     e = light.soft
     room_of_owner = np.array([[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms])
     room = room_of_owner[lux.owner]
     out = {}
     for i, r in enumerate(house.rooms):
         mine = (room == i) & lux.shell & light.good
-        out[r.id] = np.percentile(e[mine], 70, axis=0) if mine.any() else np.zeros(3)
+        out[r.id] = np.percentile(e[mine], 85, axis=0) if mine.any() else np.zeros(3)
     return out
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-VERSION = 6
+VERSION = 7
 """Counts up whenever a bake would come out differently; older bakes are then made anew."""
 
 
@@ -18,7 +18,7 @@ class Settings:
     """Luxels per piece of furniture."""
     sky_rays: int = 24
     """Rays per luxel and window."""
-    lamp_rays: int = 16
+    lamp_rays: int = 24
     sun_rays: int = 12
     """Rays over the sun's disc per texel near a shadow's edge."""
     patches: int = 64
@@ -30,7 +30,7 @@ class Settings:
 
 
 QUALITIES = {
-    "draft": Settings(24.0, 1800.0, 16, 12, 6, 32, (4, 4, 4, 4, 6, 40), 90),
+    "draft": Settings(24.0, 1800.0, 16, 20, 6, 32, (4, 4, 4, 4, 6, 40), 90),
     "normal": Settings(),
     "high": Settings(56.0, 14000.0, 48, 24, 16, 96, (8, 8, 12, 16, 128), 94),
 }

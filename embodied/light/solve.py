@@ -271,8 +271,8 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
     indirect = space(denoise.smooth_pages(indirect, *on_page, variance=light.variance), 3, 0.9)
     direct = mend(light.direct)
-    grain = denoise.spatial_variance(direct, atlas, lux.texels, lux.shell) * 0.3
-    direct = denoise.smooth_pages(direct, *on_page, steps=(1, 2, 4), likeness=(0.3, 0.2, 0.12), variance=grain)
+    grain = denoise.spatial_variance(direct, atlas, lux.texels, lux.shell) * 0.8
+    direct = denoise.smooth_pages(direct, *on_page, steps=(1, 2, 4, 8), likeness=(0.3, 0.2, 0.12, 0.1), variance=grain)
     direct = space(direct, 2, 0.6)
     patches = mend(light.patches)
     total = direct + indirect + patches

@@ -17,8 +17,8 @@ from scipy.ndimage import map_coordinates
 from embodied.house import House
 from embodied.light.atlas import gamma
 
-TARGET = 0.9
-"""Linear value (before the curve) that a white sheet in a room's fuller light (70th percentile) is brought to."""
+TARGET = 1.05
+"""Linear value (before the curve) that a white sheet in a room's fuller light (85th percentile) is brought to."""
 ADAPT = 0.9
 """How far exposure follows a room's own light rather than the house's."""
 BALANCE = 0.62
@@ -76,7 +76,7 @@ def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> E
     """Set the gains.
 
     Args:
-      light: room id to (3,) 70th percentile of e on its walls, floor and ceiling.
+      light: room id to (3,) 85th percentile of e on its walls, floor and ceiling.
       outside: (3,) middle radiance of what windows show.
     """
     e = np.array([light[r.id] for r in house.rooms])
