@@ -30,8 +30,8 @@ from agents.vocabulary import build_vocabulary
 from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
-from embodied.evaluate import AGENTS, evaluate, spread
 from embodied.evaluate import agent as agent_without_learning
+from embodied.evaluate import evaluate, spread
 from embodied.interface import Episode
 from embodied.records import save_lines
 from embodied.tables import as_json, markdown, save

@@ -50,7 +50,7 @@ torch.set_num_threads(1)
 
 TINY = dataclasses.replace(
     SCALES["mini"], hidden_size=32, navigation_embedding=32, ask_embedding=8, self_heads=2, text_heads=2, dropout=0.1,
-    iterations=4, batch=6, training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
+    iterations=4, batch=6, evaluation_choice="likeliest", training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
     instruction_length=40, learning_rate=3e-3,
 )
 
@@ -217,6 +217,23 @@ def test_two_observations_that_differ_only_in_what_is_private_look_the_same():
     b = other.percept([turned(seen, 4)], other.start((0,)))
     for name in ("current", "actions", "action_slots"):
         assert torch.equal(getattr(a, name), getattr(b, name)), name
+
+
+def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
+    """So a panorama still equals its target image exactly, whatever is hidden."""
+    split = setting()
+    learner = for_training(agent_for(split).policy(split.bank), environment_dropout=0.5)
+    sight = Sight("grid0", 0)
+    first = dataclasses.replace(split.make_env().reset(split.tasks[0]), sight=sight, target=sight, turn=0)
+    torch.manual_seed(0)
+    memory = learner.start((0, 1))
+    percept = learner.percept([first, first], memory)
+    assert torch.equal(percept.current, percept.target)
+    hidden = percept.current.abs().sum(1) == 0  # (2, D)
+    assert 0.2 < hidden.float().mean() < 0.8
+    assert not torch.equal(hidden[0], hidden[1])
+    assert torch.equal(hidden[1:], learner.percept([first], memory.keep((1,))).current.abs().sum(1) == 0)
+    assert agent_for(split).policy(split.bank).start((0,)).channels is None
 
 
 def test_labels_line_up_with_what_the_networks_said():

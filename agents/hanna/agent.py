@@ -13,7 +13,7 @@ import torch
 from agents.hanna.asking import RULES
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
-from agents.hanna.policy import HannaPolicy, choose_likeliest
+from agents.hanna.policy import CHOOSERS, HannaPolicy
 from agents.imitation.config import TrainingConfig
 from agents.options import SHIPPED_AGENT
 from agents.vision.bank import FeatureBank
@@ -48,7 +48,7 @@ class HannaAgent:
                 "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
             )
         return HannaPolicy(
-            self.network, self.vocabulary, bank, choose=choose_likeliest, ask_rule=RULES[self.config.ask_rule][1],
+            self.network, self.vocabulary, bank, choose=CHOOSERS[self.config.evaluation_choice], ask_rule=RULES[self.config.ask_rule][1],
             instruction_length=self.config.instruction_length, turn_to_agent=self.config.turn_to_agent,
             read_assistance=self.config.read_assistance,
         )

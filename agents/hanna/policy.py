@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 from agents.hanna.asking import AskRule, ask_greedily, ask_sampled
@@ -36,6 +37,9 @@ def choose_sampled(probabilities: np.ndarray, rng: np.random.Generator) -> int:
     return int(possible[min(drawn, len(possible) - 1)])
 
 
+CHOOSERS: dict[str, Chooser] = {"likeliest": choose_likeliest, "sampled": choose_sampled}
+
+
 @dataclass(frozen=True, eq=False)
 class Moment:
     """What the networks said in one step, for the episodes that were still running."""
@@ -57,6 +61,8 @@ class HannaMemory:
     previous_ask: Tensor
     """(k,) int64."""
     last_ask: tuple[int, ...]
+    channels: Tensor | None = None
+    """(k, D) what each episode sees of every feature channel; None is everything."""
     moments: tuple[Moment, ...] = ()
     """All steps so far, if the policy keeps them."""
 
@@ -70,6 +76,7 @@ class HannaMemory:
             self, positions=positions, networks=tuple(m.select(index) for m in self.networks),
             previous_action=self.previous_action[index], previous_ask=self.previous_ask[index],
             last_ask=tuple(self.last_ask[r] for r in rows),
+            channels=None if self.channels is None else self.channels[index],
         )
 
 
@@ -88,6 +95,9 @@ class HannaPolicy:
     (X27), which tells the agent where east is; D.1 leaves the order open and a robot has no compass."""
     read_assistance: bool = True
     """False: on a route the text is empty, 'target image only' of Table 4.4."""
+    environment_dropout: float = 0.0
+    """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
+    plays in a house that looks a little different, so houses cannot be learned by heart. For training."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
     _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
@@ -143,16 +153,18 @@ class HannaPolicy:
         moments = (*memory.moments, Moment(positions, scores)) if self.keep_moments else ()
         return actions, HannaMemory(
             positions, networks, percept.actions[rows, torch.tensor(chosen, device=device)],
-            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device), tuple(last_ask), moments,
+            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device), tuple(last_ask),
+            memory.channels, moments,
         )
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
-        k, device = len(positions), next(self.network.parameters()).device
+        k, device, share = len(positions), next(self.network.parameters()).device, self.environment_dropout
+        ones = torch.ones(k, self.bank.size, device=device)
         return HannaMemory(
             positions, self.network.start(k, self.instruction_length),
             torch.zeros(k, self.network.config.action_size, device=device),
-            torch.full((k,), START, device=device), (-1,) * k,
+            torch.full((k,), START, device=device), (-1,) * k, F.dropout(ones, share) if share else None,
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -174,12 +186,14 @@ class HannaPolicy:
         device = next(self.network.parameters()).device
         send = lambda array: torch.from_numpy(array).to(device)
         current = self.bank.gather([o.sight for o in observations])  # (k, 36, D) absolute
+        target = self.bank.gather([o.target for o in observations])
+        if memory.channels is not None:
+            current, target = current * memory.channels[:, None], target * memory.channels[:, None]
         rows = torch.arange(k, device=device)[:, None]
         looks = current[rows, send(views)]  # (k, A, D)
         facing = orientation(send(angles[0]), send(angles[1]), config.orientation_copies)  # exact bearing (X11)
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
-        target = self.bank.gather([o.target for o in observations])
         if self.turn_to_agent:
             order = np.arange(VIEWS)[None]
             order = send(order // HEADINGS * HEADINGS + (order + turns) % HEADINGS)  # (k, 36)
@@ -199,9 +213,13 @@ class HannaPolicy:
         return self._encoded[text]
 
 
-def for_training(policy: HannaPolicy, ask_rule: AskRule = ask_sampled) -> HannaPolicy:
+def for_training(
+    policy: HannaPolicy, ask_rule: AskRule = ask_sampled, environment_dropout: float = 0.0
+) -> HannaPolicy:
     """The same networks, sampling their actions and keeping what they said."""
-    return dataclasses.replace(policy, choose=choose_sampled, ask_rule=ask_rule, keep_moments=True)
+    return dataclasses.replace(
+        policy, choose=choose_sampled, ask_rule=ask_rule, environment_dropout=environment_dropout, keep_moments=True
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,6 +62,11 @@ class TrainingConfig:
     """False: ablation of Table D.2 (beta = 0)."""
     turn_to_agent: bool = True
     """Views in the agent's frame; False: in absolute order, as in the authors' program (X27)."""
+    environment_dropout: float = 0.0
+    """Share of feature channels hidden for a whole training episode (Tan et al. 2019); not in the dissertation."""
+    evaluation_choice: str = "likeliest"
+    """'likeliest' (dissertation) or 'sampled': how navigation actions are chosen when judged. An agent
+    that is often wrong and always takes its likeliest action walks in circles."""
     validate_every: int = 500
     """Updates between validations."""
     validation_tasks: int = 200
@@ -72,6 +77,10 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
+        if self.evaluation_choice not in ("likeliest", "sampled"):
+            raise ValueError(f"evaluation_choice must be 'likeliest' or 'sampled', got {self.evaluation_choice!r}")
+        if not 0 <= self.environment_dropout < 1:
+            raise ValueError(f"environment_dropout must be in [0, 1), got {self.environment_dropout}")
         if self.ask_rule not in RULES:
             raise ValueError(f"ask_rule must be one of {sorted(RULES)}, got {self.ask_rule!r}")
         for name in ("iterations", "batch", "training_steps", "evaluation_steps", "evaluation_batch", "validate_every",
@@ -109,8 +118,9 @@ class TrainingConfig:
 
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
-        hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.1,
-        iterations=1500, learning_rate=7e-4, curiosity_floor=0.02, validate_every=100, validation_tasks=60,
+        hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
+        iterations=1500, learning_rate=7e-4, curiosity_floor=0.02, environment_dropout=0.4,
+        evaluation_choice="sampled", validate_every=100, validation_tasks=60,
     ),
     "paper": TrainingConfig(),
 }
