@@ -71,7 +71,8 @@ class Catalogue:
           CatalogueError: unknown key.
           PackError, MeshError: the model's pack is missing or damaged.
         """
-        return self._scaled(key, tuple(self._asset(key).size if size is None else size), tuple(params))
+        own = self._asset(key).size
+        return self._scaled(key, tuple(own if size is None else size), tuple(params))
 
     def build(self, keys: Sequence[str] = ()) -> None:
         """Import the models `keys` (all if none) into the cache, with a progress bar; what is

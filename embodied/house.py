@@ -12,6 +12,7 @@ import functools
 import hashlib
 import json
 import math
+import re
 import types
 import typing
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ import numpy as np
 import shapely
 
 from assets.cache import write_bytes
+from assets.records import ROOM_KINDS
 
 SCHEMA = 1
 """Version of house.json; a file of another version is refused."""
@@ -29,6 +31,12 @@ OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french
 WEATHERS = ("clear", "hazy", "overcast")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
+
+
+LARGEST = 30.0
+"""Longest side an object may have, metres."""
+ID = re.compile(r"[\w'.-]+")
+"""What an id looks like; walls and leaves are named '<id>/<part>', so that it holds no slash."""
 
 
 class HouseError(ValueError):
@@ -208,7 +216,7 @@ class House:
         """
         try:
             body = json.loads(text)
-        except json.JSONDecodeError as e:
+        except (ValueError, RecursionError) as e:
             raise HouseError(f"house file is not JSON ({e}); write it with House.save") from e
         if not isinstance(body, dict) or "schema" not in body:
             raise HouseError("house file has no 'schema' field; write it with House.save")
@@ -230,7 +238,11 @@ class House:
     def load(path: Path) -> House:
         """Read a house.json; raises HouseError with the file's name."""
         try:
-            return House.from_json(Path(path).read_text())
+            return House.from_json(Path(path).read_text(encoding="utf-8"))
+        except FileNotFoundError as e:
+            raise FileNotFoundError(f"{path} does not exist; make one with `embodied house --seed 7 --out {Path(path).parent}`") from e
+        except UnicodeDecodeError as e:
+            raise HouseError(f"{path} is not text in UTF-8 ({e}); write it with House.save") from e
         except HouseError as e:
             raise HouseError(f"{path}: {e}") from e
 
@@ -247,7 +259,7 @@ def check(house: House) -> None:
     _check_ids(house)
     polygons = {}
     for room in house.rooms:
-        polygon = shapely.Polygon(room.polygon)
+        polygon = shapely.Polygon(room.polygon if len(room.polygon) > 2 else ())
         if not polygon.is_valid or polygon.area < 0.5 or not shapely.is_ccw(polygon.exterior):
             raise HouseError(
                 f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, "
@@ -259,6 +271,10 @@ def check(house: House) -> None:
     _check_walls(house, polygons)
     _check_reach(house)
     for p in house.placements:
+        room = house.room_by_id[p.room]
+        storey, above = house.storey_of(room), 0.5
+        if not storey.elevation - above <= p.position[2] <= storey.elevation + storey.height + above:
+            raise HouseError(f"object {p.id!r} stands at {p.position} below or above its room {p.room!r}; change its height")
         if polygons[p.room].distance(shapely.Point(p.position[:2])) > house.outer_wall:
             raise HouseError(
                 f"object {p.id!r} stands at {p.position} outside its room {p.room!r}; "
@@ -267,8 +283,10 @@ def check(house: House) -> None:
 
 
 def _check_numbers(house: House) -> None:
-    if not house.storeys or any(s.height < 1.8 for s in house.storeys):
-        raise HouseError(f"a house needs storeys of at least 1.8 m clear height, got {house.storeys}")
+    if not house.storeys or any(not 1.8 <= s.height <= 20 for s in house.storeys):
+        raise HouseError(f"a house needs storeys of 1.8 to 20 m clear height, got {house.storeys}")
+    if not 0 <= house.disorder <= 1:
+        raise HouseError(f"disorder should lie between 0 and 1, got {house.disorder}")
     if not 0 < house.inner_wall < 1 or not house.inner_wall <= house.outer_wall < 2:
         raise HouseError(f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}")
     if house.sky.weather not in WEATHERS or not 0 <= house.sky.hour < 24:
@@ -279,6 +297,12 @@ def _check_numbers(house: House) -> None:
     for name, values in numbers:
         if not all(map(math.isfinite, values)):
             raise HouseError(f"{name!r} has a number that is not finite: {values}")
+    for p in house.placements:
+        if not all(0 < s <= LARGEST for s in p.size):
+            raise HouseError(f"object {p.id!r} has the size {p.size}; all three must be positive and at most {LARGEST} m")
+    for x in house.lights:
+        if x.power < 0 or not all(0 <= c <= 1 for c in x.color):
+            raise HouseError(f"light {x.id!r} should have a power of at least 0 and a colour in [0, 1], got {x.power}, {x.color}")
 
 
 def _check_ids(house: House) -> None:
@@ -287,15 +311,27 @@ def _check_ids(house: House) -> None:
         if len(set(ids)) < len(ids):
             twice = sorted({i for i in ids if ids.count(i) > 1})
             raise HouseError(f"{what} share the ids {twice}; every id must be unique")
+        if bad := [i for i in ids if not ID.fullmatch(i)]:
+            raise HouseError(f"{what} have the ids {bad}; an id is made of letters, digits and _ - . '")
     if not house.rooms:
         raise HouseError("a house needs at least one room, got none")
     rooms = set(house.room_by_id)
     for r in house.rooms:
         if not 0 <= r.storey < len(house.storeys):
             raise HouseError(f"room {r.id!r} is on storey {r.storey}, the house has {len(house.storeys)}")
+        if r.kind not in ROOM_KINDS:
+            raise HouseError(f"room {r.id!r} has the unknown kind {r.kind!r}; use one of {ROOM_KINDS}")
+        if r.accent_wall is not None and not 0 <= r.accent_wall < len(r.polygon):
+            raise HouseError(f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}")
     for x in (*house.placements, *house.lights):
         if x.room not in rooms:
             raise HouseError(f"{x.id!r} names the unknown room {x.room!r}; rooms are {sorted(rooms)}")
+    for x in house.lights:
+        if x.placement is not None and x.placement not in house.placement_by_id:
+            raise HouseError(f"light {x.id!r} belongs to the unknown object {x.placement!r}; place that lamp or name none")
+    for s in house.stairs:
+        if not set(s.rooms) <= rooms or len(s.path) < 2 or s.width <= 0 or s.risers < 1:
+            raise HouseError(f"stair {s.id!r} should join two of the rooms {sorted(rooms)} by a path of two points or more, got {s}")
     for p in house.placements:
         if p.parent is not None and p.parent not in house.placement_by_id:
             raise HouseError(f"object {p.id!r} rests on the unknown object {p.parent!r}")
@@ -306,8 +342,6 @@ def _check_ids(house: House) -> None:
             if above.id in seen:
                 raise HouseError(f"object {p.id!r} rests on itself, through {sorted(seen)}")
             seen.add(above.id)
-        if min(p.size) <= 0:
-            raise HouseError(f"object {p.id!r} has the size {p.size}; all three must be positive")
 
 
 def _check_overlaps(house: House, polygons: dict[str, shapely.Polygon]) -> None:
@@ -413,8 +447,8 @@ def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
             raise HouseError(f"{where} should have {len(args)} values, got {len(value)}")
         return tuple(_read(a, v, f"{where}[{i}]") for i, (a, v) in enumerate(zip(args, value)))
     if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if not math.isfinite(value):
-            raise HouseError(f"{where} should be a finite number, got {value!r}")
+        if not abs(value) <= 1e12:  # NaN too
+            raise HouseError(f"{where} should be a finite number below 1e12, got {value!r:.40}")
         return float(value)
     if type(value) is not kind:
         raise HouseError(f"{where} should be {kind.__name__}, got {value!r}")
