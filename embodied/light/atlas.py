@@ -236,7 +236,7 @@ def read_colours(path: str) -> np.ndarray:
     """(h, w, 3) uint8 sRGB of an image file."""
     image = cv2.imread(path, cv2.IMREAD_COLOR)
     if image is None:
-        raise FileNotFoundError(f"texture {path} cannot be read; delete the cache's textures and try again")
+        raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
     return np.ascontiguousarray(image[..., ::-1])
 
 

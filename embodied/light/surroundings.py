@@ -22,7 +22,7 @@ RADIUS = 70.0
 """Metres to the dome."""
 DOME = "outdoor/sky"
 """Owner of the dome; no instance id belongs to it."""
-LUXELS = 200_000
+LUXELS = 110_000
 """Luxels for all outer parts together, at most."""
 
 
