@@ -24,6 +24,7 @@ from embodied.language.clauses import (
     StopBy,
     StopHere,
     StopIn,
+    Thing,
     To,
     Turn,
 )
@@ -142,12 +143,12 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
     """
     rest, clauses = normalised(text), []
     while rest:
-        match, template = _longest(rest, lexicon)
-        if match is None:
+        heard = _longest(rest, lexicon)
+        if heard is None:
             rest = rest.partition(" ")[2]
             continue
-        clauses += _clauses(template, match, lexicon)
-        rest = rest[match.end():].lstrip()
+        clauses += _clauses(heard)
+        rest = rest[heard.length:].lstrip()
     if not clauses:
         raise ValueError(f"no part of {text!r} is a route instruction; expected words such as 'turn left and go to the sofa'")
     return RouteInstruction(tuple(clauses))
@@ -167,31 +168,69 @@ def normalised(text: str) -> str:
 _EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in (*FILLERS.values(), *LINKS.values()) for f in fs if " " in f}, key=lambda s: (-len(s), s))
 
 
-def _longest(text: str, lexicon: Lexicon) -> tuple[re.Match | None, Template]:
-    best, chosen = None, TEMPLATES[0]
-    first = text.split(" ", 1)[0]
-    for pattern, start, template in _patterns(lexicon):
-        if start and start != first:
-            continue
-        match = pattern.match(text)
-        if match and (best is None or match.end() > best.end()):
-            best, chosen = match, template
-    return best, chosen
+@dataclass(frozen=True)
+class _Pattern:
+    """A template to be read: what stands before its thing, and after it."""
+
+    template: Template
+    first: str
+    """Its first word, or '' where a slot comes first."""
+    before: re.Pattern
+    after: re.Pattern | None
+    """None where the template names no thing."""
 
 
-@functools.lru_cache(maxsize=4)
-def _patterns(lexicon: Lexicon) -> tuple[tuple[re.Pattern, str, Template], ...]:
-    """(pattern, first word or '', template) for every template."""
+@dataclass(frozen=True)
+class _Heard:
+    """A template found at the beginning of a text."""
+
+    template: Template
+    length: int
+    """Characters it accounts for."""
+    said: dict[str, str]
+    thing: Thing | None
+
+
+def _longest(text: str, lexicon: Lexicon) -> _Heard | None:
+    """The template that accounts for most of the beginning of `text`."""
+    first, best = text.split(" ", 1)[0], None
+    for pattern in _patterns():
+        if pattern.first in ("", first):
+            heard = _read(pattern, text, lexicon)
+            if heard is not None and (best is None or heard.length > best.length):
+                best = heard
+    return best
+
+
+def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _Heard | None:
+    start = pattern.before.match(text)
+    if start is None:
+        return None
+    if pattern.after is None:
+        return _Heard(pattern.template, start.end(), start.groupdict(), None)
+    for words, thing in lexicon.things_at(text[start.end():]):
+        end = pattern.after.match(text, start.end() + len(words))
+        if end is not None:
+            return _Heard(pattern.template, end.end(), start.groupdict() | end.groupdict(), thing)
+    return None
+
+
+@functools.cache
+def _patterns() -> tuple[_Pattern, ...]:
+    """Every template as patterns."""
     rooms = _any(ROOM_OF_NOUN)
     slots = {"side": "(?P<side>left|right)", "room": f"(?P<room>{rooms})", "other": f"(?P<other>{rooms})",
-             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "thing": f"the (?P<thing>{lexicon.noun_pattern})", "walk": f"(?:{_any(VERBS)})", "soon": f"(?:{_any(SOON)})"}
+             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "walk": f"(?:{_any(VERBS)})", "soon": f"(?:{_any(SOON)})"}
     found = []
     for t in TEMPLATES:
-        pattern = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
+        text = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
         for name, slot in slots.items():
-            pattern = pattern.replace(f"{{{name}}}", slot)
+            text = text.replace(f"{{{name}}}", slot)
+        before, thing, after = text.partition("{thing}")
         first = t.text.split(" ", 1)[0].lower()
-        found.append((re.compile(pattern + r"(?![\w-])"), "" if first.startswith("{") else first, t))
+        whole = r"(?![\w-])"
+        found.append(_Pattern(t, "" if first.startswith("{") else first, re.compile(before + ("the " if thing else whole)),
+                              re.compile(after + whole) if thing else None))
     return tuple(found)
 
 
@@ -200,11 +239,9 @@ def _any(words: Iterable[str]) -> str:
     return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
-def _clauses(template: Template, match: re.Match, lexicon: Lexicon) -> list[Clause]:
-    said = match.groupdict()
+def _clauses(heard: _Heard) -> list[Clause]:
+    said, thing, side = heard.said, heard.thing, heard.said.get("side")
     rooms = iter([ROOM_OF_NOUN[said[k]] for k in ("room", "other") if said.get(k)])
-    thing = lexicon.heard(said["thing"]) if said.get("thing") else None
-    side = said.get("side")
     count = said.get("n")
     number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
     make = {
@@ -214,4 +251,4 @@ def _clauses(template: Template, match: re.Match, lexicon: Lexicon) -> list[Clau
         "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "stop_by": lambda: StopBy(thing),
         "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,
     }
-    return [make[kind]() for kind in template.kinds]
+    return [make[kind]() for kind in heard.template.kinds]

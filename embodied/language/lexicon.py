@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,8 @@ ROOM_NOUNS: dict[str, tuple[str, ...]] = {
 }
 """Room kind to the nouns for it, the plainest first."""
 ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
+MOST_WORDS = 8
+"""Longest wording of a thing: three adjectives of up to two words, then a noun."""
 UNFIT = frozenset({
     "person", "wall socket", "double socket", "network socket", "aerial socket", "light switch", "double light switch",
     "dimmer switch", "smoke detector", "ceiling lamp", "strip light", "spotlight", "track light", "fluorescent lamp",
@@ -99,7 +102,7 @@ class Lexicon:
                     nouns_of[asset.object_class].append(noun)
         self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
         self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
-        self.adjectives = tuple(sorted(adjectives - EMPTY))
+        self.adjectives = frozenset(adjectives - EMPTY)
 
     def thing(self, word: Word) -> Thing:
         """What a word may stand for.
@@ -121,23 +124,23 @@ class Lexicon:
         spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
         extra = [*sizes_of(asset), *(PRAISE[int(rng.integers(len(PRAISE)))] for _ in range(3))]
         more = [extra[int(rng.integers(len(extra)))]] if rng.random() < ornament else []
-        return Word(noun, tuple([*more, *spare[:adjectives]]))
+        return Word(noun, (*more, *spare[:adjectives]))
 
-    @functools.cached_property
-    def noun_pattern(self) -> str:
-        """Regular expression of a thing: adjectives, then the longest noun that fits."""
-        nouns = "|".join(re.escape(n) for n in sorted(self.classes_of, key=lambda n: (-len(n), n)))
-        words = "|".join(re.escape(w) for w in sorted({*self.adjectives, *EMPTY}, key=lambda w: (-len(w), w)))
-        return rf"(?:(?:{words}) ){{0,3}}(?:{nouns})"
+    def things_at(self, text: str) -> Iterator[tuple[str, Thing]]:
+        """What the beginning of `text` may name, the longest wording first: (words, thing)."""
+        tokens = text.split(" ", MOST_WORDS)[:MOST_WORDS]
+        for n in range(len(tokens), 0, -1):
+            thing = self.heard(tokens[:n])
+            if thing is not None:
+                yield " ".join(tokens[:n]), thing
 
-    def heard(self, text: str) -> Thing:
-        """The thing that a text of `noun_pattern` means; the longest noun at its end wins."""
-        tokens = text.split(" ")
+    def heard(self, tokens: list[str]) -> Thing | None:
+        """The thing that adjectives and a noun mean, the longest noun at their end; None if they name nothing."""
         for i in range(len(tokens)):
-            noun, words = " ".join(tokens[i:]), self._adjectives_of(tokens[:i])
-            if noun in self.classes_of and words is not None:
-                return Thing(self.classes_of[noun], tuple(sorted(w for w in words if w not in EMPTY)))
-        raise ValueError(f"{text!r} names nothing of the catalogue; expected adjectives and one of its nouns")
+            found = self.classes_of.get(" ".join(tokens[i:]))
+            if found is not None and (words := self._adjectives_of(tokens[:i])) is not None:
+                return Thing(found, tuple(sorted(w for w in words if w not in EMPTY)))
+        return None
 
     def _adjectives_of(self, tokens: list[str]) -> list[str] | None:
         """Tokens as adjectives, the longest first ('dark brown', 'wood'); None if they are none."""

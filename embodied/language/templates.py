@@ -29,7 +29,7 @@ def _all(kinds: str, *lines: str) -> list[Template]:
     return found
 
 
-TEMPLATES: tuple[Template, ...] = tuple([
+TEMPLATES: tuple[Template, ...] = (
     *_all("turn", "turn {side}", "take a {side}", "turn to your {side}", "make a {side} turn", "terse: go {side}",
           "chatty: hang a {side}", "formal: rotate ninety degrees to the {side}", "face {side}", "turn to the {side}",
           "chatty: you want to turn {side}", "swing {side}", "chatty: make a {side}", "turn {side} {soon}",
@@ -98,7 +98,7 @@ TEMPLATES: tuple[Template, ...] = tuple([
     *_all("to stop_here", "walk to {thing} and stop", "go to {thing} and wait there", "stop when you reach {thing}", "walk up to {thing} then stop",
           "go to {thing} and stop there"),
     *_all("enter stop_here", "enter the {room} and stop", "walk into the {room} and wait there", "step into the {room} and stop just inside"),
-])
+)
 """Every way of speaking. 'exit enter' names two rooms: {room} is left, {other} entered."""
 
 FILLERS: dict[str, tuple[str, ...]] = {
