@@ -196,9 +196,11 @@ def _without_learning():
 
 def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:
     """Figures D.1 and D.2 and the kinds of failure, as numbers."""
+    conditions = [{**dataclasses.asdict(p), "f1": p.f1} for p in predictions(episodes, worlds)]
     return {
-        "request share": request_share(episodes), "failures": dataclasses.asdict(failures(episodes, worlds)),
-        "conditions": [{**dataclasses.asdict(p), "f1": p.f1} for p in predictions(episodes, worlds)],
+        "request share": request_share(episodes),
+        "failures": {k: float(v) for k, v in dataclasses.asdict(failures(episodes, worlds)).items()},
+        "conditions": [{k: None if v != v else v for k, v in c.items()} for c in conditions],  # NaN is no JSON
     }
 
 

@@ -62,7 +62,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
     table = (tmp_path / "table" / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
         assert f"| {row} |" in table
-    behaviour = json.loads((tmp_path / "table" / "behaviour.json").read_text())
+    behaviour = json.loads((tmp_path / "table" / "behaviour.json").read_text(), parse_constant=pytest.fail)
     assert 0 <= behaviour["behaviour"]["test_unseen"]["request share"] <= 1
     assert len(list((tmp_path / "table").glob("episodes_*.jsonl"))) == table.count("| test_unseen |")
 
