@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -200,7 +201,7 @@ def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:
     return {
         "request share": request_share(episodes),
         "failures": {k: float(v) for k, v in dataclasses.asdict(failures(episodes, worlds)).items()},
-        "conditions": [{k: None if v != v else v for k, v in c.items()} for c in conditions],  # NaN is no JSON
+        "conditions": [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in c.items()} for c in conditions],  # NaN is no JSON
     }
 
 
