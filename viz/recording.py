@@ -125,7 +125,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("plot/distance/goal", rr.Scalars(goal_distance))
     if step.targets and tuple(step.targets) != tuple(task.goal_nodes):
         target = min(float(world.graph.distance[step.pose.node, g]) for g in step.targets)
-        recording.log("plot/distance/current target", rr.Scalars(target))
+        recording.log("plot/distance/current_target", rr.Scalars(target))
     recording.log("mode", rr.StateChange(state="sub-task" if step.mode is Mode.SUB else "main task"))
     recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
     log_thought(recording, step)

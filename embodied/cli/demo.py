@@ -1,7 +1,8 @@
 """From a seed to a recorded walk, in one command.
 
-Generates a furnished house, draws the panorama of every viewpoint, lets an agent walk the
-navigation graph to the object it is asked for, and records the episode for Rerun.
+Generates a furnished house with people in it, lights it, draws the panorama of every viewpoint,
+lets an agent walk to an object it is asked for, then lets a trained agent, which has never seen
+this house, find another one by asking the people; both episodes are recorded for Rerun.
 """
 
 from __future__ import annotations
@@ -32,49 +33,113 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.env import HelpEnv
     from embodied.generate import generate_house
-    from embodied.language import People
-    from embodied.metrics import navigation_error, spl, success
     from embodied.plan import save_plan
-    from embodied.policies import Shortest
-    from embodied.rollout import rollout
-    from embodied.tasks.find import find_pool, find_task
+
+    catalogue, seconds = catalogue_of(args), {}
+    args.out.mkdir(parents=True, exist_ok=True)
+    with timed("a house with people in it", seconds):
+        house, graph, routes = inhabited(generate_house(args.seed, catalogue=catalogue), catalogue, args)
+        house.save(args.out / "house.json")
+        save_plan(house, args.out / "plan.png", graph=graph)
+    note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, {len(graph.ids)} viewpoints")
     from embodied.world import open_world
-    from viz.blueprint import episode_blueprint
+
+    with open_world(house, catalogue, args.cache, graph=graph, size=args.size, quality=args.quality) as world:
+        with timed("light and panoramas", seconds):
+            world.render_all(progress=True)
+        with timed("the first task: find something", seconds):
+            walk = find_something(args, world)
+        with timed("the second task: ask for help", seconds):
+            help_facts = ask_for_help(args, world, routes)
+        facts = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png"), "seconds": seconds,
+                 "renderer": world.fingerprint["renderer"]}
+    show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}",
+                                 f"look at a recording with: .venv/bin/embodied view {help_facts['recording']}"]))
+    return 0
+
+
+def inhabited(house, catalogue, args: argparse.Namespace):
+    """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
+    from embodied.assistants.routes import build_routes
+    from embodied.language import People, PlainLanguage
+    from embodied.navgraph import build_graph
+    from embodied.people import add_people
+    from embodied.world import open_world
+
+    graph = build_graph(house, catalogue)
+    with open_world(house, catalogue, args.cache, graph=graph) as empty:
+        starts = [r.path[0] for r in build_routes(empty, seed=args.seed, language=PlainLanguage(), house_split="test")]
+    house = add_people(house, graph, starts, catalogue, seed=args.seed)
+    with open_world(house, catalogue, args.cache, graph=graph) as world:
+        return house, graph, build_routes(world, seed=args.seed, language=People(), house_split="test")
+
+
+def find_something(args: argparse.Namespace, world) -> dict:
+    """The shortest-path agent walks to an object; recorded to episode.rrd."""
+    from embodied.environments import environment_maker
+    from embodied.language import People
+    from embodied.policies import Shortest
+    from embodied.rollout import play
+    from embodied.tasks.find import find_pool, find_task
+
+    task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
+    episode = play(environment_maker("find", {world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path")[0]
+    return recorded(args, world, episode, sinks_of(args, args.out / "episode.rrd"))
+
+
+def ask_for_help(args: argparse.Namespace, world, routes) -> dict:
+    """The trained agent does a HANNA task in a house it has never seen; recorded to help.rrd.
+
+    Its features come from plainly drawn panoramas, the kind that its encoder learned from.
+    """
+    from agents.commands import FACES
+    from agents.evaluate import hanna_policies
+    from agents.hanna.agent import load_agent
+    from agents.vision.bank import FeatureBank
+    from agents.vision.encoder import load_encoder
+    from agents.vision.features import encode_panoramas
+    from embodied.environments import environment_maker
+    from embodied.language import People
+    from embodied.rollout import play
+    from embodied.tasks.hanna import hanna_pool, hanna_task
+    from embodied.world import open_world
+    from viz.sinks import Sinks
+
+    agent, encoder = load_agent(), load_encoder()
+    with open_world(world.house, world.catalogue, args.cache, graph=world.graph, size=FACES) as plain:
+        features = encode_panoramas(encoder, (plain.panorama(n) for n in range(len(world.graph.ids))))
+    bank = FeatureBank({world.name: features}, encoder.digest)
+    pool = hanna_pool(world, seed=args.seed)
+    task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
+    make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
+    episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
+    return recorded(args, world, episode, Sinks(args.out / "help.rrd"))
+
+
+def recorded(args: argparse.Namespace, world, episode, sinks) -> dict:
+    """Record an episode; what is worth telling about it."""
+    from embodied.metrics import navigation_error, spl, success
+    from viz.blueprint import blueprint_of
     from viz.recording import record
     from viz.sinks import open_recording
 
-    catalogue, timings = catalogue_of(args), {}
-    with timed("house", timings):
-        house = generate_house(args.seed, catalogue=catalogue)
-    args.out.mkdir(parents=True, exist_ok=True)
-    house.save(args.out / "house.json")
-    with open_world(house, catalogue, args.cache, size=args.size, quality=args.quality) as world:
-        note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, {len(world.graph.ids)} viewpoints")
-        save_plan(house, args.out / "plan.png", graph=world.graph)
-        with timed("panoramas", timings):
-            world.render_all(progress=True)
-        task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
-        note(f"the agent is asked: “{task.request}”")
-        sinks = sinks_of(args, args.out / "episode.rrd")
-        with timed("recording", timings), open_recording(
-            sinks, episode_blueprint(house), name=task.request, properties=texts(world.fingerprint)
-        ) as recording:
-            frames = list(rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path"))
-            for _ in record(recording, world, task, (f.step for f in frames)):
-                pass
-        episode = frames[-1].episode
-        facts = {
-            "request": task.request, "success": success(episode, world.graph), "spl": round(spl(episode, world.graph), 3),
-            "navigation_error_m": round(navigation_error(episode, world.graph), 2), "steps": len(episode.steps),
-            "recording": str(sinks.rrd), "recording_mib": round(sinks.rrd.stat().st_size / 2**20, 1),
-            "plan": str(args.out / "plan.png"), "seconds": timings, "renderer": world.fingerprint["renderer"],
-        }
-    show(args, facts, f"{'found' if facts['success'] else 'not found'} after {facts['steps']} steps, SPL {facts['spl']}\n"
-                      f"floor plan  {facts['plan']}\nrecording   {facts['recording']} ({facts['recording_mib']} MiB); "
-                      f"look at it with: .venv/bin/rerun {facts['recording']}")
-    return 0
+    with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as stream:
+        for _ in record(stream, world, episode.task, episode.steps):
+            pass
+    return {
+        "agent": episode.agent, "request": episode.task.request, "success": bool(success(episode, world.graph)),
+        "spl": round(spl(episode, world.graph), 3), "navigation_error_m": round(navigation_error(episode, world.graph), 2),
+        "steps": len(episode.steps), "requests": episode.requests, "recording": str(sinks.rrd),
+        "recording_mib": round(sinks.rrd.stat().st_size / 2**20, 1),
+    }
+
+
+def told(facts: dict) -> str:
+    """One line about a recorded episode."""
+    outcome = "found" if facts["success"] else f"missed by {facts['navigation_error_m']} m"
+    return (f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} requests for help"
+            f"  -> {facts['recording']} ({facts['recording_mib']} MiB)")
 
 
 @contextlib.contextmanager
