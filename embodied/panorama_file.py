@@ -86,6 +86,10 @@ class PanoramaFile:
         """(6, s, s) int32."""
         return _apart(self._picture(node, "ids", cv2.IMREAD_UNCHANGED)).astype(np.int32)
 
+    def damaged(self) -> tuple[tuple[int, str], ...]:
+        """(node, channel) of every picture that does not match its checksum; reads the whole file."""
+        return tuple((node, c) for node in range(len(self)) for c in CHANNELS if self._data(node, c) is None)
+
     def close(self) -> None:
         self._file.close()
 
@@ -98,12 +102,17 @@ class PanoramaFile:
     def _picture(self, node: int, channel: str, flag: int) -> np.ndarray:
         if not 0 <= node < len(self):
             raise IndexError(f"{self.path} holds the nodes 0 to {len(self) - 1}, not {node}")
+        data = self._data(node, channel)
+        if data is None:
+            raise PanoramaFileError(f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again")
+        return cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+
+    def _data(self, node: int, channel: str) -> bytes | None:
+        """The picture as a file, or None where it is damaged."""
         offset, length, crc = self.index["nodes"][node][channel]
         self._file.seek(offset)
         data = self._file.read(length)
-        if len(data) != length or zlib.crc32(data) != crc:
-            raise PanoramaFileError(f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again")
-        return cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+        return data if len(data) == length and zlib.crc32(data) == crc else None
 
 
 def write_panoramas(path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False) -> None:

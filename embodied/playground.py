@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -68,8 +69,10 @@ def seen_features(world: World, catalogue: Catalogue, cache: Path) -> np.ndarray
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
     path = cache / "semantic" / f"{digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes)[:32]}.npy"
-    if path.exists():
-        return np.load(path, allow_pickle=False)
+    with contextlib.suppress(OSError, ValueError, EOFError):  # absent or damaged: made anew
+        known = np.load(path, allow_pickle=False)
+        if known.ndim == 3 and known.shape[::2] == (len(world.graph.positions), len(classes) + len(ROOM_KINDS)):
+            return known
     features = semantic_features(world, classes, ROOM_KINDS)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, _npy(features))

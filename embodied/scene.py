@@ -291,7 +291,7 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     """(h, w, 3) uint8 RGB, or (h, w, 4) where the picture has holes; at most `largest` pixels a side."""
     image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise FileNotFoundError(f"texture {Path(path).name!r} cannot be read at {path}; run `embodied assets build`")
+        raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
     if image.ndim == 2:
         image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     if image.dtype != np.uint8:

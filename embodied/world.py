@@ -147,7 +147,12 @@ class World:
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
         self._progress = progress
-        if self._open_file() is None:
+        file = self._open_file()
+        if file is not None and (damaged := file.damaged()):
+            log.warning("%s: %s of its pictures are damaged; drawing again", self.path, len(damaged))
+            file.close()
+            file = self._file = None
+        if file is None:
             write_panoramas(self.path, self._draw_all(progress), self.fingerprint)
             self._refused = False
             self._recent.cache_clear()

@@ -218,7 +218,7 @@ def test_light_of_another_house_is_refused(house):
 
 
 def test_a_missing_texture_says_how_to_get_it():
-    with pytest.raises(FileNotFoundError, match="embodied assets build"):
+    with pytest.raises(OSError, match="missing or damaged; delete"):
         scene.load_texture("/nowhere/oak.png")
 
 

@@ -17,6 +17,9 @@ APPLICATION = "embodied"
 MEMORY_LIMIT = "1GiB"
 """What a viewer or server that we start may keep before it drops the oldest data."""
 
+FOOTER = b"RRF2FOOT"
+"""What stands 12 bytes before the end of a .rrd file that was finished (Rerun 0.41)."""
+
 
 @dataclass(frozen=True)
 class Sinks:
@@ -41,13 +44,17 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
       blueprint: the layout a viewer starts with.
       name: what the viewer calls it.
       properties: fingerprint of renderer, device and versions, kept inside the recording.
+
+    Raises:
+      OSError: the file could not be written to its end.
     """
     rr.set_strict_mode(True)  # a call that cannot be logged is an error, not a warning
     recording = rr.RecordingStream(APPLICATION)
     with contextlib.ExitStack() as stack:
-        outputs = []
+        outputs, file = [], None
         if sinks.rrd is not None:
-            outputs.append(rr.FileSink(str(stack.enter_context(atomic_path(Path(sinks.rrd))))))
+            file = stack.enter_context(atomic_path(Path(sinks.rrd)))
+            outputs.append(rr.FileSink(str(file)))
         if sinks.spawn:
             rr.spawn(connect=False, memory_limit=MEMORY_LIMIT, server_memory_limit=MEMORY_LIMIT)
             outputs.append(rr.GrpcSink())
@@ -62,10 +69,16 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
         if properties:
             recording.send_property("fingerprint", rr.AnyValues(**properties))
         yield recording
-        recording.flush()
+        try:
+            recording.flush()
+        except RuntimeError as e:
+            raise OSError(f"the recording could not be sent or written to its end ({e}); free some disk space, or look "
+                          "whether the viewer still runs, and run again") from e
         if sinks.serve:
             _keep_serving()
         recording.disconnect()
+        if file is not None and file.read_bytes()[-12:-4] != FOOTER:
+            raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
 
 
 def open_viewer(rrd: Path) -> None:

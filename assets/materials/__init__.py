@@ -19,6 +19,8 @@ from assets.materials.registry import MATERIALS
 from assets.records import Finish
 
 __all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
+IMAGES = ("color.png", "normal.png", "roughness.png")
+"""The maps of a material on disk."""
 
 
 def of_role(role: str) -> tuple[Material, ...]:
@@ -103,21 +105,23 @@ def _read_mean(folder: Path) -> dict | None:
     note = folder / "maps.json"
     try:
         mean = json.loads(note.read_text())
-        sizes = {name: (folder / name).stat().st_size for name in mean["bytes"]}
-    except (OSError, ValueError, KeyError):
+        sizes = {name: (folder / name).stat().st_size for name in IMAGES}
+        numbers = [*mean["color"], mean["roughness"]]
+        whole = sizes == mean["bytes"] and len(numbers) == 4 and all(isinstance(n, float) and 0 <= n <= 1 for n in numbers)
+    except (OSError, ValueError, KeyError, TypeError):
         return None
-    return mean if sizes == mean["bytes"] else None
+    return mean if whole else None
 
 
 def _write(folder: Path, maps: Maps, tile: float) -> dict:
     """Write the three PNGs and then the note that vouches for them."""
-    images = {
-        "color.png": np.round(maps.color[..., ::-1] * 255).astype(np.uint8),
-        "normal.png": normal_map(maps.height, tile)[..., ::-1],
-        "roughness.png": np.round(maps.roughness * 255).astype(np.uint8),
-    }
+    images = (
+        np.round(maps.color[..., ::-1] * 255).astype(np.uint8),
+        normal_map(maps.height, tile)[..., ::-1],
+        np.round(maps.roughness * 255).astype(np.uint8),
+    )
     sizes = {}
-    for name, image in images.items():
+    for name, image in zip(IMAGES, images, strict=True):
         with atomic_path(folder / name) as temporary:
             if not cv2.imwrite(str(temporary), np.ascontiguousarray(image), [cv2.IMWRITE_PNG_COMPRESSION, 3]):
                 raise OSError(f"could not write {folder / name}; free some disk space and run again")

@@ -79,9 +79,12 @@ def renderer() -> Finding:
 
 def packs(args: argparse.Namespace) -> Finding:
     """The furniture libraries."""
-    from assets.packs import find_packs
+    from assets.packs import PackError, find_packs
 
-    found = find_packs(tuple(args.pack))
+    try:
+        found = find_packs(tuple(args.pack))
+    except PackError as e:
+        return Finding("furniture", False, str(e), "name existing files with --pack, or none for those of the system")
     text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
     return Finding("furniture", bool(found), text, "apt-get install sweethome3d-furniture, or name files with --pack")
 

@@ -13,6 +13,7 @@ import functools
 import json
 import shutil
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -138,7 +139,8 @@ def open_bake(folder: Path, house: House) -> Bake:
     folder = Path(folder)
     try:
         manifest = json.loads((folder / "manifest.json").read_text())
-    except (OSError, ValueError) as e:
+        files = dict(manifest["files"])
+    except (OSError, ValueError, KeyError, TypeError) as e:
         raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
     if manifest.get("version") != VERSION:
         raise StaleBake(f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; run `embodied light` again")
@@ -147,10 +149,9 @@ def open_bake(folder: Path, house: House) -> Bake:
             f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: it was edited "
             "after it was lit; run `embodied light` again"
         )
-    for name, size in manifest["files"].items():
-        path = folder / name
-        if not path.is_file() or path.stat().st_size != size:
-            raise StaleBake(f"{path} is missing or damaged; run `embodied light` again")
+    for name, mark in files.items():
+        if _mark(folder / name) != mark:
+            raise StaleBake(f"{folder / name} is missing or damaged; run `embodied light` again")
     return Bake(folder, manifest)
 
 
@@ -166,13 +167,18 @@ def _open(folder: Path, house: House) -> Bake | None:
         return None
 
 
+def _mark(path: Path) -> list[int] | None:
+    """Size and CRC-32 of a file; None where there is none."""
+    return [path.stat().st_size, zlib.crc32(path.read_bytes())] if path.is_file() else None
+
+
 def _drop_damaged(folder: Path) -> None:
     """Delete the manifest and every file that is not as it says, so that they are made anew."""
     path = folder / "manifest.json"
-    with contextlib.suppress(OSError, ValueError, KeyError, AttributeError):
-        for name, size in json.loads(path.read_text())["files"].items():
-            if (folder / name).is_file() and (folder / name).stat().st_size != size:
-                (folder / name).unlink()
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+        for name, mark in json.loads(path.read_text())["files"].items():
+            if _mark(folder / name) != mark:
+                (folder / name).unlink(missing_ok=True)
     path.unlink(missing_ok=True)
 
 
@@ -262,7 +268,7 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     clock("meshes")
     for name in ("direct", "sun", "bounces"):
         (folder / f"stage_{name}.npz").unlink(missing_ok=True)
-    files = {p.name: p.stat().st_size for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")}
+    files = {p.name: _mark(p) for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")}
     manifest = {
         "version": VERSION, "key": folder.name, "house": house.digest, "device": device(),
         "settings": dataclasses.asdict(settings), "pages": first + len(outer_pages) + 1, "own_pages": len(s.atlas.pages),

@@ -125,7 +125,7 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
             row[f"psnr_{truth}"] = None if way == truth else float(np.median([psnr(a, b) for a, b in pairs]))
             row[f"ssim_{truth}"] = None if way == truth else float(np.median([ssim(a, b) for a, b in pairs]))
         rows.append(row)
-    pages = [sum(v for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
+    pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
     return {
         "rows": rows, "views": [list(v) for v in views], "device": device(),
         "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),

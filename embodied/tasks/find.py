@@ -71,7 +71,7 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     """Task `index` of the pool: a pure function of its arguments.
 
     Raises:
-      IndexError: the pool has no such task.
+      ValueError: the pool has no such task.
     """
     goal, start, rng = draw(pool, index, seed=seed, kind="find")
     what = FindObject(goal.object_class, None, goal.placements)
@@ -84,7 +84,7 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
 def draw(pool: Pool, index: int, *, seed: int, kind: str) -> tuple[GoalClass, Pose, np.random.Generator]:
     """Pair `index` of the pool with a random heading, and the generator for the rest of its words."""
     if not 0 <= index < len(pool):
-        raise IndexError(f"world {pool.world!r} has {len(pool)} {kind} tasks, asked for number {index}")
+        raise ValueError(f"world {pool.world!r} has {len(pool)} {kind} tasks, asked for number {index}")
     c, node = (int(x) for x in pool.pairs[index])
     rng = stream(seed, "task", kind, pool.world, index)
     return pool.classes[c], Pose(node, int(rng.integers(TURNS))), rng
