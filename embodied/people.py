@@ -12,6 +12,7 @@ import shapely
 
 from embodied.geometry import rectangle, yaw_facing
 from embodied.house import House, Placement, rounded
+from embodied.navgraph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -50,16 +51,27 @@ def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: 
     for node in sorted({int(s) for s in starts}):
         room = house.room_by_id[graph.room_of_node[node]]
         rng = stream(seed, "person", house.name, node)
-        spot = _spot(graph.positions[node], house.floor(room), ways, [*taken, *(_disc(p.position) for p in people)], rng=rng)
+        asset = figures[int(rng.integers(len(figures)))]
+        others = [*taken, *(_disc(p.position) for p in people)]
+        spot = _spot(graph.positions[node], asset, house.floor(room), ways, others, rng=rng)
         if spot is None:
             continue
-        asset = figures[int(rng.integers(len(figures)))]
         direction = math.atan2(graph.positions[node, 1] - spot[1], graph.positions[node, 0] - spot[0])
         people.append(Placement(
             f"{CLASS}_{len(people) + 1}", asset.key, CLASS, room.id,
             rounded((spot[0], spot[1], house.storey_of(room).elevation)), rounded(yaw_facing(direction)), asset.size,
         ))
-    return dataclasses.replace(house, placements=(*house.placements, *people))
+    return _passable(house, people)
+
+
+def _passable(house: House, people: list[Placement]) -> House:
+    """The house with those people who shut nobody off from a room; the last to come step aside first."""
+    full = dataclasses.replace(house, placements=(*house.placements, *people))
+    while people and (shut := set(unreachable_rooms(full)) - set(unreachable_rooms(house))):
+        near = [p for p in people if p.room in shut] or people
+        people = [p for p in people if p is not near[-1]]
+        full = dataclasses.replace(house, placements=(*house.placements, *people))
+    return full
 
 
 def stands(asset: Asset) -> bool:
@@ -67,15 +79,19 @@ def stands(asset: Asset) -> bool:
     return asset.support == "floor" and asset.size[2] >= STANDING and max(asset.size[:2]) <= 2 * STANDING / 3
 
 
-def _spot(eye: np.ndarray, floor: shapely.Polygon, ways, taken: list, *, rng: np.random.Generator) -> tuple[float, float] | None:
-    """The first of 96 seeded spots around `eye` that is free, the nearer ones first."""
+def _spot(
+    eye: np.ndarray, asset: Asset, floor: shapely.Polygon, ways, taken: list, *, rng: np.random.Generator
+) -> tuple[float, float] | None:
+    """The first of 96 seeded spots around `eye` that is free for a figure looking at `eye`, the nearer ones first."""
     angles = rng.permutation(16) * (2 * math.pi / 16)
     for radius in np.linspace(NEAREST, FARTHEST, 6):
         for angle in angles:
             x, y = eye[0] + radius * math.cos(angle), eye[1] + radius * math.sin(angle)
             point = shapely.Point(x, y)
-            body = point.buffer(BODY)
-            if floor.covers(body) and ways.distance(point) >= PASSAGE and not any(t.intersects(body) for t in taken):
+            yaw = yaw_facing(angle + math.pi)
+            body = point.buffer(BODY).union(shapely.Polygon(rectangle(x, y, asset.size[0], asset.size[1], yaw)))
+            clear = ways.distance(point) >= PASSAGE and ways.distance(body) >= RADIUS
+            if clear and floor.covers(body) and not any(t.intersects(body) for t in taken):
                 return float(x), float(y)
     return None
 
