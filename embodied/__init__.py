@@ -1,1 +1,58 @@
-"""embodied: generated houses in MuJoCo, panoramas, and agents that ask people for help."""
+"""embodied: generated houses in MuJoCo, panoramas, and agents that ask people for help.
+
+    import embodied
+
+    catalogue = embodied.load_catalogue()
+    house = embodied.generate_house(7, embodied.HouseConfig(area=(38.0, 46.0)), catalogue)
+    with embodied.open_world(house, catalogue, embodied.default_cache()) as world:
+        panorama = world.panorama(0)
+        left = panorama.view_rgb(yaw=1.57, pitch=0.0)
+
+Places: generate_house, House, HouseConfig, load_catalogue, default_cache, build_graph, NavGraph.
+Pictures: open_world, World, Renderer, Panorama. Randomness: stream.
+Tasks and people are in embodied.interface; read it first when you write an agent.
+
+Each name is imported when it is first used, so that `import embodied` costs nothing; and off-screen
+OpenGL is chosen before mujoco is imported, whichever name comes first. Gymnasium is not imported
+here: `import embodied.gym_env` registers the environments, or let Gymnasium do it by
+gymnasium.make("embodied.gym_env:embodied/HANNA-v0").
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from assets.cache import default_cache
+    from assets.catalogue import load_catalogue
+    from embodied.generate import HouseConfig, generate_house
+    from embodied.house import House
+    from embodied.navgraph import NavGraph, build_graph
+    from embodied.panorama import Panorama
+    from embodied.render import Renderer
+    from embodied.seeds import stream
+    from embodied.world import World, open_world
+
+__all__ = ["House", "HouseConfig", "NavGraph", "Panorama", "Renderer", "World", "build_graph", "default_cache",
+           "generate_house", "load_catalogue", "open_world", "stream"]
+
+HOMES = {
+    "House": "embodied.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navgraph",
+    "Panorama": "embodied.panorama", "Renderer": "embodied.render", "World": "embodied.world",
+    "build_graph": "embodied.navgraph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
+    "load_catalogue": "assets.catalogue", "open_world": "embodied.world", "stream": "embodied.seeds",
+}
+"""The module behind each public name."""
+
+
+def __getattr__(name: str) -> object:
+    """A public name, imported on first use (PEP 562)."""
+    if name not in HOMES:
+        raise AttributeError(f"module 'embodied' has no attribute {name!r}; it offers {__all__}")
+    value = globals()[name] = getattr(importlib.import_module(HOMES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

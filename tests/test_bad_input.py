@@ -1,0 +1,210 @@
+"""Wrong input, damaged files and unable machines: one line that says what to do, and nothing half-written is believed."""
+
+from __future__ import annotations
+
+import copy
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+
+import embodied
+from assets.cache import atomic_path
+from assets.catalogue import CatalogueError, load_catalogue
+from assets.materials import finish
+from assets.sh3f import CATALOGUE, PackError, open_pack
+from embodied import cli
+from embodied.errors import UnableError
+from embodied.house import House, HouseError
+from embodied.panorama import Panorama
+from embodied.panorama_file import PanoramaFile, write_panoramas
+from embodied.scene import load_texture
+
+
+def said(capsys, *words: str) -> str:
+    """The one line that a wrong command says."""
+    assert cli.main(words) == 2
+    out, err = capsys.readouterr()
+    assert not out and err.startswith("error: ") and err.count("\n") == 1, err
+    return err
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (("house", "--area", "5", "10", "--out", "x"), "area should be"),
+    (("house", "--area", "nan", "nan", "--out", "x"), "area should be"),
+    (("house", "--style", "nope", "--out", "x"), "style should be one of"),
+    (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
+    (("render", "/nowhere"), "make one with `embodied house"),
+    (("light", "/nowhere"), "make one with `embodied house"),
+    (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
+    (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
+    (("bench", "nothing"), "unknown benchmark"),
+])
+def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert message in said(capsys, *words)
+    assert not list(tmp_path.iterdir())
+
+
+def edited(change) -> str:
+    body = copy.deepcopy(json.loads(two_rooms().to_json()))
+    change(body)
+    return json.dumps(body)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda h: h.update(schema=99), "this version reads 1"),
+    (lambda h: h.update(openings=h["openings"][1:]), "has no door"),
+    (lambda h: h["rooms"][0].update(kind="dungeon"), "unknown kind 'dungeon'"),
+    (lambda h: h["rooms"][0].update(id="../up"), "an id is made of"),
+    (lambda h: h["rooms"][0].update(polygon=[[0, 0]]), "simple counter-clockwise polygon"),
+    (lambda h: h["rooms"][0].update(accent_wall=9), "its walls are 0 to 3"),
+    (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "finite number"),
+    (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "finite number"),
+    (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
+    (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
+    (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
+    (lambda h: h["placements"][0].update(yaw="north"), "should be float"),
+    (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
+    (lambda h: h.update(disorder=7.0), "disorder"),
+    (lambda h: h.update(stairs=[{"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}]), "stair 's'"),
+    (lambda h: h.update(lights=[{"id": "l", "room": "bedroom_1", "placement": "ghost", "position": [7, 2, 2],
+                                 "color": [1, 1, 1], "power": 100}]), "unknown object 'ghost'"),
+])
+def test_a_house_edited_into_nonsense_is_refused(change, message):
+    with pytest.raises(HouseError, match=message):
+        House.from_json(edited(change))
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\xfe\x00", b"[" * 100_000, b'{"schema":1,"seed":' + b"9" * 6000 + b"}", b"null"])
+def test_a_house_file_that_is_no_house_is_named(data, tmp_path):
+    path = tmp_path / "house.json"
+    path.write_bytes(data)
+    with pytest.raises(HouseError, match=r"house\.json"):
+        House.load(path)
+
+
+def test_an_unknown_asset_is_named(tmp_path):
+    with pytest.raises(CatalogueError, match="no asset 'no/such'"):
+        load_catalogue(tmp_path).mesh("no/such", (1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize("name", ["../../evil.obj", "/etc/evil.obj", "a\\b.obj", "C:/evil.obj"])
+def test_a_pack_that_climbs_out_is_refused(name, tmp_path):
+    with zipfile.ZipFile(tmp_path / "bad.sh3f", "w") as z:
+        z.writestr(CATALOGUE, "")
+        z.writestr(zipfile.ZipInfo(name), "v 0 0 0")
+    with pytest.raises(PackError, match="outside the library"):
+        open_pack(tmp_path / "bad.sh3f")
+
+
+def test_a_bomb_and_a_torn_pack_are_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "bomb.sh3f", "w", zipfile.ZIP_DEFLATED) as z:
+        z.writestr("zeros.obj", bytes(8 * 2**20))
+    with pytest.raises(PackError, match="zip bomb"):
+        open_pack(tmp_path / "bomb.sh3f")
+    torn = tmp_path / "torn.sh3f"
+    torn.write_bytes((tmp_path / "bomb.sh3f").read_bytes()[:500])
+    with pytest.raises(PackError, match="not a .sh3f library"):
+        open_pack(torn)
+
+
+@pytest.mark.parametrize("note", ["[1]", "null", "{", '{"color": "x", "bytes": {}}'])
+def test_a_damaged_note_of_a_material_is_made_again(note, tmp_path):
+    made = finish("paint_white/0", tmp_path)
+    (path,) = tmp_path.glob("materials/*/maps.json")
+    before = path.read_text()
+    path.write_text(note)
+    finish.cache_clear()
+    assert finish("paint_white/0", tmp_path) == made
+    assert path.read_text() == before
+
+
+def test_a_flipped_texture_is_noticed(tmp_path):
+    path = tmp_path / "color.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"x" * 100)
+    with pytest.raises(OSError, match="missing or damaged; delete"):
+        load_texture(str(path))
+
+
+def test_a_flipped_byte_in_a_panorama_file_is_found(tmp_path):
+    faces = Panorama(np.full((6, 8, 8, 3), 90, np.uint8), np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
+    path = tmp_path / "a.pano"
+    write_panoramas(path, [faces, faces], {})
+    with PanoramaFile(path) as file:
+        assert not file.damaged()
+        offset = file.index["nodes"][1]["depth"][0]
+    data = bytearray(path.read_bytes())
+    data[offset + 3] ^= 1
+    path.write_bytes(data)
+    with PanoramaFile(path) as file:
+        assert file.damaged() == ((1, "depth"),)
+
+
+def test_no_opengl_is_one_line():
+    for environment, message in (({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
+                                 ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL")):
+        code = "from embodied import cli\nfrom embodied.cli import doctor\ndoctor.run = lambda a: __import__('embodied.gl').gl.info()\n"
+        done = subprocess.run([sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"], check=False,
+                              capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
+        assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+@pytest.mark.parametrize(("error", "status", "message"), [
+    (OSError(errno.ENOSPC, "No space left on device", "/x/y"), 2, "/x/y: No space left on device: the disk is full; free"),
+    (UnableError("no light;\nuse unlit"), 2, "error: no light; use unlit"),
+    (KeyboardInterrupt(), 130, "the same command goes on from there"),
+])
+def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys, monkeypatch):
+    from embodied.cli import doctor
+
+    def fail(_):
+        raise error
+
+    monkeypatch.setattr(doctor, "run", fail)
+    assert cli.main(["doctor"]) == status
+    err = capsys.readouterr().err.strip()
+    assert message in err and "\n" not in err
+
+
+def test_a_full_disk_leaves_no_file(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    with pytest.raises(OSError, match="full"), atomic_path(path) as temporary:
+        temporary.write_text("half")
+        raise OSError(errno.ENOSPC, "full")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"] and path.read_text() == "old"
+
+
+def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(tmp_path):
+    words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
+    code = ("import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.cli import main\n"
+            "print('go', flush=True); raise SystemExit(main())")
+    process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and "Traceback" not in err, err
+    assert not list(tmp_path.rglob(".*"))
+
+
+def test_help_imports_no_subcommand_and_import_embodied_is_light():
+    code = ("import sys, embodied, embodied.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
+            "print([m for m in ('numpy', 'shapely', 'mujoco', 'torch', 'embodied.cli.house') if m in sys.modules])")
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_every_public_name_is_there():
+    assert all(getattr(embodied, name) is not None for name in embodied.__all__)
+    with pytest.raises(AttributeError, match="it offers"):
+        embodied.nothing  # noqa: B018  the access is the test
