@@ -23,7 +23,8 @@ SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "han
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Options that all of them share."""
     parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built")
-    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR", help="where expensive products are kept")
+    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR",
+                        help="where expensive products are kept; safe to delete (default: %(default)s)")
     parser.add_argument("--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)")
 
 

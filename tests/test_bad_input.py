@@ -47,6 +47,8 @@ def said(capsys, *words: str) -> str:
     (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
     (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
     (("bench", "nothing"), "unknown benchmark"),
+    (("dataset", "find", "--out", "x", "--area", "5", "10"), "area should be"),
+    (("dataset", "find", "--out", "x", "--workers", "0"), "--workers should be at least 1"),
 ])
 def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -187,10 +189,11 @@ def test_a_full_disk_leaves_no_file(tmp_path):
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(tmp_path):
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
     code = ("import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.cli import main\n"
+            "import embodied.export, embodied.generate, embodied.plan  # some libraries swallow a Ctrl-C while they load\n"
             "print('go', flush=True); raise SystemExit(main())")
     process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.readline()
-    time.sleep(0.5)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130 and "Traceback" not in err, err

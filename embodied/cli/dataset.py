@@ -41,7 +41,11 @@ def run(args: argparse.Namespace) -> int:
     from embodied.compat import export
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
     from embodied.datasets.store import Dataset
+    from embodied.generate import HouseConfig
 
+    HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
+    if args.workers < 1:
+        raise ValueError(f"--workers should be at least 1, got {args.workers}")
     config = DatasetConfig(args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language)
 
     def watch(jobs, total):

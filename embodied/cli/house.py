@@ -15,7 +15,7 @@ from embodied.generate import HouseConfig, generate_house
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="which house; the same seed gives the same house")
+    parser.add_argument("--seed", type=int, default=0, help="which house; the same seed gives the same house (default: %(default)s)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")

@@ -25,7 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", choices=("unlit", "baked"), default="baked", help="how the house is drawn (default: baked)")
     parser.add_argument("--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)")
     parser.add_argument("--video", type=Path, metavar="MP4", help="write what the agent sees as a video")
-    parser.add_argument("--video-size", type=int, nargs=2, default=(480, 640), metavar=("H", "W"), help="pixels, both even")
+    parser.add_argument("--video-size", type=int, nargs=2, default=(480, 640), metavar=("H", "W"), help="pixels, both even (default: 480 640)")
     add_sinks(parser)
     add_cache(parser)
     add_packs(parser)
