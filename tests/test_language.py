@@ -8,7 +8,7 @@ import pytest
 from assets.catalogue import load_catalogue
 from embodied.assistants.routes import RouteConfig, sampled_paths
 from embodied.generate import HouseConfig, generate_house
-from embodied.language.clauses import Enter, Exit, Metres, Past, StopBy, StopHere, To, Turn
+from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, follow
@@ -53,7 +53,7 @@ def some_phrases(lexicon, rng) -> list[Phrase]:
 
     choice = lambda: kinds[int(rng.integers(len(kinds)))]
     return [Phrase(Exit(choice())), Phrase(Turn("left")), of(To), of(lambda t: Past(t, "right")), Phrase(Turn("right", 45)),
-            Phrase(Enter(choice())), Phrase(Turn("left", 180)), Phrase(Metres(int(rng.integers(1, 9)))), of(StopBy)]
+            Phrase(Enter(choice())), Phrase(Turn("left", 180)), Phrase(Metres(int(rng.integers(1, 9)))), of(Notice), of(StopBy)]
 
 
 def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
@@ -135,7 +135,7 @@ def test_landmarks_are_visible_from_the_route(world, spoken):
     for text, path, _ in spoken:
         seen = {s.object_class for n in path for s in world.sightings(n)}
         for clause in parse(text, lexicon).clauses:
-            if isinstance(clause, To | Past | StopBy):
+            if isinstance(clause, To | Past | Notice | StopBy):
                 assert seen & set(clause.thing.classes), (text, clause)
 
 

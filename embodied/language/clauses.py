@@ -84,6 +84,13 @@ class Avoid:
 
 
 @dataclass(frozen=True)
+class Notice:
+    """Something one sees on the way; nothing to do about it."""
+
+    thing: Thing
+
+
+@dataclass(frozen=True)
 class StopBy:
     """The end is beside something."""
 
@@ -102,8 +109,10 @@ class StopHere:
     """The end is where the last clause ended."""
 
 
-Clause = Turn | Exit | Enter | Cross | Forward | Metres | To | Past | Avoid | StopBy | StopIn | StopHere
+Clause = Turn | Exit | Enter | Cross | Forward | Metres | To | Past | Avoid | Notice | StopBy | StopIn | StopHere
 STOPS = (StopBy, StopIn, StopHere)
+REMARKS = (Avoid, Notice)
+"""Clauses that ask for nothing to be done."""
 WALKS = (Exit, Enter, Cross, Forward, Metres, To, Past)
 """Clauses that take at least one step."""
 

@@ -19,6 +19,7 @@ from embodied.language.clauses import (
     Exit,
     Forward,
     Metres,
+    Notice,
     Past,
     RouteInstruction,
     StopBy,
@@ -49,7 +50,7 @@ def kind_of(clause: Clause) -> str:
         return {45: "slight", 90: "turn", 180: "around"}[clause.angle]
     if isinstance(clause, Past):
         return "past" if clause.side is None else "past_side"
-    return {Exit: "exit", Enter: "enter", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid",
+    return {Exit: "exit", Enter: "enter", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid", Notice: "notice",
             StopBy: "stop_by", StopIn: "stop_in", StopHere: "stop_here"}[type(clause)]
 
 
@@ -248,7 +249,7 @@ def _clauses(heard: _Heard) -> list[Clause]:
         "turn": lambda: Turn(side), "slight": lambda: Turn(side, 45), "around": lambda: Turn(LEFT, 180),
         "exit": lambda: Exit(next(rooms)), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
         "forward": Forward, "metres": lambda: Metres(number), "to": lambda: To(thing), "past": lambda: Past(thing),
-        "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "stop_by": lambda: StopBy(thing),
+        "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "notice": lambda: Notice(thing), "stop_by": lambda: StopBy(thing),
         "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,
     }
     return [make[kind]() for kind in heard.template.kinds]

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from embodied.geometry import wrap
 from embodied.language.clauses import (
     LEFT,
+    REMARKS,
     STOPS,
-    Avoid,
     Clause,
     Cross,
     Enter,
@@ -94,8 +94,8 @@ def carry_out(eyes: Eyes, instruction: RouteInstruction, start: int, yaw: float)
 
 
 def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
-    """Without warnings, and with a walk after every turn that has none before the next turn or stop."""
-    kept = [c for c in clauses if not isinstance(c, Avoid)]
+    """Without remarks, and without turns at the end that nothing follows."""
+    kept = [c for c in clauses if not isinstance(c, REMARKS)]
     while len(kept) > 1 and isinstance(kept[-1], Turn):
         kept.pop()
     return tuple(kept)

@@ -21,6 +21,7 @@ from embodied.language.clauses import (
     Exit,
     Forward,
     Metres,
+    Notice,
     Past,
     StopBy,
     StopHere,
@@ -102,6 +103,8 @@ def plan(world: World, path: Sequence[int], yaw: float, speaker: Speaker, *, rng
             phrases.append(Phrase(Cross(kind(start))))
         else:
             phrases.append(Phrase(Forward()))
+    if rng.random() < speaker.remarks and (remark := _remark(eyes, lexicon, path, speaker, used, rng)) is not None:
+        phrases.append(remark)
     if rng.random() < speaker.avoids and (wrong := _wrong_room(eyes, path, kind)):
         phrases.append(Phrase(Avoid(wrong)))
     phrases.append(_stop(eyes, lexicon, path, kind(path[-1]), legs[-1].crosses if legs else False, phrases, speaker, used, rng))
@@ -230,6 +233,15 @@ def _ranked(things: Sequence[SeenThing], rng: np.random.Generator) -> list[SeenT
     """Things in the order somebody would think of them: large ones mostly first."""
     weights = {t.placement: math.log(t.pixels + 1) * (1 + 1.2 * float(rng.random())) for t in sorted(things, key=lambda t: t.placement)}
     return sorted(things, key=lambda t: (-weights[t.placement], t.placement))
+
+
+def _remark(eyes: Eyes, lexicon: Lexicon, path: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator) -> Phrase | None:
+    """Any thing in view near the end, large or small."""
+    things = [t for t in eyes.at(path[-1 - int(rng.integers(2))]).things if t.placement not in used]
+    if not things:
+        return None
+    word = lexicon.words_for(things[int(rng.integers(len(things)))].asset, rng, adjectives=int(rng.integers(2)), ornament=speaker.ornament)
+    return Phrase(Notice(lexicon.thing(word)), word)
 
 
 def _wrong_room(eyes: Eyes, path: Sequence[int], kind) -> str | None:

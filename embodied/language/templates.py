@@ -14,7 +14,7 @@ from dataclasses import dataclass
 class Template:
     kinds: tuple[str, ...]
     """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'cross', 'forward', 'metres', 'to',
-    'past', 'past_side', 'avoid', 'stop_by', 'stop_in', 'stop_here'."""
+    'past', 'past_side', 'avoid', 'notice', 'stop_by', 'stop_in', 'stop_here'."""
     text: str
     habit: str = ""
     """'terse', 'chatty', 'formal', or '' for everybody."""
@@ -73,6 +73,10 @@ TEMPLATES: tuple[Template, ...] = (
           "leave {thing} to your {side}", "terse: past {thing} on {side}", "stroll by {thing} on your {side}"),
     *_all("avoid", "do not go into the {room}", "don't enter the {room}", "chatty: don't go in the {room} though",
           "if you end up in the {room} you went too far", "ignore the {room}", "not the {room}", "formal: avoid the {room}"),
+    *_all("notice", "you will see {thing}", "you should see {thing}", "notice {thing}", "you can see {thing} ahead", "look out for {thing}",
+          "{thing} will be in view", "chatty: you can't miss {thing}", "formal: observe {thing}", "terse: note {thing}",
+          "chatty: you'll spot {thing}", "{thing} should be nearby", "mind {thing}", "chatty: watch out for {thing} by the way",
+          "formal: {thing} is visible ahead", "chatty: I love {thing} over there"),
     *_all("stop_by", "stop next to {thing}", "stop by {thing}", "wait by {thing}", "stop in front of {thing}", "wait near {thing}",
           "stop beside {thing}", "stop at {thing}", "terse: stop {thing}", "chatty: you are done when you are right by {thing}",
           "formal: halt beside {thing}", "stand next to {thing} and wait", "stop when you are near {thing}",
