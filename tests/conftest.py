@@ -8,10 +8,10 @@ import pytest
 
 from embodied.house import House, Opening, Placement, Room, Storey
 
-FINISHES = dict(
-    floor_finish="oak_planks/0", wall_finish="paint_white/0",
-    ceiling_finish="paint_white/0", skirting_finish="paint_white/0",
-)
+FINISHES = {
+    "floor_finish": "oak_planks/0", "wall_finish": "paint_white/0",
+    "ceiling_finish": "paint_white/0", "skirting_finish": "paint_white/0",
+}
 
 
 def two_rooms() -> House:

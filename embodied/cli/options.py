@@ -6,6 +6,7 @@ import argparse
 import ast
 import dataclasses
 import inspect
+import itertools
 import textwrap
 import types
 import typing
@@ -44,7 +45,7 @@ def field_docs(kind: type) -> dict[str, str]:
     """Field name to the docstring that stands below it in the source."""
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body
     docs = {}
-    for field, doc in zip(body, body[1:]):
+    for field, doc in itertools.pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
             docs[field.target.id] = " ".join(str(doc.value.value).split())
     return docs
