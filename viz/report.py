@@ -91,7 +91,7 @@ def _plots(found: Sequence[Listed], agents: Sequence[str]) -> str:
     axes = figure.subplots(1, 3, sharey=True)
     of = {a: [x for x in found if x.agent == a] for a in agents}
     axes[0].barh(agents, [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f")
-    axes[0].set(title="ended at a goal node, %", xlim=(0, 100))
+    axes[0].set(title="ended exactly at a goal node, %\n(the tables also count those within the radius)", xlim=(0, 100))
     axes[1].boxplot([[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
     axes[1].set(title="steps")
     axes[2].boxplot([[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
