@@ -23,7 +23,7 @@ from embodied.scene import compile_scene
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 
-LARGE = HouseConfig(area=(370.0, 390.0))
+LARGE = HouseConfig(area=(500.0, 550.0))
 """A house of about 125 viewpoints, the mean of Matterport3D."""
 TYPICAL = HouseConfig(area=(110.0, 130.0))
 
