@@ -34,11 +34,14 @@ def digest(*parts: object) -> str:
 
 
 @contextlib.contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path, *, sync: bool = True) -> Iterator[Path]:
     """A temporary sibling of `path` that replaces it only if the body succeeds.
 
     A reader therefore sees the old file, no file or the whole new file; Ctrl-C, a full disk or
     an exception leaves nothing half-written behind.
+
+    Args:
+      sync: False does not wait for the disk; for the many small files that are checked when read.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
@@ -46,8 +49,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        with open(temporary, "rb") as f:
-            os.fsync(f.fileno())
+        if sync:
+            with open(temporary, "rb") as f:
+                os.fsync(f.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     finally:

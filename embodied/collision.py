@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
 from scipy import ndimage
 
+from assets.cache import atomic_path, digest
 from assets.records import Asset, MeshPart
 from embodied.house import House, Room
 
+BOXES_VERSION = 1
+"""Counts up whenever `object_boxes` would give other boxes."""
 CELLS = (20, 14, 10, 7, 5, 3, 2)
 """Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
 MOST_BOXES = 30
@@ -42,6 +48,23 @@ class Box:
     half: tuple[float, float, float]
     """Half extents, metres."""
     yaw: float = 0.0
+
+
+def kept_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path) -> tuple[Box, ...]:
+    """`object_boxes`, kept on disk under what they depend on; a file that makes no sense is made again."""
+    surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
+    meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
+    path = Path(cache) / "collision" / f"{digest(BOXES_VERSION, surfaces, asset.size, size, *meshes)[:32]}.json"
+    try:
+        rows = np.array(json.loads(path.read_text()), float).reshape(-1, 7)
+        if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
+            return tuple(Box(tuple(r[:3]), tuple(r[3:6]), r[6]) for r in rows.tolist())
+    except (OSError, ValueError, TypeError):
+        path.unlink(missing_ok=True)
+    boxes = object_boxes(asset, parts, size)
+    with atomic_path(path, sync=False) as temporary:
+        temporary.write_text(json.dumps([[*map(float, (*b.centre, *b.half, b.yaw))] for b in boxes]))
+    return boxes
 
 
 def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[Box, ...]:

@@ -10,6 +10,7 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,8 @@ VISUAL, COLLISION = 2, 3
 """Geom groups."""
 TEXTURE_SIZE = 512
 """Largest side of a texture in pixels; larger ones are shrunk when loaded."""
+DECODERS = 4
+"""Threads that decode textures."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
@@ -206,10 +209,13 @@ def yaw_quat(yaw: float) -> list[float]:
 
 def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, mujoco.MjsBody]) -> None:
     meshes: dict[str, str] = {}
-    looks = _Looks(spec)
+    looks = _Looks(spec, [p.mesh.finish.texture for p in parts if p.mesh.finish.texture])
     count: dict[str, int] = {}
+    drawable: dict[str, bool] = {}
     for part in parts:
-        if not _is_drawable(part.mesh):
+        if part.mesh_key not in drawable:
+            drawable[part.mesh_key] = _is_drawable(part.mesh)
+        if not drawable[part.mesh_key]:
             continue
         if part.mesh_key not in meshes:
             meshes[part.mesh_key] = f"{len(meshes):04d}_{re.sub(r'[^A-Za-z0-9]+', '_', part.mesh_key)[:60]}"
@@ -248,8 +254,12 @@ def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: np.ndarray, normals: np.
 class _Looks:
     """Materials and textures of a spec, each made once. MuJoCo draws at most 1000 of either."""
 
-    def __init__(self, spec: mujoco.MjSpec) -> None:
+    def __init__(self, spec: mujoco.MjSpec, textures: Sequence[str]) -> None:
+        """`textures`: the files that will be needed; they are decoded side by side, which OpenCV allows."""
         self._spec = spec
+        files = list(dict.fromkeys(textures))
+        with ThreadPoolExecutor(DECODERS) as pool:
+            self._images = dict(zip(files, pool.map(load_texture, files), strict=True))
         self._materials: dict[tuple, str] = {}
         self._textures: dict[str, str] = {}
 
@@ -273,8 +283,7 @@ class _Looks:
     def _texture(self, path: str) -> str:
         if path not in self._textures:
             name = self._textures[path] = f"texture_{len(self._textures)}"
-            image = load_texture(path)
-            add_texture(self._spec, name, image)
+            add_texture(self._spec, name, self._images[path])
         return self._textures[path]
 
 
@@ -350,8 +359,10 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
 
 
 def placement_boxes(catalogue, p: Placement) -> tuple[collision.Box, ...]:
-    """The collision boxes of a placement, in the asset frame."""
-    return collision.object_boxes(catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params), p.size)
+    """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
+    asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
+    cache = getattr(catalogue, "cache", None)
+    return collision.object_boxes(asset, parts, p.size) if cache is None else collision.kept_boxes(asset, parts, p.size, cache)
 
 
 def _add_boxes(body: mujoco.MjsBody, owner: str, boxes: Sequence[collision.Box], *, density: float = 1000.0,

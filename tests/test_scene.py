@@ -12,7 +12,7 @@ from handmade import HandCatalogue, box_mesh, furnished
 
 from assets.catalogue import load_catalogue
 from assets.packs import find_packs
-from assets.records import Asset, Finish, SupportSurface
+from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied import collision, scene
 from embodied.generate import HouseConfig, generate_house
 from embodied.house import Placement
@@ -234,3 +234,15 @@ def test_placements_outside_the_catalogue_are_named(house):
     ghost = Placement("ghost_1", "hand/ghost", "ghost", "bedroom_1", (7.0, 2.0, 0.0), 0.0, (1.0, 1.0, 1.0))
     with pytest.raises(KeyError, match="hand/ghost"):
         scene.compile_scene(dataclasses.replace(house, placements=(ghost,)), HandCatalogue())
+
+
+def test_kept_boxes_are_those_that_were_computed_and_damage_is_mended(tmp_path):
+    plate = MeshPart(*(np.asarray(a, t) for a, t in (
+        ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.4]], np.float32), ([[0, 1, 2], [0, 2, 3]], np.int32),
+        ([[0, 0, 1]] * 4, np.float32), ([[0, 0]] * 4, np.float32))), Finish())
+    asset = Asset("hand/plate", "plate", "plate", (1.0, 1.0, 0.4), "floor")
+    first = collision.kept_boxes(asset, [plate], asset.size, tmp_path)
+    assert first == collision.object_boxes(asset, [plate], asset.size) == collision.kept_boxes(asset, [plate], asset.size, tmp_path)
+    kept = next((tmp_path / "collision").iterdir())
+    kept.write_text(kept.read_text()[:-9])
+    assert collision.kept_boxes(asset, [plate], asset.size, tmp_path) == first
