@@ -150,7 +150,7 @@ class HelpEnv:
 
     def _replied(self, reply: Reply) -> None:
         """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, or override _replied")
 
     def _stopped(self) -> None:
         """The agent says it is done."""
