@@ -43,7 +43,10 @@ class HouseConfig:
 
     def __post_init__(self) -> None:
         if self.area is not None:
-            low, high = self.area
+            try:
+                low, high = (float(a) for a in self.area)
+            except (TypeError, ValueError):
+                raise HouseError(f"area should be a pair (low, high) of m2, got {self.area!r}") from None
             if not AREAS[0] <= low <= high <= AREAS[1]:
                 raise HouseError(f"area should be (low, high) within {AREAS} m2, got {self.area}")
         _within("rooms", self.rooms, 2, 20)
