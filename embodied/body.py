@@ -33,6 +33,8 @@ CONTROL = 0.02
 """Seconds between two commands."""
 NEAR = 0.06
 """A node is reached within this many metres."""
+AHEAD = 0.4
+"""The body steers for a point of its line this many metres ahead, so that it stays on the line."""
 PATIENCE = 4.0
 """Seconds allowed beyond four times what the way takes at full speed."""
 
@@ -121,20 +123,23 @@ class Driver:
         mujoco.mj_step(self.model, self.data, 10 * self._substeps)
 
     def drive(self, target: np.ndarray) -> Drive:
-        """Turn towards (x, y) and go there; give up after a while."""
-        start, way = self.data.time, float(np.linalg.norm(np.asarray(target)[:2] - self.position))
+        """Turn towards (x, y) and go there along the straight line; give up after a while."""
+        start, origin, goal = self.data.time, self.position, np.asarray(target)[:2]
+        way = float(np.linalg.norm(goal - origin))
+        along = (goal - origin) / max(way, 1e-9)
         limit = 4.0 * (way / FASTEST + math.pi / TURNING) + PATIENCE
         metres, bumps, touching = 0.0, [], frozenset()
         while self.data.time - start < limit:
             before = self.position
-            offset = np.asarray(target)[:2] - before
-            distance = float(np.linalg.norm(offset))
+            distance = float(np.linalg.norm(goal - before))
             if distance < NEAR:
                 self._command(0.0, 0.0)
                 return Drive(True, self.data.time - start, metres, tuple(bumps))
+            ahead = origin + along * min(way, float((before - origin) @ along) + AHEAD)
+            offset = ahead - before
             error = float(wrap(math.atan2(offset[1], offset[0]) - self.yaw))
             turn = float(np.clip(5.0 * error, -TURNING, TURNING))
-            speed = 0.0 if abs(error) > 0.25 else min(FASTEST, 2.0 * distance + 0.05)
+            speed = 0.0 if abs(error) > 0.2 else min(FASTEST, 2.0 * distance + 0.05)
             self._command(speed, turn)
             mujoco.mj_step(self.model, self.data, self._substeps)
             metres += float(np.linalg.norm(self.position - before))

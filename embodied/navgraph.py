@@ -23,14 +23,14 @@ CELL = 0.1
 """Grid on which viewpoints are chosen, metres."""
 ENTERED = 0.4
 """Share of a room's free floor that must be reachable for the room to count as entered."""
-APART = 0.7
+APART = 0.65
 """Least distance between viewpoints of one room, in units of the wanted spacing."""
 LOOKS = 48
 """Candidates per viewpoint whose views of the others are compared."""
 CROWDED = 0.6
 """Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
-LONGEST = 2.2
-"""Longest edge in units of the wanted spacing: about 5 m, where Matterport3D cuts its edges too."""
+LONGEST = 2.0
+"""Longest edge in units of the wanted spacing: 4.5 m; 95 % of Matterport3D's edges are shorter than 5 m."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,6 +99,13 @@ def test_edge_lengths_are_those_of_matterport3d():
     assert np.quantile(lengths, 0.95) < 5.0
 
 
+def test_viewpoints_have_choices():
+    """A tree has degree 2; Matterport3D's graphs have about 4, ours lie between because rooms are smaller."""
+    for _, graph in pairs():
+        assert 2 * len(graph.edges) / len(graph.ids) > 2.2
+    assert np.mean([2 * len(graph.edges) / len(graph.ids) for _, graph in pairs()]) > 2.7
+
+
 def test_a_large_house_has_about_125_nodes():
     house = generate_house(500, HouseConfig(area=(500, 520)), load_catalogue())
     assert 100 <= len(build_graph(house).ids) <= 155
