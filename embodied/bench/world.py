@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -105,6 +106,8 @@ def memory(catalogue: Catalogue, cache: Path, seed: int, count: int) -> Iterator
         values.append(process.memory_info().rss / 2**20)
     third = max(count // 3, 1)
     yield from_values(f"memory after {count} houses", values[-1:], "MiB", aim=2048.0)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10  # Linux counts KiB
+    yield from_values("peak memory on the way", [peak], "MiB", aim=2048.0)
     growth = np.median(values[-third:]) - np.median(values[third:2 * third] if count >= 3 else values)
     yield from_values("growth over the last third", [float(growth)], "MiB", aim=100.0)
 
