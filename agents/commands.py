@@ -11,13 +11,16 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
+import joblib
 import numpy as np
 import torch
 
 from agents.evaluate import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent, new_agent
-from agents.imitation.config import SCALES
+from agents.imitation.checkpoint import Progress
+from agents.imitation.config import SCALES, TrainingConfig
 from agents.imitation.parallel import join_launcher
 from agents.imitation.training import Split, train
 from agents.options import chosen
@@ -107,41 +110,54 @@ def encoder_of(args: argparse.Namespace) -> Encoder:
 
 def run_features(args: argparse.Namespace, note: Note = print) -> int:
     """Features of every house of a data set; houses that have them are skipped."""
-    torch.set_num_threads(args.threads)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
-    made = 0
-    for name in _houses(data, data.splits):
-        place, path = data.place(name), feature_path(args.data / "features", encoder.digest, name)
-        try:
-            load_features(path, encoder=encoder.digest, source=place.house.digest)
-            continue
-        except (FileNotFoundError, ValueError):
-            pass  # missing, damaged or of another house: made anew
-        with data.open_world(name, load_catalogue(args.cache), args.cache, size=FACES, quality=args.quality) as world:
-            panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-            save_features(path, encode_panoramas(encoder, panoramas), encoder, place.house.digest)
-        made += 1
-        note(f"{name}: {len(place.graph.positions)} nodes")
-    note(f"{made} houses made, encoder {encoder.digest[:16]}")
+    missing = [n for n in _houses(data, data.splits) if not _has_features(data, n, encoder)]
+    jobs = (joblib.delayed(_make_features)(data, n, encoder, args) for n in missing)
+    for line in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
+        note(line)
+    note(f"{len(missing)} houses made, encoder {encoder.digest[:16]}")
     return 0
+
+
+def _has_features(data: Dataset, name: str, encoder: Encoder) -> bool:
+    """False: missing, damaged, or of another house."""
+    path = feature_path(data.folder / "features", encoder.digest, name)
+    try:
+        load_features(path, encoder=encoder.digest, source=data.place(name).house.digest)
+        return True
+    except (FileNotFoundError, ValueError):
+        return False
+
+
+def _make_features(data: Dataset, name: str, encoder: Encoder, args: argparse.Namespace) -> str:
+    torch.set_num_threads(args.threads)
+    with data.open_world(name, load_catalogue(args.cache), args.cache, size=FACES, quality=args.quality) as world:
+        panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
+        path = feature_path(data.folder / "features", encoder.digest, name)
+        save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest)
+        return f"{name}: {len(world.graph.positions)} nodes"
 
 
 # HANNA -------------------------------------------------------------------------------------------
 
-def split_of(data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None) -> Split:
-    """A split of a data set, ready to be played with features."""
-    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in data.names(name)}
-    tasks = data.tasks(name)
+def split_of(
+    data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None, houses: int | None = None
+) -> Split:
+    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses."""
+    names = data.names(name)[:houses]
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in names}
+    tasks = [t for t in data.tasks(name) if t.world in paths]
     return Split(
         data.places(name), tasks if limit is None else spread(tasks, limit), data.environment(name),
         load_bank(paths, encoder.digest).to(device),
     )
 
 
-def vocabulary_of(data: Dataset):
-    """Words of the training split: requests and the routes that training hears."""
-    routes = [r.instruction for n in data.names("train") for r in data.routes(n) if r.split == "train_seen"]
-    return build_vocabulary([*(t.request for t in data.tasks("train")), *routes], least=2)
+def vocabulary_of(data: Dataset, houses: int | None = None):
+    """Words of the training split's first `houses` houses: requests and the routes that training hears."""
+    names = data.names("train")[:houses]
+    routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
+    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], least=2)
 
 
 def run_train_hanna(
@@ -150,16 +166,28 @@ def run_train_hanna(
 ) -> int:
     """Train an agent on a data set's training houses, validating on its unseen validation houses."""
     torch.set_num_threads(args.threads)
-    device = join_launcher(args.device)
-    data, encoder, config = Dataset(args.data), encoder_of(args), chosen(args, SCALES[args.scale])
-    training = split_of(data, "train", encoder, device)
+    train_agent(
+        Dataset(args.data), encoder_of(args), chosen(args, SCALES[args.scale]), args.out,
+        device=join_launcher(args.device), minutes=args.minutes, note=note, on_validation=on_validation,
+    )
+    return 0
+
+
+def train_agent(
+    data: Dataset, encoder: Encoder, config: TrainingConfig, folder: Path, *, device: str = "cpu",
+    minutes: float | None = None, note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> Progress:
+    """Train, or go on training, the agent of a run folder; arguments as in agents.imitation.training.train."""
+    houses = config.training_houses or None
+    training = split_of(data, "train", encoder, device, houses=houses)
     validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
-    agent = new_agent(config, vocabulary_of(data), encoder.digest, encoder.size)
+    agent = new_agent(config, vocabulary_of(data, houses), encoder.digest, encoder.size)
     agent.network.to(device)
     parameters = sum(p.numel() for p in agent.network.parameters())
-    note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
-    train(agent, training, validation, HannaTeacher(), args.out, minutes=args.minutes, note=note, on_validation=on_validation)
-    return 0
+    count = len({t.world for t in training.tasks})
+    note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
+    return train(agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation)
 
 
 def run_eval(args: argparse.Namespace, note: Note = print) -> int:

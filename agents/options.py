@@ -65,6 +65,7 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
     parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="houses side by side (default: %(default)s)")
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
 
 
@@ -76,6 +77,21 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
     add_fields(parser, TrainingConfig)
+
+
+def add_study(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2 or houses")
+    add_common(parser)
+    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
+                        help="an encoder of `embodied train vision` (default: shipped)")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="agents, episodes and tables; the same command goes on")
+    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
+    parser.add_argument("--tasks", type=int, metavar="N", help="judge on at most so many tasks of a split, from all houses alike")
+    parser.add_argument("--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)")
+    parser.add_argument("--workers", type=int, default=2, metavar="N", help="agents trained side by side (default: %(default)s)")
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    parser.set_defaults(threads=1)  # per agent; they are trained side by side
+    add_fields(parser, TrainingConfig, skip=("training_houses",))
 
 
 def add_eval(parser: argparse.ArgumentParser) -> None:

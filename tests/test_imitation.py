@@ -50,7 +50,7 @@ torch.set_num_threads(1)
 
 TINY = dataclasses.replace(
     SCALES["mini"], hidden_size=32, navigation_embedding=32, ask_embedding=8, self_heads=2, text_heads=2, dropout=0.1,
-    iterations=4, batch=6, evaluation_choice="likeliest", training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
+    iterations=4, batch=6, training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
     instruction_length=40, learning_rate=3e-3,
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 
 import numpy as np
@@ -13,9 +14,11 @@ from test_datasets import build
 from agents import commands, options
 from agents.evaluate import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
-from agents.vision.encoder import SHIPPED, load_encoder, random_encoder
+from agents.study import Setting, run_study
+from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from embodied.evaluate import evaluate
+from embodied.seeds import stream
 
 torch.set_num_threads(1)
 SMALL = ["--hidden-size", "16", "--navigation-embedding", "16", "--ask-embedding", "8", "--self-heads", "2", "--text-heads",
@@ -82,6 +85,56 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     assert failures(episodes, worlds).departed_wrong == 0.0
     assert request_share(episodes) > 0.2
     assert [p.reason for p in predictions(episodes, worlds)] == ["lost", "uncertain_wrong", "never_asked"]
+
+
+@pytest.fixture
+def study(data, tmp_path):
+    """A study of the smallest agents on the hand-made data set, with features of an encoder on disk."""
+    save_encoder(random_encoder(seed=1), tmp_path / "encoder.safetensors")
+    encoder = load_encoder(tmp_path / "encoder.safetensors")
+    for name in {n for s in data.splits for n in data.names(s)}:
+        place = data.place(name)
+        features = stream(0, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
+        save_features(feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest)
+    config = commands.chosen(parsed(options.add_train_hanna, "--data", ".", "--out", ".", *SMALL), options.SCALES["mini"])
+    config = dataclasses.replace(config, iterations=2)
+    return Setting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
+
+
+def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study):
+    lines = []
+    written = run_study(study, ["4.5", "4.6"], note=lines.append)
+    assert sorted(p.name for p in (study.out / "agents").iterdir()) == [
+        "ask_every_5", "final", "lstm", "no_ask", "no_curiosity", "random_ask"]
+    settings = json.loads((study.folder_of("ask every 5") / "settings.json").read_text())
+    assert (settings["ask_rule"], settings["alpha"]) == ("every5", 0.5)
+    table = written["4.5"].read_text()
+    rows = json.loads((study.out / "table_4.5.json").read_text())
+    assert [(r["agent"], r["split"]) for r in rows] == [
+        (a, s) for s in ("test_seen", "test_unseen") for a in ("No ask", "Random ask", "Ask every 5", "Learned")]
+    assert rows[0]["values"]["requests"]["mean"] == 0.0
+    assert "(86.67)" in table and "(45.43)" in table and "3 episodes in 1 houses" in table
+    assert (study.out / "figure_D.1.png").stat().st_size > 5_000 and (study.out / "figure_D.2.png").exists()
+    once = {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in ("final", "lstm")}
+    again = run_study(study, ["4.6"], note=lines.append)
+    assert again["4.6"].read_text() == written["4.6"].read_text()
+    assert {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in once} == once, "nothing was trained twice"
+
+
+def test_a_study_of_more_houses_than_there_are_is_refused_before_anything_is_trained(study):
+    with pytest.raises(ValueError, match="more training houses"):
+        run_study(study, ["houses"])
+    with pytest.raises(ValueError, match="unknown studies"):
+        run_study(study, ["5.1"])
+    assert not study.out.exists()
+
+
+def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
+    encoder = random_encoder(seed=0)
+    some, every = (commands.split_of(data, "train", encoder, houses=n) for n in (1, None))
+    assert {t.world for t in some.tasks} == {data.names("train")[0]}
+    assert 0 < len(some.tasks) < len(every.tasks)
+    assert len(commands.vocabulary_of(data, 1).words) <= len(commands.vocabulary_of(data).words)
 
 
 def test_missing_features_and_wrong_rows_are_named(data, tmp_path):

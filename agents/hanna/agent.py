@@ -10,10 +10,10 @@ import safetensors
 import safetensors.torch
 import torch
 
-from agents.hanna.asking import RULES
+from agents.hanna.asking import RULES, ask_above
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
-from agents.hanna.policy import CHOOSERS, HannaPolicy
+from agents.hanna.policy import HannaPolicy, choose_at
 from agents.imitation.config import TrainingConfig
 from agents.options import SHIPPED_AGENT
 from agents.vision.bank import FeatureBank
@@ -37,7 +37,7 @@ class HannaAgent:
     feature_size: int
 
     def policy(self, bank: FeatureBank) -> HannaPolicy:
-        """The agent acting: likeliest actions, its own rule of asking.
+        """The agent acting as it is judged: see the evaluation settings of TrainingConfig.
 
         Raises:
           ValueError: features of another encoder.
@@ -47,10 +47,12 @@ class HannaAgent:
                 f"the features come from encoder {bank.digest[:12]}, the agent learned from {self.encoder_digest[:12]}; "
                 "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
             )
+        config = self.config
+        rule = ask_above(config.ask_threshold) if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
-            self.network, self.vocabulary, bank, choose=CHOOSERS[self.config.evaluation_choice], ask_rule=RULES[self.config.ask_rule][1],
-            instruction_length=self.config.instruction_length, turn_to_agent=self.config.turn_to_agent,
-            read_assistance=self.config.read_assistance,
+            self.network, self.vocabulary, bank, choose=choose_at(config.evaluation_temperature), ask_rule=rule,
+            instruction_length=config.instruction_length, turn_to_agent=config.turn_to_agent,
+            read_assistance=config.read_assistance,
         )
 
 

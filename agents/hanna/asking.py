@@ -29,9 +29,13 @@ def ask_sampled(probability: float, observation: Observation, last_asked: int, *
     return bool(rng.random() < probability)
 
 
-def ask_greedily(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
-    """Ask where the network finds it more likely than not: for evaluation."""
-    return probability > 0.5
+def ask_above(threshold: float) -> AskRule:
+    """Ask where the network's probability exceeds `threshold`: for evaluation."""
+    return lambda probability, observation, last_asked, *, rng: probability > threshold
+
+
+ask_greedily = ask_above(0.5)
+"""Ask where the network finds it more likely than not."""
 
 
 def heuristic(rule: policies.AskRule) -> AskRule:

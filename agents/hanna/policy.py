@@ -37,7 +37,13 @@ def choose_sampled(probabilities: np.ndarray, rng: np.random.Generator) -> int:
     return int(possible[min(drawn, len(possible) - 1)])
 
 
-CHOOSERS: dict[str, Chooser] = {"likeliest": choose_likeliest, "sampled": choose_sampled}
+def choose_at(temperature: float) -> Chooser:
+    """Draw from the distribution sharpened (below 1) or flattened (above 1) by `temperature`; 0 is the likeliest."""
+    if temperature == 0:
+        return choose_likeliest
+    if temperature == 1:
+        return choose_sampled
+    return lambda probabilities, rng: choose_sampled((probabilities / probabilities.max()) ** (1 / temperature), rng)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,8 @@ class TrainingConfig:
     """The authors' program's; the text does not mention it (X12)."""
     batch: int = 32
     """Episodes per update."""
+    training_houses: int = 0
+    """Learn from so many of the data set's training houses; 0: from all."""
     training_steps: int = 20
     """Horizon of training episodes."""
     instruction_length: int = 50
@@ -64,9 +66,12 @@ class TrainingConfig:
     """Views in the agent's frame; False: in absolute order, as in the authors' program (X27)."""
     environment_dropout: float = 0.0
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019); not in the dissertation."""
-    evaluation_choice: str = "likeliest"
-    """'likeliest' (dissertation) or 'sampled': how navigation actions are chosen when judged. An agent
-    that is often wrong and always takes its likeliest action walks in circles."""
+    evaluation_temperature: float = 0.0
+    """How navigation actions are chosen when judged: 0 takes the likeliest (dissertation), 1 draws from
+    the distribution, between them it is sharpened. An agent that is often wrong and always takes its
+    likeliest action walks in circles."""
+    ask_threshold: float = 0.5
+    """When judged, the learned rule asks where REQUEST is more probable than this."""
     validate_every: int = 500
     """Updates between validations."""
     validation_tasks: int = 200
@@ -77,8 +82,10 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
-        if self.evaluation_choice not in ("likeliest", "sampled"):
-            raise ValueError(f"evaluation_choice must be 'likeliest' or 'sampled', got {self.evaluation_choice!r}")
+        if self.evaluation_temperature < 0:
+            raise ValueError(f"evaluation_temperature must not be negative, got {self.evaluation_temperature}")
+        if not 0 <= self.ask_threshold <= 1:
+            raise ValueError(f"ask_threshold must be in [0, 1], got {self.ask_threshold}")
         if not 0 <= self.environment_dropout < 1:
             raise ValueError(f"environment_dropout must be in [0, 1), got {self.environment_dropout}")
         if self.ask_rule not in RULES:
@@ -90,6 +97,8 @@ class TrainingConfig:
         for name in ("learning_rate", "checkpoint_minutes"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if self.training_houses < 0:
+            raise ValueError(f"training_houses must not be negative, got {self.training_houses}")
         if self.alpha < 0:
             raise ValueError(f"alpha must not be negative, got {self.alpha}")
 
@@ -120,7 +129,7 @@ SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
         iterations=1500, learning_rate=7e-4, curiosity_floor=0.02, environment_dropout=0.4,
-        evaluation_choice="sampled", validate_every=100, validation_tasks=60,
+        evaluation_temperature=1.0, validate_every=100, validation_tasks=60,
     ),
     "paper": TrainingConfig(),
 }

@@ -19,7 +19,7 @@ from pathlib import Path
 from embodied.errors import UnableError
 
 COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features",
-            "train", "eval", "judge", "bench")
+            "train", "eval", "judge", "study", "bench")
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
 REMEDIES = {

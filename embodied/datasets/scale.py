@@ -86,14 +86,15 @@ def _small(kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int
     return {"train": train, "val": val, "test": test}, _seen_and_unseen(tasks, held, held, held, judged)
 
 
-SCALES = ("paper", "mini", "tiny")
+SCALES = ("paper", "midi", "mini", "tiny")
 
 
 def scale(name: str, kind: str) -> Scale:
     """The named scale of a kind of play.
 
     'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
-    20 unseen houses to judge by; 'tiny' is for tests.
+    20 unseen houses to judge by; 'midi' has the same unseen houses and five times the houses to
+    learn from, with as many tasks each; 'tiny' is for tests.
 
     Raises:
       ValueError: an unknown scale or kind.
@@ -102,6 +103,8 @@ def scale(name: str, kind: str) -> Scale:
         raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
     if name == "paper":
         houses, splits = PAPER[kind]
+    elif name == "midi":
+        houses, splits = _small(kind, (128, 8, 4, 20), 12_800, 500)
     elif name == "mini":
         houses, splits = _small(kind, (24, 8, 4, 20), 2_400, 500)
     elif name == "tiny":

@@ -1,0 +1,69 @@
+"""The figures of a study: D.1, D.2, and success against the number of training houses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from assets.cache import atomic_path
+from embodied.tables import Estimate
+
+BLUE, GREY = "#2b6cb0", "#a0aec0"
+
+
+def requests_figure(behaviour: Mapping[str, Any], path: Path) -> None:
+    """Figure D.1: (a) share of steps that ask, (b) how often each condition is predicted and true."""
+    figure = Figure(figsize=(8, 3), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1, 2))
+    share = 100 * behaviour["request share"]
+    left.bar(["asks", "moves"], [share, 100 - share], color=[BLUE, GREY])
+    left.set_ylabel("share of steps (%)")
+    left.set_title("(a) requests")
+    _pairs(right, behaviour["conditions"], ("predicted_share", "true_share"), ("predicted", "true"))
+    right.set_title("(b) conditions, where help could be asked")
+    _save(figure, path)
+
+
+def conditions_figure(behaviour: Mapping[str, Any], path: Path) -> None:
+    """Figure D.2: accuracy, precision, recall and F1 of the predicted conditions."""
+    figure = Figure(figsize=(8, 3), layout="constrained")
+    _pairs(figure.subplots(), behaviour["conditions"], ("accuracy", "precision", "recall", "f1"),
+           ("accuracy", "precision", "recall", "F1"))
+    _save(figure, path)
+
+
+def houses_figure(curves: Mapping[str, Sequence[tuple[int, Estimate]]], path: Path) -> None:
+    """Success with 95 % intervals against the number of training houses, one curve per split."""
+    figure = Figure(figsize=(5, 3.4), layout="constrained")
+    axes = figure.subplots()
+    for split, points in curves.items():
+        axes.errorbar([n for n, _ in points], [100 * e.mean for _, e in points], [100 * e.half for _, e in points],
+                      marker="o", capsize=3, label=split)
+    axes.set_xscale("log", base=2)
+    ticks = sorted({n for points in curves.values() for n, _ in points})
+    axes.set_xticks(ticks, [str(n) for n in ticks])
+    axes.set_xlabel("training houses")
+    axes.set_ylabel("success (%)")
+    axes.set_ylim(0, 100)
+    axes.legend()
+    axes.grid(alpha=0.3)
+    _save(figure, path)
+
+
+def _pairs(axes, conditions: Sequence[Mapping[str, Any]], fields: Sequence[str], labels: Sequence[str]) -> None:
+    width = 0.8 / len(fields)
+    for k, (name, label) in enumerate(zip(fields, labels, strict=True)):
+        heights = [100 * (c[name] or 0.0) for c in conditions]  # None: the condition was never true or never said
+        axes.bar([i + (k + 0.5) * width - 0.4 for i in range(len(heights))], heights, width, label=label)
+    axes.set_xticks(range(len(conditions)), [c["reason"].replace("_", " ") for c in conditions])
+    axes.set_ylabel("%")
+    axes.set_ylim(0, 100)
+    axes.legend(fontsize=8)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    with atomic_path(Path(path)) as temporary:
+        figure.savefig(temporary, dpi=130, format="png")

@@ -1,0 +1,261 @@
+"""The dissertation's tables on our houses: train one agent per row, judge all on the same tasks, print both.
+
+A study names agents by what is different about their training; agents that several tables share
+are trained once. `printed` holds the dissertation's numbers (Matterport3D houses, human routes):
+comparable in shape, not in level.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import joblib
+import torch
+
+from agents.commands import about, split_of, train_agent
+from agents.evaluate import hanna_policies
+from agents.figures import conditions_figure, houses_figure, requests_figure
+from agents.hanna.agent import HannaAgent, load_agent
+from agents.imitation.config import TrainingConfig
+from agents.vision.encoder import Encoder, load_encoder
+from assets.cache import write_bytes, write_json
+from embodied.datasets.store import Dataset
+from embodied.evaluate import agent as agent_without_learning
+from embodied.evaluate import evaluate
+from embodied.interface import Episode, Policy
+from embodied.records import save_lines
+from embodied.tables import Row, save, shown
+
+Note = Callable[[str], None]
+
+VARIANTS: Mapping[str, Mapping[str, object]] = {
+    "final": {},
+    "no ask": {"ask_rule": "never", "alpha": 0.5},
+    "random ask": {"ask_rule": "random", "alpha": 0.5},
+    "ask every 5": {"ask_rule": "every5", "alpha": 0.5},
+    "target image only": {"read_assistance": False},
+    "no curiosity": {"alpha": 0.0},
+    "lstm": {"model": "lstm", "alpha": 0.0, "predict_reasons": False},
+    "no reset": {"reset_inter_task": False},
+    "no conditions": {"predict_reasons": False},
+    "no similarity": {"similarity_attention": False},
+    **{f"{n} houses": {"training_houses": n} for n in (8, 32, 128)},
+}
+"""What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note)."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of a table."""
+
+    label: str
+    variant: str
+    """Key of VARIANTS, or '' for an agent that does not learn."""
+    played: str = "learned"
+    """Which of agents.evaluate.hanna_policies, or the name of an agent without learning."""
+    printed: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Column to the dissertation's numbers, one per split."""
+
+    @property
+    def key(self) -> str:
+        return f"{self.variant}, {self.played}" if self.variant else self.played
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of the dissertation."""
+
+    title: str
+    splits: tuple[str, ...]
+    columns: tuple[str, ...]
+    lines: tuple[Line, ...]
+
+
+def _line(label: str, variant: str, played: str = "learned", **printed: Sequence[float]) -> Line:
+    return Line(label, variant, played, {name.replace("_", " "): values for name, values in printed.items()})
+
+
+TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
+FULL = ("success", "spl", "navigation error", "requests")
+TABLES: Mapping[str, Table] = {
+    "4.3": Table("Results on the test splits", TEST, FULL, (
+        _line("Random walk", "", "random walk", success=(0.54, 0.46), spl=(0.33, 0.23), navigation_error=(15.38, 15.34), requests=(0, 0)),
+        _line("Forward 10", "", "forward 10", success=(5.98, 6.36), spl=(4.19, 4.78), navigation_error=(14.61, 13.81), requests=(0, 0)),
+        _line("No assistance", "no ask", success=(17.21, 8.10), spl=(13.76, 4.23), navigation_error=(11.48, 13.22), requests=(0, 0)),
+        _line("Learn to interpret assistance", "final", success=(86.67, 45.43), spl=(63.27, 25.02), navigation_error=(1.63, 8.04), requests=(2.7, 4.4)),
+        _line("Shortest", "", "shortest", success=(100, 100), spl=(100, 100), navigation_error=(0, 0), requests=(0, 0)),
+        _line("Perfect assistance interpretation", "final", "learned, perfect interpretation", success=(90.19, 79.01), spl=(68.76, 54.86), navigation_error=(1.16, 2.65), requests=(2.4, 3.0)),
+    )),
+    "4.4": Table("Types of assistance", TEST, ("success",), (
+        _line("Target image only", "target image only", success=(84.29, 29.91)),
+        _line("+ language instruction", "final", success=(86.67, 45.43)),
+    )),
+    "4.5": Table("Help-request policies", TEST, ("success", "requests"), (
+        _line("No ask", "no ask", success=(17.21, 8.10), requests=(0, 0)),
+        _line("Random ask", "random ask", success=(78.40, 35.97), requests=(4.1, 6.6)),
+        _line("Ask every 5", "ask every 5", success=(86.63, 33.62), requests=(3.5, 7.1)),
+        _line("Learned", "final", success=(86.67, 45.43), requests=(2.7, 4.4)),
+    )),
+    "4.6": Table("Model and curiosity", ("test_unseen",), ("success", "mistake repeat", "request repeat"), (
+        _line("LSTM encoder-decoder", "lstm", success=(19.25,), mistake_repeat=(31.09,), request_repeat=(49.37,)),
+        _line("Our model, alpha = 0", "no curiosity", success=(41.92,), mistake_repeat=(25.20,), request_repeat=(39.85,)),
+        _line("Our model, alpha = 1", "final", success=(45.43,), mistake_repeat=(20.53,), request_repeat=(10.80,)),
+    )),
+    "D.2": Table("Ablations", VALIDATION, FULL, (
+        _line("Final agent", "final", success=(86.06, 45.39), spl=(62.49, 23.33), navigation_error=(1.48, 8.21), requests=(2.7, 4.5)),
+        _line("No inter-task reset", "no reset", success=(83.62, 40.60), spl=(60.44, 19.89), navigation_error=(1.44, 8.26), requests=(3.2, 7.3)),
+        _line("No condition prediction", "no conditions", success=(69.51, 45.72), spl=(44.87, 23.35), navigation_error=(3.11, 6.56), requests=(4.7, 8.1)),
+        _line("No cosine-similarity attention", "no similarity", success=(80.44, 38.69), spl=(56.63, 19.86), navigation_error=(1.89, 8.81), requests=(3.7, 8.5)),
+        _line("No curiosity loss", "no curiosity", success=(86.66, 39.92), spl=(69.66, 21.33), navigation_error=(1.28, 8.66), requests=(2.0, 7.7)),
+    )),
+    "houses": Table("Success and the number of training houses (no counterpart in the dissertation)", TEST, FULL, tuple(
+        _line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)
+    )),
+}
+"""The studies by name. D.2 is on the validation splits, as in the dissertation."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all agents of a study share."""
+
+    data: Path
+    encoder: Path
+    out: Path
+    config: TrainingConfig
+    """Where the variants start from."""
+    tasks: int | None = None
+    """At most so many tasks per split, from all houses alike."""
+    seed: int = 0
+    """Of judging; training has its own in `config`."""
+    device: str = "cpu"
+    threads: int = 1
+    """Of PyTorch, per agent in training."""
+
+    def config_of(self, variant: str) -> TrainingConfig:
+        return dataclasses.replace(self.config, **VARIANTS[variant])
+
+    def folder_of(self, variant: str) -> Path:
+        return self.out / "agents" / variant.replace(" ", "_")
+
+
+def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+    """Train what is missing, judge, and write each table as Markdown, CSV and JSON; returns the Markdown files.
+
+    Agents are trained in `workers` processes; each goes on from its run folder, so the same
+    command continues after an interruption. Results do not depend on `workers`.
+
+    Raises:
+      ValueError: an unknown study, or a variant that wants more training houses than there are.
+    """
+    if unknown := [n for n in names if n not in TABLES]:
+        raise ValueError(f"unknown studies {unknown}; there are {list(TABLES)}")
+    data = Dataset(setting.data)
+    wanted = dict.fromkeys(line.variant for n in names for line in TABLES[n].lines if line.variant)
+    there = len(data.names("train"))
+    if short := [v for v in wanted if setting.config_of(v).training_houses > there]:
+        raise ValueError(f"{short} want more training houses than the {there} of {setting.data}; build a larger scale")
+    jobs = (joblib.delayed(_train)(setting, v, note if workers == 1 else None) for v in wanted)
+    for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+        note(line)
+    judged = _Judge(setting, data, note)
+    return {name: _write(setting, name, judged) for name in names}
+
+
+def _train(setting: Setting, variant: str, note: Note | None) -> str:
+    torch.set_num_threads(setting.threads)
+    data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant)
+    config = setting.config_of(variant)
+    if note is None:
+        folder.mkdir(parents=True, exist_ok=True)
+        log = open(folder / "log.txt", "a", buffering=1)  # noqa: SIM115 - lives as long as this training
+        note = lambda line: print(line, file=log)
+    progress = train_agent(data, encoder, config, folder, device=setting.device, note=note)
+    return f"{variant}: {progress.update} updates, best validation {100 * progress.best:.1f} % after {progress.best_update}"
+
+
+class _Judge:
+    """Plays each (agent, split) once, however many tables ask for it."""
+
+    def __init__(self, setting: Setting, data: Dataset, note: Note) -> None:
+        self.setting, self.data, self.note = setting, data, note
+        self.encoder: Encoder = load_encoder(setting.encoder)
+        self.behaviour: dict[tuple[str, str], dict] = {}
+        self._agents: dict[str, HannaAgent] = {}
+        self._banks: dict[str, object] = {}
+        self._rows: dict[tuple[str, str], Row] = {}
+
+    def row(self, line: Line, split: str) -> Row:
+        if (line.key, split) not in self._rows:
+            def keep(name: str, episodes: Sequence[Episode]) -> None:
+                file = f"{split}_{line.key.replace(',', '').replace(' ', '_')}.jsonl"
+                save_lines(self.setting.out / "episodes" / file, episodes)
+                if line.variant and line.played == "learned":
+                    self.behaviour[line.key, split] = about(episodes, self.data.places(split))
+
+            (row,) = evaluate(
+                self.data, split, {line.key: self._policy(line, split)}, seed=self.setting.seed,
+                limit=self.setting.tasks, batch=32, keep=keep,
+            )
+            self._rows[line.key, split] = row
+            self.note(f"{line.key} on {split}: success {shown('success', row.values['success'])} %")
+        return self._rows[line.key, split]
+
+    def _policy(self, line: Line, split: str) -> Policy:
+        if not line.variant:
+            return agent_without_learning("hanna", line.played)
+        if line.variant not in self._agents:
+            self._agents[line.variant] = load_agent(self.setting.folder_of(line.variant) / "best.safetensors")
+        if split not in self._banks:
+            self._banks[split] = split_of(self.data, split, self.encoder).bank
+        return hanna_policies(self._agents[line.variant], self._banks[split])[line.played]
+
+
+def _write(setting: Setting, name: str, judged: _Judge) -> Path:
+    """One study's files; the figures go with the tables they belong to."""
+    table = TABLES[name]
+    rows = [dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines]
+    stem = f"table_{name}"
+    save(rows, setting.out, stem)
+    path = setting.out / f"{stem}.md"
+    write_bytes(path, side_by_side(setting, name, rows).encode())
+    if name == "4.5":
+        line, split = table.lines[-1], "test_unseen"
+        behaviour = judged.behaviour[line.key, split]
+        write_json(setting.out / "behaviour.json", behaviour, indent=1)
+        requests_figure(behaviour, setting.out / "figure_D.1.png")
+        conditions_figure(behaviour, setting.out / "figure_D.2.png")
+    if name == "houses":
+        counts = [setting.config_of(line.variant).training_houses for line in table.lines]
+        houses_figure({s: [(n, r.values["success"]) for n, r in zip(counts, rows[k * len(counts):], strict=False)]
+                       for k, s in enumerate(table.splits)}, setting.out / "figure_houses.png")
+    return path
+
+
+def side_by_side(setting: Setting, name: str, rows: Sequence[Row]) -> str:
+    """The table with the dissertation's numbers in brackets, and what it was made with."""
+    table = TABLES[name]
+    heads = [f"{column} {split}" for split in table.splits for column in table.columns]
+    text = [f"# {name}: {table.title}" if name == "houses" else f"# Table {name}: {table.title}", "",
+            "| agent | " + " | ".join(heads) + " |", "|" + "---|" * (1 + len(heads))]
+    by = {(r.agent, r.split): r for r in rows}
+    for line in table.lines:
+        cells = []
+        for k, split in enumerate(table.splits):
+            for column in table.columns:
+                cell = shown(column, by[line.label, split].values[column])
+                printed = line.printed.get(column)
+                cells.append(cell if printed is None else f"{cell} ({printed[k]:g})")
+        text.append(f"| {line.label} | " + " | ".join(cells) + " |")
+    first = {r.split: r for r in rows}
+    counts = "; ".join(f"{s}: {first[s].episodes} episodes in {first[s].houses} houses" for s in table.splits)
+    c = setting.config
+    how = (
+        f"{counts}. Mean and 95 % interval clustered by house; in brackets the dissertation's numbers. "
+        f"Trained {c.iterations} updates of {c.batch} episodes, seed {c.seed}; judged with seed {setting.seed}, "
+        f"temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per cent."
+    )
+    return "\n".join([*text, "", how, ""])
