@@ -55,7 +55,11 @@ def run_train_vision(args: argparse.Namespace, note: Note = print) -> int:
     torch.set_num_threads(args.threads)
     data, config = Dataset(args.data), chosen(args, VisionConfig())
     train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
-    strips = {n: _strips(data, n, args, note) for n in (*train_names, *test_names)}
+    missing = [n for n in (*train_names, *test_names) if not _strips_path(args, n).exists()]
+    jobs = (joblib.delayed(_draw_strips)(data, n, args) for n in missing)
+    for name in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
+        note(f"drawn: {name}")
+    strips = {n: HouseStrips.load(_strips_path(args, n)) for n in (*train_names, *test_names)}
     seen = [strips[n] for n in train_names]
     encoder, heads, classes = train_encoder(seen, config, note=note)
     encoder = whitened(encoder, seen)
@@ -85,14 +89,15 @@ def labelled(data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, cla
     )
 
 
-def _strips(data: Dataset, name: str, args: argparse.Namespace, note: Note) -> HouseStrips:
-    path = args.out / "strips" / f"{name}.npz"
-    if not path.exists():
-        catalogue = load_catalogue(args.cache)
-        with data.open_world(name, catalogue, args.cache, size=FACES) as world:
-            look(world, all_classes(catalogue)).save(path)
-        note(f"drawn: {name}")
-    return HouseStrips.load(path)
+def _strips_path(args: argparse.Namespace, name: str) -> Path:
+    return args.out / "strips" / f"{name}.npz"
+
+
+def _draw_strips(data: Dataset, name: str, args: argparse.Namespace) -> str:
+    catalogue = load_catalogue(args.cache)
+    with data.open_world(name, catalogue, args.cache, size=FACES) as world:
+        look(world, all_classes(catalogue)).save(_strips_path(args, name))
+    return name
 
 
 def _houses(data: Dataset, splits: Sequence[str]) -> list[str]:

@@ -58,6 +58,7 @@ def chosen(args: argparse.Namespace, config):
 def add_train_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where strips, weights and numbers go")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="houses drawn side by side (default: %(default)s)")
     add_fields(parser, VisionConfig)
 
 

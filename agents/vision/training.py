@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
@@ -25,6 +26,9 @@ from agents.vision.resnet import ARCHITECTURES, ResNet
 from agents.vision.strip import CELL, COLUMNS
 from assets.records import ROOM_KINDS
 from embodied.seeds import stream
+
+SHADE = 0.3
+"""Deviation of the logarithm of the uneven light laid over training strips."""
 
 
 class Heads(nn.Module):
@@ -106,12 +110,18 @@ def turned(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
 
 
 def recolour(image: np.ndarray, *, rng: np.random.Generator) -> np.ndarray:
-    """(H, W, 3) uint8 with another exposure, white balance and gamma: lighting must not matter."""
+    """(H, W, 3) uint8 with another exposure, white balance and gamma, lit unevenly: lighting must not matter.
+
+    The strips of training are drawn without light; lamps, windows and shadows come with the bake.
+    """
     gain = rng.uniform(0.7, 1.35) * rng.uniform(0.93, 1.07, 3)
     gamma = rng.uniform(0.8, 1.25)
     ramp = (np.arange(256)[:, None] / 255) ** gamma * gain
     table = np.clip(ramp * 255, 0, 255).astype(np.uint8)  # (256, 3)
-    return np.ascontiguousarray(np.stack([table[image[..., c], c] for c in range(3)], -1))
+    recoloured = np.stack([table[image[..., c], c] for c in range(3)], -1)
+    shade = np.exp(rng.normal(0.0, SHADE, (4, 9))).astype(np.float32)
+    shade = cv2.resize(np.concatenate([shade, shade[:, :1]], 1), image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
 
 def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
