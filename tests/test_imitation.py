@@ -19,7 +19,8 @@ import torch.distributed as dist
 from hand_worlds import grid_world
 
 from agents.hanna.agent import load_agent, new_agent, save_agent
-from agents.hanna.policy import choose_likeliest, choose_sampled
+from agents.hanna.asking import ask_above
+from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
 from agents.imitation.checkpoint import CheckpointError
 from agents.imitation.collect import collect, imitation_loss
 from agents.imitation.config import SCALES, TrainingConfig
@@ -151,6 +152,20 @@ def test_sampled_choices_have_their_frequencies_and_never_take_the_impossible():
     assert counts[1] == counts[4] == 0
     assert np.allclose(counts, p, atol=0.03)
     assert choose_likeliest(p, rng) == 2
+
+
+def test_a_low_temperature_sharpens_and_zero_takes_the_likeliest():
+    """At temperature 1/2 the odds of 1 : 3 become 1 : 9."""
+    p, rng = np.array([0.25, 0.0, 0.75]), np.random.default_rng(0)
+    drawn = [choose_at(0.5)(p, rng) for _ in range(4000)]
+    assert abs(drawn.count(2) / 4000 - 0.9) < 0.02 and 1 not in drawn
+    assert {choose_at(0)(p, rng) for _ in range(50)} == {2}
+    assert abs(sum(choose_at(1)(p, rng) == 2 for _ in range(4000)) / 4000 - 0.75) < 0.03
+
+
+def test_the_threshold_decides_when_the_learned_rule_asks():
+    asks = lambda threshold, p: ask_above(threshold)(p, None, -1, rng=None)
+    assert asks(0.4, 0.45) and not asks(0.5, 0.45) and not asks(0.5, 0.5)
 
 
 def test_every_pass_of_training_takes_every_task_once():
