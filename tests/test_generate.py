@@ -163,9 +163,9 @@ def test_wide_houses_are_not_all_rectangles():
     assert 4 in corners and 6 in corners and 8 in corners
 
 
-@pytest.mark.parametrize("shape, corners", [("rectangle", 4), ("L", 6), ("T", 8), ("U", 8)])
+@pytest.mark.parametrize("shape, corners", [("rectangle", 4), ("L", 6), ("T", 8), ("U", 8), ("cross", 12)])
 def test_an_asked_shape_is_built(shape, corners):
-    house = generate_house(5, HouseConfig(area=(180, 200), shape=shape), stages=BARE)
+    house = generate_house(5, HouseConfig(area=(210, 230), shape=shape), stages=BARE)
     outline = shapely.union_all([polygon(r) for r in house.rooms]).simplify(1e-6)
     assert len(outline.exterior.coords) - 1 == corners
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from assets.materials import art
+from assets.materials.list_prints import PRINTS
 from assets.materials.material import Material, listed
 
 
@@ -43,6 +44,7 @@ def _art() -> list[Material]:
                     paper,
                     p(art.shapes, ground=(0.93, 0.91, 0.88), colors=soft),
                 ),
+                *PRINTS["art_shapes"],
             ],
         ),
         *listed(
@@ -73,6 +75,7 @@ def _art() -> list[Material]:
                     ("canvas",),
                     p(art.fields, colors=((0.80, 0.74, 0.66), (0.90, 0.87, 0.82), (0.66, 0.57, 0.48))),
                 ),
+                *PRINTS["art_fields"],
             ],
         ),
         *listed(
@@ -129,6 +132,7 @@ def _art() -> list[Material]:
                         layers=5,
                     ),
                 ),
+                *PRINTS["art_hills"],
             ],
         ),
         *listed(
@@ -158,6 +162,7 @@ def _art() -> list[Material]:
                         water=((0.66, 0.50, 0.46), (0.14, 0.15, 0.24)),
                     ),
                 ),
+                *PRINTS["art_sea"],
             ],
         ),
         *listed(
@@ -191,6 +196,7 @@ def _art() -> list[Material]:
                     paper,
                     p(art.botanical, ground=(0.13, 0.15, 0.15), ink=(0.62, 0.68, 0.55)),
                 ),
+                *PRINTS["art_botanical"],
             ],
         ),
         *listed(
@@ -240,6 +246,7 @@ def _art() -> list[Material]:
                         colors=((0.75, 0.24, 0.20), (0.20, 0.42, 0.40), (0.88, 0.70, 0.28), (0.26, 0.33, 0.52)),
                     ),
                 ),
+                *PRINTS["art_brushwork"],
             ],
         ),
         *listed(
@@ -271,6 +278,7 @@ def _art() -> list[Material]:
                         fruit=((0.55, 0.62, 0.24), (0.66, 0.70, 0.36), (0.44, 0.52, 0.20)),
                     ),
                 ),
+                *PRINTS["art_still_life"],
             ],
         ),
         *listed(
@@ -304,6 +312,7 @@ def _art() -> list[Material]:
                     paper,
                     p(art.poster, ground=(0.20, 0.32, 0.28), ink=(0.90, 0.86, 0.76), accent=(0.80, 0.52, 0.32)),
                 ),
+                *PRINTS["art_poster"],
             ],
         ),
     ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from embodied.generate.finishes import STYLES
 from embodied.house import HouseError
 
-SHAPES = ("rectangle", "L", "T", "U")
+SHAPES = ("rectangle", "L", "T", "U", "cross")
 AREAS = (32.0, 700.0)
 """Smallest and largest total area, square metres."""
 
@@ -80,7 +80,8 @@ class HouseConfig:
     def least_area(self) -> float:
         """The smallest total area, square metres, that holds what is asked for."""
         rooms = max(self.rooms or 2, (self.bedrooms or 1) + 1)
-        return max(AREAS[0] + 17.0 * (rooms - 2), {"L": 75.0, "T": 95.0, "U": 150.0}.get(self.shape or "", 0.0))
+        shape = {"L": 75.0, "T": 95.0, "U": 150.0, "cross": 210.0}.get(self.shape or "", 0.0)
+        return max(AREAS[0] + 17.0 * (rooms - 2), shape)
 
     def most_area(self) -> float:
         """The largest total area, square metres, that the asked number of main rooms can fill sensibly."""

@@ -1,4 +1,4 @@
-"""The footprint: one to three wings along a corridor spine, on a grid of 0.1 m.
+"""The footprint: one to four wings along a corridor spine, on a grid of 0.1 m.
 
 A house is drawn in a canonical pose, the first wing running along +x from the public end and the
 others hanging down from it; `generate.layout` mirrors and turns the finished plan. Lengths here
@@ -95,6 +95,8 @@ def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) ->
         return config.shape
     if area < 75:
         return "rectangle"
+    if rng.random() < np.interp(area, (230, 330, 450), (0, 0.6, 0.85)):
+        return "cross"
     x = float(np.interp(area, (75, 140, 230), (0, 0.35, 1)))
     p = np.array([0.62 * (1 - x), 0.28 + 0.12 * x, 0.1 + 0.2 * x, 0.3 * x if area > 140 else 0.0])
     return str(rng.choice(["rectangle", "L", "T", "U"], p=p / p.sum()))
@@ -104,6 +106,8 @@ def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Foot
     """A footprint of `area` square metres with the corridors of its wings."""
     if shape == "rectangle":
         return _flat(area, rng) if area < 62 else _bar(area, rng)
+    if shape == "cross":
+        return _crossed(area, rng)
     if area < (260 if shape == "U" else 150):
         return _bumped(area, shape, rng)
     return _winged(area, shape, rng)
@@ -263,3 +267,63 @@ def _u(long, top, bottom, corridor, public, private) -> Footprint:
         Strip("y", bottom + corridor, -1, fall + bottom + corridor, xb + corridor, 1, right, far + xb - xa, 2, -corridor),
     )
     return Footprint("U", strips, (band_p, band_a, band_q), (), corridor)
+
+
+def _crossed(area: float, rng: np.random.Generator) -> Footprint:
+    """Four short wings about a crossing: the day wings on the left and above, the private ones on the right and below.
+
+    The wing above stands off the one below, so that no corridor is seen from end to end.
+    """
+    corridor = int(rng.integers(13, 17))
+    scale = float(np.interp(area, (200, 300, 450, 700), (0.3, 0.8, 1.4, 2.0)))
+    low, high = int(30 + 9 * scale), int(36 + 11 * scale)
+    (top, bottom), (left, right), (west, east) = (_depths(rng, low, high) for _ in range(3))
+    deep, wing, rise = top + corridor + bottom, left + corridor + right, west + corridor + east
+    arm = area * 100 / ((deep + wing) / 2)  # total length of bar and wings
+    long = round(arm * rng.uniform(0.5, 0.6))
+    long = max(long, max(wing, rise) + 60)
+    rest = max(arm - long, 60.0) * (deep + wing) / (wing + rise)
+    share = float(rng.uniform(0.42, 0.58))
+    below, above = max(32, round(rest * share)), max(32, round(rest * (1 - share)))
+    slack = long - max(wing, rise)
+    x_below = round(slack * rng.uniform(0.42, 0.66))
+    x_above = round(slack * rng.uniform(0.34, 0.58))
+    x_below, x_above = (min(max(x, 28), slack - 28) for x in (x_below, x_above))
+    xb, xc = x_below + left, x_above + west
+
+    def end(share_of: float, length: int, room: int) -> int:
+        """Length of the rooms across a wing's end, 0 for none, decimetres."""
+        size = round(float(np.clip(share_of * area, 20, 58)) * 100 / length)
+        return size if 30 <= size <= room - 25 else 0
+
+    day = end(rng.uniform(0.1, 0.15), deep, min(xb, xc)) if rng.random() < 0.8 else 0
+    night = end(rng.uniform(0.06, 0.1), deep, long - max(xb, xc) - corridor) if rng.random() < 0.5 else 0
+    foot = end(rng.uniform(0.06, 0.1), wing, below) if rng.random() < 0.5 else 0
+    head = end(rng.uniform(0.08, 0.12), rise, above) if rng.random() < 0.8 else 0
+    roof = bottom + corridor
+    stop = long - night
+    strips = (
+        Strip("x", day, 1, xc - day, roof, 1, top, day, 0, 0),
+        Strip("x", xc + corridor, 1, stop - xc - corridor, roof, 1, top, xc, 0, xc + corridor - day),
+        Strip("x", day, 1, xb - day, bottom, -1, bottom, day, 0, 0),
+        Strip("x", xb + corridor, 1, stop - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - day),
+        Strip("y", 0, -1, below - foot, xb, -1, left, xb + bottom, 1, bottom),
+        Strip("y", 0, -1, below - foot, xb + corridor, 1, right, xb + bottom, 1, bottom),
+        Strip("y", deep, 1, above - head, xc, -1, west, 0.4 * xc, 2, top),
+        Strip("y", deep, 1, above - head, xc + corridor, 1, east, 0.4 * xc, 2, top),
+    )
+    bands = (
+        Band("x", day, 1, stop - day, bottom, roof, (day == 0, night == 0)),
+        Band("y", bottom, -1, bottom + below - foot, xb, xb + corridor, (False, foot == 0)),
+        Band("y", roof, 1, top + above - head, xc, xc + corridor, (False, head == 0)),
+    )
+    caps = []
+    if day:
+        caps.append(Cap(0, True, "y", (0, 0, day, deep), (bottom, roof)))
+    if head:
+        caps.append(Cap(2, True, "x", (x_above, deep + above - head, x_above + rise, deep + above), (xc, xc + corridor)))
+    if night:
+        caps.append(Cap(0, False, "y", (stop, 0, long, deep), (bottom, roof)))
+    if foot:
+        caps.append(Cap(1, False, "x", (x_below, -below, x_below + wing, foot - below), (xb, xb + corridor)))
+    return Footprint("cross", strips, bands, tuple(caps), corridor)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 SIZES: dict[str, tuple[float, float, float]] = {
     # kind: smallest and largest usual area (m2), smallest usual side (m)
-    "living_room": (15, 42, 3.4), "kitchen": (6, 20, 2.1), "dining_room": (9, 21, 2.7),
+    "living_room": (15, 54, 3.4), "kitchen": (6, 20, 2.1), "dining_room": (9, 21, 2.7),
     "main_bedroom": (11, 24, 2.9), "bedroom": (8.5, 16, 2.5), "kids_room": (9, 16, 2.5),
     "guest_room": (9, 16, 2.6), "bathroom": (4, 9.5, 1.7), "toilet": (1.7, 3, 1.1), "hall": (3, 14, 1.3),
     "corridor": (1.5, 14, 1.1), "study": (6.5, 15, 2.2), "laundry_room": (3.5, 9, 1.6), "pantry": (1.8, 4.5, 1.1),

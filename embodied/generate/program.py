@@ -50,7 +50,7 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
     """
     bedrooms = config.bedrooms or _bedrooms(area, config, rng)
     spaces = [Space("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
-    living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, 38))
+    living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, np.interp(area, (260, 500), (38, 52))))
     spaces.append(Space("living_room", living))
     spaces.append(Space("kitchen", float(np.clip(rng.normal(0.1, 0.012) * area, 5.2, 18))))
     if area > rng.uniform(78, 105) and (config.rooms is None or config.rooms > bedrooms + 1):

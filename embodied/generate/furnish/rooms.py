@@ -90,11 +90,13 @@ def kitchen(ctx: Context) -> None:
         wet.lone_fridge(ctx)
     if area > 13 and ctx.chance(0.6):
         wet.island(ctx)
-    if area > 8.5 and (area > 11 or "dining_room" not in ctx.kinds or ctx.chance(0.6)):
-        living.dining(ctx, "small table" if area < 14 else "dining table", "kitchen chair", 1.3 if area < 14 else 1.9)
+    if area > 5.5 and (area > 11 or "dining_room" not in ctx.kinds or ctx.chance(0.6)):
+        most = 1.9 if area > 14 else 1.3 if area > 8.5 else 0.85
+        living.dining(ctx, "small table" if area < 14 else "dining table", "kitchen chair", most)
     if area > 11 and ctx.chance(0.4):
         work.storage(ctx, "cupboard")
-    work.corner_thing(ctx, "kitchen bin", most=(0.5, 0.5, 0.9))
+    work.corner_thing(ctx, "kitchen bin", most=(0.5, 0.5, 0.9)) or work.corner_thing(
+        ctx, "kitchen bin", most=(0.35, 0.35, 0.7))
     if ctx.chance(0.4):
         work.corner_thing(ctx, "high chair" if "kids_room" in ctx.kinds else "plant", most=(0.7, 0.7, 1.3))
     if ctx.chance(0.3):
@@ -447,6 +449,11 @@ def _corner(role: str, **limits) -> Callable[[Context], object]:
     return lambda ctx: work.corner_thing(ctx, role, **limits)
 
 
+def _table_for_two(ctx: Context) -> object:
+    """A small table with its chairs, where the kitchen has none yet."""
+    return None if ctx.roles("dining table", "dining chair") else living.dining(ctx, "small table", "kitchen chair", 1.15)
+
+
 SITTING = (
     living.conversation, living.reading_corner, work.bookshelf, _piece("living storage"), work.corner_plant,
     _piece("display storage"), work.console, work.corner_plant, living.sofa_group, _corner("floor vase"),
@@ -463,6 +470,8 @@ FILLERS: dict[str, tuple[float, tuple[Callable[[Context], object], ...]]] = {
     "living_room": (0.26, SITTING), "family_room": (0.26, SITTING), "library": (0.26, SITTING), "sun_room": (0.24, SITTING),
     "dining_room": (0.26, (_piece("display storage"), work.corner_plant, living.reading_corner, work.console,
                            work.corner_plant, _piece("cupboard"), work.bookshelf)),
+    "kitchen": (0.27, (_piece("cupboard", clear=0.5), work.corner_plant, _table_for_two, _piece("shelving unit", clear=0.4),
+                       _corner("basket", most=(0.5, 0.5, 0.6)), _piece("display storage", clear=0.5), work.corner_plant)),
     "main_bedroom": (0.34, RESTING), "bedroom": (0.36, RESTING), "guest_room": (0.34, RESTING),
     "kids_room": (0.34, (sleep.toys, sleep.child_table, work.bookshelf, _corner("big toy"), _piece("shelving unit", clear=0.4),
                          _corner("bean bag"), sleep.dresser)),

@@ -143,13 +143,13 @@ def clutter(ctx: Context) -> None:
         for role, chance, spot, turn in recipe:
             repeats = 1 if name in ("counter",) else len(group)
             for k in range(repeats):
-                if not ctx.chance(min(chance * density, 0.97)):
+                if not ctx.chance(min(chance * (max(density, 0.9) if name == "counter" else density), 0.97)):
                     continue
-                thing = group[k] if repeats > 1 else group[int(ctx.rng.integers(len(group)))]
                 asset = ctx.pick(role, most=(1.2, 0.9, 0.9))
                 if asset is None or not tops.allows(asset):
                     continue
-                tops.put(asset, thing, _main(thing), spot, turn)
+                places = [group[k]] if repeats > 1 else [group[int(i)] for i in ctx.rng.permutation(len(group))[:3]]
+                any(tops.put(asset, thing, _main(thing), spot, turn) for thing in places)
     for thing in carriers:
         _shelves(tops, thing, density)
     for thing in carriers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import Thing
@@ -152,7 +153,8 @@ def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | N
             if scale < 1:
                 w, d = w * scale, d * scale
     b = box(x, y, w, d, 0.0, top - h, top)
-    if not ctx.space.fits(b, passage=True):
+    low = underside is not None and any(overlap(b, k) for k in ctx.space.keepouts)  # before a window or in a doorway
+    if low or not ctx.space.fits(b, passage=True):
         return False
     ctx.space.add([b])
     ctx.things.append(Thing(lamp, x, y, top - h, 0.0, (w, d, h), looks(ctx, lamp), None, None, "ceiling",
@@ -248,7 +250,7 @@ def _wall_behind(ctx: Context, thing: Thing) -> tuple[Wall | None, float]:
 
 def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: float) -> int:
     """One large picture, a pair or a row of three, centred at `s`; returns how many hang."""
-    asset = ctx.pick("art")
+    asset = _art(ctx)
     if asset is None:
         return 0
     count = 1 if width < 0.9 else int(ctx.rng.choice([1, 2, 3], p=[0.5, 0.25, 0.25]))
@@ -263,11 +265,28 @@ def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: flo
     z = max(lowest, EYE - h / 2)
     hung = 0
     for k in range(count):
-        piece = asset if k == 0 else (ctx.pick("art") or asset)
+        piece = asset if k == 0 else _art(ctx)
         at = s + (k - (count - 1) / 2) * (w + 0.1)
         hung += mount(ctx, piece, wall, at, z, "picture", size=(w, piece.size[1], h), margin=0.04,
                       role="picture") is not None
     return hung
+
+
+def _art(ctx: Context) -> Asset | None:
+    """Something to hang whose image is not in the room yet and the rarest in the house."""
+    hung: Counter[str] = Counter()
+    for key, n in ctx.stock.used.items():
+        hung[_image(key)] += n
+    here = {_image(t.asset.key) for t in ctx.things if t.role == "picture"}
+    options = [a.key for a in ctx.stock.of_role("art") if _image(a.key) not in here]
+    least = min((hung[_image(k)] for k in options), default=0)
+    rare = frozenset(k for k in options if hung[_image(k)] == least)
+    return ctx.pick("art", where=lambda a: a.key in rare)
+
+
+def _image(key: str) -> str:
+    """What a picture shows: the poster and the framed print of one image are alike."""
+    return key.rsplit("/", 1)[-1].removeprefix("paper_")
 
 
 def pictures(ctx: Context) -> None:
