@@ -7,6 +7,7 @@ the networks said while acting is kept with its gradients, so each step is compu
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -59,20 +60,25 @@ class Experience:
     episodes: tuple[Episode, ...]
     said: Said
     targets: Targets
+    thinking: float
+    """Seconds of playing that the policy took; the environment and the teacher took the others."""
 
 
 class _Remembering:
-    """A policy that keeps the memory of its last call, because `rollout` does not hand it out."""
+    """A policy that keeps the memory of its last call, because `rollout` does not hand it out, and its time."""
 
     def __init__(self, policy: HannaPolicy) -> None:
         self.policy = policy
         self.memory: HannaMemory | None = None
+        self.seconds = 0.0
 
     def act(
         self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
         rngs: Sequence[np.random.Generator],
     ) -> tuple[list[Action | None], HannaMemory]:
+        began = time.perf_counter()
         actions, self.memory = self.policy.act(observations, memory, rngs=rngs)
+        self.seconds += time.perf_counter() - began
         return actions, self.memory
 
 
@@ -87,7 +93,7 @@ def collect(
     episodes = tuple(done[i] for i in range(len(tasks)))
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
     moments = remembering.memory.moments
-    return Experience(episodes, join(moments), targets(moments, labels))
+    return Experience(episodes, join(moments), targets(moments, labels), remembering.seconds)
 
 
 def join(moments: Sequence[Moment]) -> Said:

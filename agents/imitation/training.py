@@ -75,6 +75,11 @@ class Clock:
         finally:
             self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - began
 
+    def move(self, seconds: float, source: str, to: str) -> None:
+        """Count some of the seconds spent on one kind of work as another's."""
+        self.spent[source] -= seconds
+        self.spent[to] = self.spent.get(to, 0.0) + seconds
+
 
 def train(
     agent: HannaAgent, training: Split, validation: Split, teacher: Teacher, folder: Path, *,
@@ -155,10 +160,11 @@ def learn_once(
     try:
         with dropout_of(config.seed + parallel.rank(), update):
             agent.network.train()
-            with clock.on("play"):
+            with clock.on("environment"):
                 experience = collect(
                     training.make_env, learner, tasks, teacher, training.worlds, seed=seed_of(config.seed, update)
                 )
+            clock.move(experience.thinking, "environment", "network")
             with clock.on("backward"):
                 losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor)
                 optimizer.zero_grad(set_to_none=True)
@@ -277,6 +283,8 @@ class Report:
         mean = {name: total / self._counts[name] for name, total in self._sums.items()}
         for name, value in mean.items():
             self._writer.add_scalar(f"train/{name}", value, update)
+        for what, seconds_spent in self.clock.spent.items():
+            self._writer.add_scalar(f"seconds/{what}", seconds_spent, update)
         passed = time.monotonic() - self._since
         pace = self._sums["steps"] / passed
         shares = ", ".join(f"{what} {100 * s / passed:.0f} %" for what, s in sorted(self.clock.spent.items()))
