@@ -55,6 +55,7 @@ def run_train_vision(args: argparse.Namespace, note: Note = print) -> int:
     torch.set_num_threads(args.threads)
     data, config = Dataset(args.data), chosen(args, VisionConfig())
     train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
+    train_names = train_names[: config.training_houses or None]
     missing = [n for n in (*train_names, *test_names) if not _strips_path(args, n).exists()]
     jobs = (joblib.delayed(_draw_strips)(data, n, args) for n in missing)
     for name in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):

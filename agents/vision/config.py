@@ -11,6 +11,8 @@ class VisionConfig:
 
     network: str = "compact"
     """Key of resnet.ARCHITECTURES."""
+    training_houses: int = 0
+    """Learn from so many of the data set's training houses; 0: from all."""
     epochs: int = 6
     batch: int = 8
     """Strips per update."""
