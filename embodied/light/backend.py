@@ -6,8 +6,10 @@ needs a shared libLLVM of version 15 or later (Debian: `apt install libllvm19`).
 
 from __future__ import annotations
 
+import ctypes
 import ctypes.util
 import functools
+import gc
 import glob
 import os
 import re
@@ -111,6 +113,17 @@ def constant(x: float):
     import drjit as dr
 
     return dr.opaque(mitsuba().Float, float(x))
+
+
+def rest() -> None:
+    """Give back the memory that finished stages held: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
+    import drjit as dr
+
+    gc.collect()
+    dr.flush_malloc_cache()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def r2(k: int) -> tuple[float, float]:

@@ -27,7 +27,7 @@ from assets.records import Finish
 from embodied.house import House
 from embodied.light import tone
 from embodied.light.atlas import Atlas, albedo, atlas_of, linear, rasterise, read_colours, things_of  # noqa: F401
-from embodied.light.backend import LightError, device, scene_of, warn
+from embodied.light.backend import LightError, device, rest, scene_of, warn
 from embodied.light.compose import Ingredients, page_of
 from embodied.light.emitters import in_the_open, lamps_of, portals_of
 from embodied.light.radiosity import space_of
@@ -200,7 +200,7 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
                 took: dict[str, float] | None = None) -> Solved:
     """Everything up to the light of every luxel; stages are kept in `folder` where one is given."""
     took = {} if took is None else took
-    read = read or functools.lru_cache(maxsize=None)(read_colours)
+    read = read or _reader()
     clock = _Clock(took)
     parts = tuple(p for p in house_parts(house, catalogue) if p.kind != "outdoor" and len(p.mesh.faces))
     clock("parts")
@@ -230,7 +230,7 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     took: dict[str, float] = {}
     start = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
-    read = functools.lru_cache(maxsize=None)(read_colours)
+    read = _reader()
     s = solve_house(house, catalogue, cache, settings, folder, read=read, progress=progress, took=took)
     clock = _Clock(took)
     dark = [r.id for r, g in zip(house.rooms, _levels(s)) if g < tone.DARKEST]
@@ -285,6 +285,11 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     return Bake(folder, manifest)
 
 
+def _reader() -> Callable[[str], np.ndarray]:
+    """Colour maps by path; the last few are remembered, all of a house would fill hundreds of megabytes."""
+    return functools.lru_cache(maxsize=16)(read_colours)
+
+
 def _same_atlas(folder: Path, atlas: Atlas) -> None:
     """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
     pages = [digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes)) for p in atlas.pages]
@@ -302,6 +307,7 @@ class _Clock:
         self._took, self._last = took, time.perf_counter()
 
     def __call__(self, name: str) -> None:
+        rest()
         now = time.perf_counter()
         self._took[name] = self._took.get(name, 0.0) + now - self._last
         self._last = now

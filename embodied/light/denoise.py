@@ -175,14 +175,18 @@ class _Grid:
 
 
 def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12) -> np.ndarray:
-    """(m, k) int, nearest good luxels of the chosen ones by place and facing."""
+    """(m, k) int32, nearest good luxels of the chosen ones by place and facing."""
     pool = np.nonzero(good)[0]
     if not len(pool):
         pool = np.arange(len(position))
     where = np.concatenate([position, normal * 0.02], axis=1).astype(np.float32)
     tree = cKDTree(where[pool], balanced_tree=False, compact_nodes=False)
-    _, near = tree.query(where[chosen], k=min(k, len(pool)), workers=-1)
-    return pool[near.reshape(int(np.count_nonzero(chosen)), min(k, len(pool)))]
+    asked, k = where[chosen], min(k, len(pool))
+    out = np.empty((len(asked), k), np.int32)
+    for start in range(0, len(asked), 200_000):
+        part = slice(start, start + 200_000)
+        out[part] = pool[tree.query(asked[part], k=k, workers=-1)[1].reshape(-1, k)]
+    return out
 
 
 def smooth_space(

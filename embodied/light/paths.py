@@ -83,8 +83,7 @@ def lights_of(atlas, lux: Luxels, space: Space, portals: Sequence[Portal], lamps
     spaces, index = [space], [0] * len(portals)
     for x in lamps:
         if x.owner is not None and x.owner in atlas.owners:
-            hidden = frozenset({atlas.owners.index(x.owner)})
-            spaces.append(radiosity.space_of(atlas, lux.texels, outdoors.picture, hidden))
+            spaces.append(radiosity.without(space, atlas, x.owner))
             index.append(len(spaces) - 1)
         else:
             index.append(0)

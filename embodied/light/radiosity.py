@@ -10,7 +10,7 @@ radiosity solution (Reichert 1992).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,20 +71,17 @@ class Space:
     """Outdoor radiance (ENV_ROWS x 2 ENV_ROWS pixels, flat RGB)."""
 
 
-def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray, hidden: frozenset[int] = frozenset()) -> Space:
+def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray) -> Space:
     """Upload the house.
 
     Args:
       luxels: what lies under each page at fineness 1.
       env: outdoor radiance picture (h, 2h, 3).
-      hidden: numbers of owners to leave out.
     """
     mi = mitsuba()
     corners = np.concatenate([p.corners for p in atlas.pages])
-    owner = np.concatenate([p.owner for p in atlas.pages])
     page = np.concatenate([np.full(len(p.corners), i) for i, p in enumerate(atlas.pages)])
-    clear = np.array([p.glass for p in atlas.pages])[page] | np.isin(owner, sorted(hidden))
-    keep = np.nonzero(~clear)[0]
+    keep = np.nonzero(~np.array([p.glass for p in atlas.pages])[page])[0]
     xy = np.concatenate([p.luxels for p in atlas.pages])[keep]
     thin = np.concatenate([p.thin for p in atlas.pages])[keep]
     sizes = np.array([p.width * p.height for p in atlas.pages])
@@ -95,6 +92,13 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray, hidden: fr
         mi.Bool(np.ascontiguousarray(thin)), u32([p.width for p in atlas.pages]), u32([p.height for p in atlas.pages]),
         u32(np.cumsum(sizes) - sizes), u32(nearest_luxel(atlas, luxels)), flat(_small(env)),
     )
+
+
+def without(space: Space, atlas: Atlas, owner: str) -> Space:
+    """The same space for shadow rays that pass through everything of `owner`."""
+    corners = np.concatenate([p.corners for p in atlas.pages])[space.opaque_faces]
+    owners = np.concatenate([p.owner for p in atlas.pages])[space.opaque_faces]
+    return replace(space, scene=scene_of(corners[owners != atlas.owners.index(owner)]))
 
 
 def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | None = None) -> np.ndarray:

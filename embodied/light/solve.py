@@ -83,6 +83,10 @@ def luxels_of(house: House, atlas: Atlas, lamps: Sequence[Lamp], read: Callable[
         area.append(_share_of_area(page, t))
         owner.append(page.owner[t.face])
     owner_of = np.concatenate(owner)
+    ends = np.cumsum([len(t.index) for t in texels])
+    places = {k: np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")}
+    mine = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
+    texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # views: once in memory, not twice
     units = {}
     for o, room, kind in zip(atlas.owners, atlas.rooms, atlas.kinds):
         units.setdefault(o.split("/")[0] if kind == "opening" else room, len(units))
@@ -92,7 +96,7 @@ def luxels_of(house: House, atlas: Atlas, lamps: Sequence[Lamp], read: Callable[
     sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
     glow_all = np.concatenate(glow)
     return Luxels(
-        texels, *(np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")),
+        texels, *places.values(),
         np.concatenate(thin), np.concatenate(color), glow_all, sampled[owner_of] & (glow_all.sum(1) > 0),
         np.concatenate(area), owner_of, unit_of_owner[owner_of].astype(np.int32), shell_of_owner[owner_of],
     )
@@ -129,7 +133,7 @@ def glow_of(house: House, atlas: Atlas, page, texels: Texels, lamps: Sequence[La
 
 
 def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Portal], lamps: Sequence[Lamp],
-                 settings: Settings, env: np.ndarray, tell: Callable[[float], None]) -> np.ndarray:
+                 settings: Settings, tell: Callable[[float], None]) -> np.ndarray:
     """(n, 3) e from sky and lamps."""
     e = np.zeros((len(lux.position), 3), np.float32)
     jobs: list[tuple[Space, Callable]] = []
@@ -138,7 +142,7 @@ def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Port
     for lamp in lamps:
         own = space
         if lamp.owner is not None and lamp.owner in atlas.owners:
-            own = radiosity.space_of(atlas, lux.texels, env, frozenset({atlas.owners.index(lamp.owner)}))
+            own = radiosity.without(space, atlas, lamp.owner)
         jobs.append((own, lambda s, p, r, x=lamp: radiosity.lamp_light(s, p, x, r or settings.lamp_rays)))
     for done, (where, shine) in enumerate(jobs):
         tell(done / len(jobs))
@@ -298,7 +302,7 @@ def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Se
     n = len(lux.position)
     zero = np.zeros((n, 3), np.float32)
     direct = stage("direct", lambda: {
-        "e": direct_light(lux, atlas, space, portals, lamps, settings, outdoors.picture, lambda x: tell("direct light", x)),
+        "e": direct_light(lux, atlas, space, portals, lamps, settings, lambda x: tell("direct light", x)),
         "outer": outer_light(house, lux, atlas, space)})
     sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
     light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool), np.zeros(n, np.float32))
