@@ -177,6 +177,25 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
     assert message in err and "\n" not in err
 
 
+def test_an_optimiser_can_be_made_after_drawing():
+    """PyTorch's CUDA build imports triton then, whose LLVM does not get on with that of Mesa's software OpenGL."""
+    code = ("from embodied import gl; gl.info(); import torch\n"
+            "torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))]); print('made')")
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
+    assert done.stdout.strip() == "made", (done.returncode, done.stderr)
+
+
+def test_viewers_that_are_not_there_are_named_before_any_work(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("viz.sinks.PORT", 1)  # nobody listens there
+    assert "no viewer listens at" in said(capsys, "demo", "--connect", "rerun+http://127.0.0.1:1/proxy")
+    assert "URL of a running viewer" in said(capsys, "demo", "--connect", "http://127.0.0.1:1")
+    assert "use --serve and a browser" in said(capsys, "rollout", "--spawn")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_full_disk_leaves_no_file(tmp_path):
     path = tmp_path / "a.json"
     path.write_text("old")
@@ -186,17 +205,18 @@ def test_a_full_disk_leaves_no_file(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"] and path.read_text() == "old"
 
 
-def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(tmp_path):
+@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.3, 1.0])
+def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
+    """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
-    code = ("import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.cli import main\n"
-            "import embodied.export, embodied.generate, embodied.plan  # some libraries swallow a Ctrl-C while they load\n"
-            "print('go', flush=True); raise SystemExit(main())")
+    code = ("import sys, signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.__main__ import start\n"
+            "print('go', flush=True); sys.exit(start())")
     process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.readline()
-    time.sleep(0.3)
+    time.sleep(0.01 + seconds)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
-    assert process.returncode == 130 and "Traceback" not in err, err
+    assert process.returncode == 130 and "Traceback" not in err and "stopped" in err, err
     assert not list(tmp_path.rglob(".*"))
 
 

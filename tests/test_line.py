@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
+import subprocess
+import time
 
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 from viz.blueprint import episode_blueprint
 from viz.recording import Pictures, camera_axes, record
-from viz.sinks import Sinks, open_recording
+from viz.sinks import Sinks, viewer_program, listens, open_recording, open_viewers
 from viz.video import camera_track, write_video
 
 SMALL = HouseConfig(area=(38.0, 46.0))
@@ -66,6 +69,31 @@ def test_a_broken_recording_leaves_no_file(world, tmp_path):
     ):
         raise RuntimeError("stopped half-way")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
+    task, saved = tasks_of(world, 1)[0], tmp_path / "received.rrd"
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    viewer = subprocess.Popen([viewer_program(), "--save", str(saved), "--port", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        until = time.monotonic() + 20
+        while not listens("127.0.0.1", port) and time.monotonic() < until:
+            time.sleep(0.1)
+        with open_viewers(connect=f"rerun+http://127.0.0.1:{port}/proxy") as viewers:
+            steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
+            for _ in range(2):  # a second recording follows the first into the same viewer
+                with open_recording(Sinks(None, viewers), episode_blueprint(world.house), name="sent", properties={}) as recording:
+                    list(record(recording, world, task, steps, pictures=Pictures((48, 64), 32)))
+        def held() -> int:
+            return saved.read_bytes().count(b"RecordingInfo:name") if saved.exists() else 0
+        while held() < 2 and time.monotonic() < until:
+            time.sleep(0.1)
+        assert held() >= 2 and b"/agent/camera" in saved.read_bytes()
+    finally:
+        viewer.kill()
+        viewer.wait()
 
 
 def test_the_film_starts_and_ends_where_the_walk_does_and_never_jumps(world, tmp_path):

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote, urlsplit
 
 import rerun as rr
 import rerun.blueprint as rrb
+import rerun_cli
 
 from assets.cache import atomic_path
+from embodied.errors import UnableError
 
 APPLICATION = "embodied"
 MEMORY_LIMIT = "1GiB"
 """What a viewer or server that we start may keep before it drops the oldest data."""
+
+PORT, WEB_PORT = 9876, 9090
+"""Rerun's own: where viewers and servers listen for recordings, where a browser finds the web viewer."""
+
+PATIENCE = 60.0
+"""Seconds that a viewer may take to accept the last of a recording."""
 
 FOOTER = b"RRF2FOOT"
 """What stands 12 bytes before the end of a .rrd file that was finished (Rerun 0.41)."""
@@ -23,16 +36,43 @@ FOOTER = b"RRF2FOOT"
 
 @dataclass(frozen=True)
 class Sinks:
-    """Where to send a recording; all that are set are served."""
+    """Where to send one recording; all that are set are served."""
 
     rrd: Path | None = None
     """File to write; it appears complete or not at all."""
-    spawn: bool = False
-    """Open the native viewer."""
-    connect: str | None = None
-    """URL of a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy."""
-    serve: bool = False
-    """Serve the web viewer and keep serving until Ctrl-C."""
+    viewers: tuple[str, ...] = ()
+    """URLs of running viewers and servers, as `open_viewers` gives them."""
+
+
+@contextlib.contextmanager
+def open_viewers(*, spawn: bool = False, connect: str | None = None, serve: bool = False) -> Iterator[tuple[str, ...]]:
+    """URLs for `Sinks.viewers`; what cannot be watched is said before any work is done.
+
+    Args:
+      spawn: open the native viewer; it stays open afterwards. One that runs already is used.
+      connect: URL of a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy.
+      serve: serve the web viewer while the body runs, and then until Ctrl-C.
+
+    Raises:
+      ValueError: `connect` is no URL of a viewer.
+      UnableError: no screen, nobody listens, or the ports are taken.
+    """
+    urls = []
+    if connect is not None:
+        urls.append(_checked(connect))
+    if spawn:
+        urls.append(_spawned())
+    host = _serve() if serve else None
+    if host is not None:
+        urls.append(_url(PORT))
+        page = f"http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}"
+        print(f"watch in a browser: {page}", flush=True)
+    yield tuple(dict.fromkeys(urls))
+    if host is not None:
+        print(f"still served at {page}; Ctrl-C ends it", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):
+            while True:
+                time.sleep(1.0)
 
 
 @contextlib.contextmanager
@@ -41,54 +81,133 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
 
     Args:
       sinks: where it goes.
-      blueprint: the layout a viewer starts with.
+      blueprint: the layout a viewer shows it with.
       name: what the viewer calls it.
       properties: fingerprint of renderer, device and versions, kept inside the recording.
 
     Raises:
-      OSError: the file could not be written to its end.
+      OSError: the file could not be written to its end, or a viewer went away.
     """
     rr.set_strict_mode(True)  # a call that cannot be logged is an error, not a warning
     recording = rr.RecordingStream(APPLICATION)
     with contextlib.ExitStack() as stack:
-        outputs, file = [], None
+        outputs, file = [rr.GrpcSink(url) for url in sinks.viewers], None
         if sinks.rrd is not None:
             file = stack.enter_context(atomic_path(Path(sinks.rrd)))
             outputs.append(rr.FileSink(str(file)))
-        if sinks.spawn:
-            rr.spawn(connect=False, memory_limit=MEMORY_LIMIT, server_memory_limit=MEMORY_LIMIT)
-            outputs.append(rr.GrpcSink())
-        if sinks.connect is not None:
-            outputs.append(rr.GrpcSink(sinks.connect))
-        if sinks.serve:
-            url = recording.serve_grpc(default_blueprint=blueprint, server_memory_limit=MEMORY_LIMIT)
-            rr.serve_web_viewer(open_browser=False, connect_to=url)
-        if outputs and not sinks.serve:
+        if outputs:
             recording.set_sinks(*outputs, default_blueprint=blueprint)
+        if sinks.viewers:  # an earlier recording's layout would stay otherwise
+            recording.send_blueprint(blueprint, make_active=True)
         recording.send_recording_name(name)
         if properties:
             recording.send_property("fingerprint", rr.AnyValues(**properties))
         yield recording
         try:
-            recording.flush()
+            recording.flush(timeout_sec=PATIENCE)
         except RuntimeError as e:
             raise OSError(f"the recording could not be sent or written to its end ({e}); free some disk space, or look "
                           "whether the viewer still runs, and run again") from e
-        if sinks.serve:
-            _keep_serving()
         recording.disconnect()
         if file is not None and file.read_bytes()[-12:-4] != FOOTER:
             raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
 
 
-def open_viewer(rrd: Path) -> None:
-    """Open a recording in the native viewer."""
-    rr.init(APPLICATION, spawn=True)
-    rr.log_file_from_path(rrd)
+def open_file(rrd: Path, *, serve: bool = False) -> int:
+    """Show a .rrd file in the native viewer, or serve it to browsers; returns when that is closed or stopped.
+
+    Raises:
+      UnableError: there is no screen, or the viewer could not be started.
+    """
+    command = [viewer_program(), str(rrd), "--memory-limit", MEMORY_LIMIT, "--server-memory-limit", MEMORY_LIMIT]
+    if serve:
+        _refuse_taken(PORT, WEB_PORT)
+        command += ["--serve-web", "--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
+        print(f"watch in a browser: http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}; Ctrl-C ends it", flush=True)
+    else:
+        _need_screen()
+        command += ["--port", "auto"]
+    status = 0
+    with contextlib.suppress(KeyboardInterrupt):  # reaches the viewer as well
+        status = subprocess.run(command, check=False, stdout=subprocess.DEVNULL).returncode
+    if status:
+        raise UnableError(f"the Rerun viewer ended with status {status}; look at what it wrote above, or use --serve and a browser")
+    return 0
 
 
-def _keep_serving() -> None:
-    print("serving the recording at http://127.0.0.1:9090; Ctrl-C ends it", flush=True)
-    with contextlib.suppress(KeyboardInterrupt):
-        while True:
-            time.sleep(1.0)
+def send_file(rrd: Path, viewers: tuple[str, ...]) -> None:
+    """Send a .rrd file to running viewers.
+
+    Raises:
+      OSError: it could not be sent to its end.
+    """
+    for url in viewers:
+        recording = rr.RecordingStream(APPLICATION)
+        recording.set_sinks(rr.GrpcSink(url))
+        recording.log_file_from_path(rrd)
+        try:
+            recording.flush(timeout_sec=PATIENCE)
+        except RuntimeError as e:
+            raise OSError(f"{rrd} could not be sent to {url} ({e}); look whether the viewer still runs") from e
+        recording.disconnect()
+
+
+def _url(port: int) -> str:
+    return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def _checked(url: str) -> str:
+    """`url`, if a viewer listens there."""
+    parts = urlsplit(url)
+    if parts.scheme not in ("rerun", "rerun+http", "rerun+https") or not parts.hostname:
+        raise ValueError(f"--connect should be the URL of a running viewer such as {_url(PORT)}, got {url!r}")
+    if not listens(parts.hostname, parts.port or PORT):
+        raise UnableError(f"no viewer listens at {url}; start one with `rerun` (on a screen) or `rerun --serve-web` (for browsers)")
+    return url
+
+
+def _spawned() -> str:
+    """The URL of the native viewer: the one that runs already, else a new one."""
+    if not listens("127.0.0.1", PORT):
+        _need_screen()
+        try:
+            rr.spawn(connect=False, port=PORT, memory_limit=MEMORY_LIMIT, server_memory_limit=MEMORY_LIMIT,
+                     executable_path=viewer_program(), recording=rr.RecordingStream(APPLICATION))
+        except RuntimeError as e:
+            raise UnableError(f"the Rerun viewer could not be started ({e}); use --serve and a browser, or --rrd and a file") from e
+    return _url(PORT)
+
+
+def _serve() -> rr.RecordingStream:
+    """A server for recordings, which lives as long as the stream returned, and the web viewer's page."""
+    _refuse_taken(PORT, WEB_PORT)
+    host = rr.RecordingStream(APPLICATION)
+    url = host.serve_grpc(grpc_port=PORT, server_memory_limit=MEMORY_LIMIT)
+    rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False, connect_to=url)
+    return host
+
+
+def viewer_program() -> str:
+    """The viewer that came with rerun-sdk, whatever PATH says."""
+    return str(Path(rerun_cli.__file__).parent / ("rerun.exe" if sys.platform == "win32" else "rerun"))
+
+
+def _need_screen() -> None:
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise UnableError("there is no screen here (neither DISPLAY nor WAYLAND_DISPLAY is set) to open the Rerun viewer on; "
+                          "use --serve and a browser, --connect URL with a viewer elsewhere, or --rrd FILE")
+
+
+def _refuse_taken(*ports: int) -> None:
+    for port in ports:
+        if listens("127.0.0.1", port):
+            raise UnableError(f"port {port} is taken; end the program that uses it, or send to it with --connect {_url(port)} if it is a viewer")
+
+
+def listens(host: str, port: int) -> bool:
+    """Whether a connection is accepted within three seconds."""
+    try:
+        socket.create_connection((host, port), timeout=3.0).close()
+    except OSError:
+        return False
+    return True

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.recording import add_sinks, sinks_of
+from embodied.cli.recording import add_sinks, viewers_of
 
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
@@ -26,13 +26,19 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)")
     parser.add_argument("--quality", choices=("unlit", "baked"), default="baked", help="unlit is drawn at once (default: baked)")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder to write (default: %(default)s)")
-    add_sinks(parser)
+    add_sinks(parser, "DIR/episode.rrd")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
+    with viewers_of(args) as viewers:
+        return demonstrate(args, viewers)
+
+
+def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
+    """The whole line; both episodes also go to `viewers`."""
     from embodied.generate import generate_house
     from embodied.plan import save_plan
 
@@ -49,9 +55,9 @@ def run(args: argparse.Namespace) -> int:
         with timed("light and panoramas", seconds):
             world.render_all(progress=True)
         with timed("the first task: find something", seconds):
-            walk = find_something(args, world)
+            walk = find_something(args, world, viewers)
         with timed("the second task: ask for help", seconds):
-            help_facts = ask_for_help(args, world, routes)
+            help_facts = ask_for_help(args, world, routes, viewers)
         facts = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png"), "seconds": seconds,
                  "renderer": world.fingerprint["renderer"]}
     show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}",
@@ -75,7 +81,7 @@ def inhabited(house, catalogue, args: argparse.Namespace):
         return house, graph, build_routes(world, seed=args.seed, language=People(), house_split="test")
 
 
-def find_something(args: argparse.Namespace, world) -> dict:
+def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.environments import environment_maker
     from embodied.language import People
@@ -85,10 +91,10 @@ def find_something(args: argparse.Namespace, world) -> dict:
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
     episode = play(environment_maker("find", {world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path")[0]
-    return recorded(args, world, episode, sinks_of(args, args.out / "episode.rrd"))
+    return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 
-def ask_for_help(args: argparse.Namespace, world, routes) -> dict:
+def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ...]) -> dict:
     """The trained agent does a HANNA task in a house it has never seen; recorded to help.rrd.
 
     Its features come from plainly drawn panoramas, the kind that its encoder learned from.
@@ -104,7 +110,6 @@ def ask_for_help(args: argparse.Namespace, world, routes) -> dict:
     from embodied.rollout import play
     from embodied.tasks.hanna import hanna_pool, hanna_task
     from embodied.world import open_world
-    from viz.sinks import Sinks
 
     agent, encoder = load_agent(), load_encoder()
     with open_world(world.house, world.catalogue, args.cache, graph=world.graph, size=FACES) as plain:
@@ -114,24 +119,24 @@ def ask_for_help(args: argparse.Namespace, world, routes) -> dict:
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
-    return recorded(args, world, episode, Sinks(args.out / "help.rrd"))
+    return recorded(world, episode, args.out / "help.rrd", viewers)
 
 
-def recorded(args: argparse.Namespace, world, episode, sinks) -> dict:
-    """Record an episode; what is worth telling about it."""
+def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
+    """Record an episode into the file `path` and to `viewers`; what is worth telling about it."""
     from embodied.metrics import navigation_error, spl, success
     from viz.blueprint import blueprint_of
     from viz.recording import record
-    from viz.sinks import open_recording
+    from viz.sinks import Sinks, open_recording
 
-    with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as stream:
+    with open_recording(Sinks(path, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as stream:
         for _ in record(stream, world, episode.task, episode.steps):
             pass
     return {
         "agent": episode.agent, "request": episode.task.request, "success": bool(success(episode, world.graph)),
         "spl": round(spl(episode, world.graph), 3), "navigation_error_m": round(navigation_error(episode, world.graph), 2),
-        "steps": len(episode.steps), "requests": episode.requests, "recording": str(sinks.rrd),
-        "recording_mib": round(sinks.rrd.stat().st_size / 2**20, 1),
+        "steps": len(episode.steps), "requests": episode.requests, "recording": str(path),
+        "recording_mib": round(path.stat().st_size / 2**20, 1),
     }
 
 

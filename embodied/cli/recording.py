@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from viz.sinks import Sinks
+from embodied.cli.common import note
 
 
-def add_sinks(parser: argparse.ArgumentParser) -> None:
-    """--rrd, --spawn, --connect, --serve."""
+def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """--rrd, --spawn, --connect, --serve.
+
+    Args:
+      default: what --rrd is when it is not given, for the help text.
+    """
     group = parser.add_argument_group("recording")
-    group.add_argument("--rrd", type=Path, metavar="FILE", help="write the Rerun recording here")
-    group.add_argument("--spawn", action="store_true", help="open the Rerun viewer and watch live")
+    group.add_argument("--rrd", type=Path, metavar="FILE",
+                       help="write the Rerun recording here" + (f" (default: {default})" if default else ""))
+    add_viewers(group)
+
+
+def add_viewers(group: argparse._ActionsContainer) -> None:
+    """--spawn, --connect, --serve."""
+    group.add_argument("--spawn", action="store_true", help="open the Rerun viewer, which needs a screen, and watch live")
     group.add_argument("--connect", metavar="URL", help="send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy")
-    group.add_argument("--serve", action="store_true", help="serve the web viewer and watch in the browser")
+    group.add_argument("--serve", action="store_true", help="serve the web viewer, watch in the browser, end with Ctrl-C")
 
 
-def sinks_of(args: argparse.Namespace, rrd: Path | None = None) -> Sinks:
-    """The sinks that the options ask for; `rrd` is written when no --rrd is given."""
-    from viz.sinks import Sinks
+@contextlib.contextmanager
+def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+    """The viewers that the options ask for; open them before the work begins. --serve goes on until Ctrl-C."""
+    if not (args.spawn or args.connect is not None or args.serve):
+        yield ()
+        return
+    from embodied import gl
+    from viz.sinks import open_viewers
 
-    return Sinks(args.rrd or rrd, args.spawn, args.connect, args.serve)
+    with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve) as viewers:
+        if args.spawn and gl.info().software:
+            note("this machine draws by software: the native viewer is slow, and fills memory with some drivers; better --serve")
+        yield viewers

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.demo import texts
-from embodied.cli.recording import add_sinks, sinks_of
+from embodied.cli.recording import add_sinks, viewers_of
 
 AGENTS = ("shortest", "random", "forward10")
 
@@ -33,6 +33,12 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    with viewers_of(args) as viewers:
+        return roll_out(args, viewers)
+
+
+def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
+    """Play, film and record; recordings also go to `viewers`."""
     from embodied.env import HelpEnv
     from embodied.language import People
     from embodied.metrics import PER_EPISODE
@@ -53,8 +59,9 @@ def run(args: argparse.Namespace) -> int:
             row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
             if args.video:
                 row["video"] = str(film(world, episode, numbered(args.video, number, args.episodes), tuple(args.video_size)))
-            if args.rrd or args.spawn or args.connect or args.serve:
-                row["recording"] = record_episode(args, world, episode, number)
+            if args.rrd or viewers:
+                rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
+                row["recording"] = record_episode(world, episode, rrd, viewers)
             rows.append(row)
         facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint, "episodes": rows}
     lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
@@ -106,16 +113,13 @@ def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
     return path
 
 
-def record_episode(args: argparse.Namespace, world, episode, number: int) -> str:
-    """Record one episode to where the options say; returns the file's name or the viewer's."""
+def record_episode(world, episode, rrd: Path | None, viewers: tuple[str, ...]) -> str:
+    """Record one episode to a file and to viewers; returns the file's name or the viewers'."""
     from viz.blueprint import blueprint_of
     from viz.recording import record
-    from viz.sinks import open_recording
+    from viz.sinks import Sinks, open_recording
 
-    sinks = sinks_of(args)
-    if sinks.rrd is not None:
-        sinks = type(sinks)(numbered(sinks.rrd, number, args.episodes), sinks.spawn, sinks.connect, sinks.serve)
-    with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
+    with open_recording(Sinks(rrd, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
         for _ in record(r, world, episode.task, episode.steps):
             pass
-    return str(sinks.rrd or sinks.connect or "viewer")
+    return str(rrd or ", ".join(viewers))

@@ -49,7 +49,7 @@ def _recorder(args: argparse.Namespace):
     def keep(update: int, episodes) -> None:
         for number, episode in enumerate(episodes[:WATCHED]):
             with data.open_world(episode.task.world, catalogue, args.cache) as world:
-                sinks = Sinks(Path(args.out) / f"validation_{update:06d}_{number}.rrd", False, None, False)
+                sinks = Sinks(Path(args.out) / f"validation_{update:06d}_{number}.rrd")
                 blueprint, about = episode_blueprint(world.house), texts(world.fingerprint)
                 with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as recording:
                     for _ in record(recording, world, episode.task, episode.steps):

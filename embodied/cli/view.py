@@ -1,8 +1,9 @@
 """Look at what happened: open a recording, or the episodes of a run.
 
-RUN is a .rrd file, which opens in the Rerun viewer, or a folder that `embodied eval`, `judge` or
-`rollout` wrote: its episodes are listed, --page writes one HTML page about them, and --episode N
-makes the recording of one (with --data, the data set its houses come from) and opens it.
+RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
+a viewer that runs already), or a folder that `embodied eval` or `judge` wrote: its episodes are
+listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
+--data, the data set its houses come from).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import argparse
 from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.recording import add_sinks, sinks_of
+from embodied.cli.recording import add_sinks, viewers_of
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +21,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, metavar="DIR", help="data set of the run, for --episode")
     parser.add_argument("--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings")
     parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how --episode draws the house (default: unlit)")
-    add_sinks(parser)
+    add_sinks(parser, "RUN/recordings/N.rrd")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -28,7 +29,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     if args.folder.suffix == ".rrd":
-        return open_file(args)
+        return show_file(args)
     from viz.report import load_run, summary_line, write_page
 
     found = load_run(args.folder)
@@ -43,13 +44,16 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def open_file(args: argparse.Namespace) -> int:
-    """Open a .rrd file in the native viewer."""
+def show_file(args: argparse.Namespace) -> int:
+    """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
     if not args.folder.exists():
         raise FileNotFoundError(f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`")
-    from viz.sinks import open_viewer
+    from viz.sinks import open_file, send_file
 
-    open_viewer(args.folder)
+    if args.connect is None:
+        return open_file(args.folder, serve=args.serve)
+    with viewers_of(args) as viewers:
+        send_file(args.folder, viewers)
     return 0
 
 
@@ -59,18 +63,21 @@ def record_one(args: argparse.Namespace, found) -> int:
     from embodied.datasets.store import Dataset
     from viz.blueprint import blueprint_of
     from viz.recording import record
-    from viz.sinks import open_recording
+    from viz.sinks import Sinks, open_recording
 
     if not 0 <= args.episode < len(found):
         raise ValueError(f"--episode {args.episode} does not exist; this run has the episodes 0 to {len(found) - 1}")
     if args.data is None:
         raise ValueError("--episode needs --data DIR, the data set that the run was made on: its houses are drawn again")
     episode = found[args.episode].episode
-    sinks = sinks_of(args, args.folder / "recordings" / f"{args.episode}.rrd")
-    with Dataset(args.data).open_world(episode.task.world, catalogue_of(args), args.cache, quality=args.quality, size=384) as world:
-        with open_recording(sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
-            for _ in record(r, world, episode.task, episode.steps):
-                pass
-    note(f"recorded {episode.task.id}")
-    show(args, {"recording": str(sinks.rrd)}, f"wrote {sinks.rrd}; open it with: embodied view {sinks.rrd}")
+    path = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
+    with viewers_of(args) as viewers:
+        catalogue = catalogue_of(args)
+        with Dataset(args.data).open_world(episode.task.world, catalogue, args.cache, quality=args.quality, size=384) as world:
+            sinks, blueprint, about = Sinks(path, viewers), blueprint_of(world.house, episode), texts(world.fingerprint)
+            with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as r:
+                for _ in record(r, world, episode.task, episode.steps):
+                    pass
+        note(f"recorded {episode.task.id}")
+        show(args, {"recording": str(path)}, f"wrote {path}; open it with: embodied view {path}")
     return 0
