@@ -23,7 +23,7 @@ from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 from viz.blueprint import episode_blueprint
 from viz.recording import Pictures, camera_axes, record
-from viz.sinks import Sinks, viewer_program, listens, open_recording, open_viewers
+from viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
 from viz.video import camera_track, write_video
 
 SMALL = HouseConfig(area=(38.0, 46.0))
