@@ -26,11 +26,12 @@ def seating(ctx: Context) -> list[Thing] | None:
     """Sofa before a television or a fireplace, over a coffee table on a rug."""
     fire = ctx.kind in ("living_room", "library") and ctx.chance(0.25)
     heart = ctx.pick("fire") if fire else None
-    stand = heart or ctx.pick("media unit", most=(2.2, 0.75, 1.7)) or ctx.pick("tv bench", most=(2.2, 0.7, 1.0))
+    tall = ctx.pick("media unit", most=(2.2, 0.75, 1.7)) if ctx.chance(0.15) else None  # holds no screen
+    stand = heart or tall or ctx.pick("tv bench", most=(2.2, 0.7, 1.0))
     if stand is None:
         return None
     screen = None
-    if heart is None and stand.size[2] < 1.0 and ctx.chance(0.75):
+    if heart is None and stand.size[2] < 1.0 and ctx.chance(0.92):
         fits = (max(stand.size[0] - 0.05, 0.6), 0.5, 1.2)
         screen = ctx.pick("television", least=(0.7, 0, 0), most=fits) or ctx.pick("television", most=fits)
     for rich in (2, 1, 0):
@@ -147,13 +148,28 @@ def sofa_group(ctx: Context) -> list[Thing] | None:
 
 
 def lone_sofa(ctx: Context) -> list[Thing] | None:
-    """Where nothing more fits: a sofa at a wall."""
+    """Where no group fits: a sofa at a wall, with a table before it if there is room."""
+    for longest in (2.3, 1.9, 1.75):
+        sofa, table = ctx.pick("sofa", most=(longest, 1.0, 1.2)), ctx.pick("coffee table", most=(1.2, 0.7, 0.6))
+        if sofa is not None and table is not None:
+            w, d = sofa.size[:2]
+            items = [Item(sofa, 0.0, -d / 2, role="sofa"),
+                     Item(table, 0.0, -d - 0.38 - table.size[1] / 2, wobble(ctx.rng, 2), role="coffee table")]
+            found = ctx.put(items, wall_poses(ctx.space, w + 0.1, score=lambda wall, s: centred(wall, s)), "seating")
+            if found:
+                return found
     for longest in (2.3, 1.9, 1.75):
         found = ctx.against_wall(ctx.pick("sofa", most=(longest, 1.0, 1.2)), "seating", clear=0.5, window=-0.3, centre=0.5,
                                  role="sofa")
         if found:
             return found
-    return None
+    x0, y0, x1, y1 = ctx.space.polygon.bounds
+    sofa = ctx.pick("sofa", most=(1.9, 1.0, 1.2))
+    if sofa is None:
+        return None
+    poses = floor_poses(ctx.space, score=lambda x, y, yaw: -math.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2),
+                        yaws=(0.0, math.pi / 2, math.pi, -math.pi / 2), step=0.2)
+    return ctx.put([Item(sofa, 0.0, 0.0, clear=0.4, role="sofa")], poses, "seating")
 
 
 def conversation(ctx: Context, chair_role: str = "easy chair") -> list[Thing] | None:

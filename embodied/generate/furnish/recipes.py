@@ -106,8 +106,8 @@ RECIPES: dict[str, tuple[tuple[str, float, str, float], ...]] = {
 }
 
 CLUTTER: dict[str, tuple[str, ...]] = {
-    "any": ("vase", "photo frame", "book", "small plant", "candle", "succulent", "jug", "deer figurine", "camera", "pot",
-            "cactus", "speaker"),
+    "any": (*("vase", "photo frame", "book", "small plant", "candle", "succulent", "jug", "stack of books") * 3,
+            "cactus", "cactus", "pot", "pot", "speaker", "camera", "deer figurine"),
     "pantry": ("wine bottle", "jug", "pot", "mixing bowl", "bowl", "cooking pot", "oil bottle", "milk carton",
                "bread box", "wicker basket", "tray", "cardboard box", "stack of plates", "beer bottle", "multicooker", "jug", "milk carton", "bread",
                "wine bottle", "wine bottle", "storage box", "glass", "frying pan"),
