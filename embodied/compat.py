@@ -123,7 +123,7 @@ def _export_graphs(data: Dataset, names: Sequence[str], folder: Path) -> list[Pa
     files = []
     for name in names:
         files.append(folder / f"{scan_name(name)}_connectivity.json")
-        to_matterport(data.place(name).graph, files[-1])
+        to_matterport(data.place(name).graph, data.place(name).house, files[-1])
     return [*files, _text(folder / "scans.txt", [scan_name(n) for n in names])]
 
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
 from embodied.house import DOORS, House, HouseError
-from embodied.walkable import EYE, free_floor
+from embodied.walkable import EYE, free_floor, sight_floor
 
 RADIUS = 0.2
 """Radius of the agent's body, metres."""
@@ -337,20 +337,36 @@ def _bridge(space, grid: Grid, nodes: list[int], label: np.ndarray, spacing: flo
         at = far
 
 
-def to_matterport(graph: NavGraph, path: Path) -> None:
+def sight_lines(graph: NavGraph, house: House) -> np.ndarray:
+    """(n, n) bool: which eyes of one storey see one another over whatever is lower; joined nodes always do."""
+    seen = np.zeros((len(graph.ids),) * 2, bool)
+    storey_of_node = np.array([house.room_by_id[r].storey for r in graph.room_of_node])
+    for storey in range(len(house.storeys)):
+        nodes = np.flatnonzero(storey_of_node == storey)
+        space = sight_floor(house, storey).buffer(1e-6)
+        shapely.prepare(space)
+        i, j = nodes[np.stack(np.triu_indices(len(nodes), 1))]
+        seen[i, j] = shapely.covers(space, shapely.linestrings(np.stack([graph.positions[i, :2], graph.positions[j, :2]], 1)))
+    seen[graph.edges[:, 0], graph.edges[:, 1]] = True
+    return seen | seen.T
+
+
+def to_matterport(graph: NavGraph, house: House, path: Path) -> None:
     """Write the graph as Matterport3DSimulator's `<scan>_connectivity.json`.
 
     Per viewpoint: image_id, pose (16 floats, row-major camera-to-world, translation at 3, 7, 11), included,
-    visible, unobstructed, height; 'room' is ours and ignored by the programs that read the format.
+    visible (a line of sight, however far), unobstructed (an edge), height; 'room' is ours and ignored by the
+    programs that read the format.
     """
     n = len(graph.ids)
     open_ = np.zeros((n, n), bool)
     open_[graph.edges[:, 0], graph.edges[:, 1]] = open_[graph.edges[:, 1], graph.edges[:, 0]] = True
+    seen = sight_lines(graph, house)
     items = []
     for k, (x, y, z) in enumerate(graph.positions.tolist()):
         items.append({
             "image_id": graph.ids[k], "pose": [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0],
-            "included": True, "visible": open_[k].tolist(), "unobstructed": open_[k].tolist(), "height": EYE,
+            "included": True, "visible": seen[k].tolist(), "unobstructed": open_[k].tolist(), "height": EYE,
             "room": graph.room_of_node[k],
         })
     write_bytes(Path(path), json.dumps(items).encode())

@@ -16,7 +16,7 @@ from conftest import two_rooms
 from assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house import HouseError, Placement
-from embodied.navgraph import RADIUS, build_graph, from_matterport, graph_of, to_matterport
+from embodied.navgraph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 from embodied.walkable import EYE, free_floor, leaves, sight_floor
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
@@ -35,7 +35,7 @@ def line() -> tuple:
     """Four nodes on a line, 1, 2 and 3 m apart."""
     x = np.array([0.0, 1.0, 3.0, 6.0])
     positions = np.stack([x, 0 * x, 0 * x + 1.5], axis=1)
-    return graph_of(positions, np.array([[0, 1], [2, 1], [2, 3]]), ("a", "b", "c", "d"), ("r",) * 4)
+    return graph_of(positions, np.array([[0, 1], [2, 1], [2, 3]]), ("a", "b", "c", "d"), ("living_room_1",) * 4)
 
 
 def test_distances_and_hops_on_a_line_by_hand():
@@ -107,7 +107,7 @@ def test_viewpoints_have_choices():
 
 
 def test_a_large_house_has_about_125_nodes():
-    house = generate_house(500, HouseConfig(area=(500, 520)), load_catalogue())
+    house = generate_house(500, HouseConfig(area=(400, 440)), load_catalogue())
     assert 100 <= len(build_graph(house).ids) <= 155
     assert len(house.placements) >= 250
 
@@ -141,8 +141,8 @@ def test_a_shut_door_cuts_and_an_open_one_does_not():
 
 
 def test_connectivity_files_survive_the_round_trip(tmp_path):
-    _, graph = pairs()[0]
-    to_matterport(graph, tmp_path / "house_connectivity.json")
+    house, graph = pairs()[0]
+    to_matterport(graph, house, tmp_path / "house_connectivity.json")
     items = json.loads((tmp_path / "house_connectivity.json").read_text())
     assert set(items[0]) >= {"image_id", "pose", "included", "visible", "unobstructed", "height"}
     assert len(items[0]["pose"]) == 16 and items[0]["pose"][11] == graph.positions[0, 2]
@@ -151,9 +151,33 @@ def test_connectivity_files_survive_the_round_trip(tmp_path):
     assert (again.edges == graph.edges).all() and np.allclose(again.distance, graph.distance)
 
 
+def test_visible_is_a_line_of_sight_over_furniture_and_through_doors_not_through_walls():
+    table = Placement("table_1", "hand/table", "table", "living_room_1", (2.5, 2.0, 0.0), 0.0, (1.0, 3.6, 0.75))
+    cupboard = Placement("cupboard_1", "hand/cupboard", "cupboard", "bedroom_1", (7.5, 2.6, 0.0), 0.0, (1.0, 2.6, 2.0))
+    house = dataclasses.replace(two_rooms(), placements=(table, cupboard))
+    xy = np.array([[1.0, 1.05], [4.0, 1.05], [6.0, 1.05], [8.5, 1.05], [8.5, 3.5], [6.0, 3.5]])
+    rooms = ("living_room_1",) * 2 + ("bedroom_1",) * 4
+    graph = graph_of(np.c_[xy, np.full(6, 1.5)], np.array([[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]]), tuple("abcdef"), rooms)
+    seen = sight_lines(graph, house)
+    assert seen[0, 1] and seen[0, 3], "over the table, and on through the door"
+    assert not seen[1, 5], "a wall is between"
+    assert not seen[4, 5], "the cupboard is higher than the eye"
+    assert (seen == seen.T).all() and not seen.diagonal().any()
+
+
+def test_one_sees_wherever_one_walks_and_further(tmp_path):
+    for number, (house, graph) in enumerate(pairs()):
+        path = tmp_path / f"{number}_connectivity.json"
+        to_matterport(graph, house, path)
+        items = json.loads(path.read_text())
+        visible, open_ = (np.array([i[key] for i in items]) for key in ("visible", "unobstructed"))
+        assert (visible >= open_).all() and (visible == visible.T).all()
+        assert visible.sum() > open_.sum() and not visible.diagonal().any()
+
+
 def test_excluded_viewpoints_are_left_out_and_broken_files_refused(tmp_path):
     path = tmp_path / "scan_connectivity.json"
-    to_matterport(line(), path)
+    to_matterport(line(), two_rooms(), path)
     items = json.loads(path.read_text())
     items[3]["included"] = False
     path.write_text(json.dumps(items))

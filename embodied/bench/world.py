@@ -24,8 +24,8 @@ from embodied.scene import compile_scene
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 
-LARGE = HouseConfig(area=(500.0, 550.0))
-"""A house of about 125 viewpoints, the mean of Matterport3D."""
+LARGE = HouseConfig(area=(400.0, 440.0))
+"""A house of about 125 viewpoints; Matterport3D has 117 per building."""
 TYPICAL = HouseConfig(area=(110.0, 130.0))
 
 

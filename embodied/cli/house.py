@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     graph = build_graph(house, catalogue)
     args.out.mkdir(parents=True, exist_ok=True)
     house.save(args.out / "house.json")
-    to_matterport(graph, args.out / "connectivity.json")
+    to_matterport(graph, house, args.out / "connectivity.json")
     save_plan(house, args.out / "plan.png", graph=graph)
     if not args.no_mjcf:
         note("writing house.xml with its meshes and textures")

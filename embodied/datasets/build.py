@@ -209,7 +209,7 @@ def _write_unit(
             seed=config.seed, language=language,
         )
     house.save(home / "house.json")
-    to_matterport(graph, home / "connectivity.json")
+    to_matterport(graph, house, home / "connectivity.json")
     save_lines(home / "routes.jsonl", routes)
     counts = {s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
               for s, _ in shares(unit, config)}
