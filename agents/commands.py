@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import json
 import math
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -29,14 +30,15 @@ from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, rando
 from agents.vision.features import encode_panoramas, feature_path, load_bank, load_features, save_features
 from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
 from agents.vision.probe import Labelled, read
-from agents.vision.training import save_training, train_encoder, whitened
+from agents.vision.strip import view_of_strip
+from agents.vision.training import save_training, train_encoder, trained_classes, whitened
 from agents.vocabulary import build_vocabulary
 from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.evaluate import agent as agent_without_learning
 from embodied.evaluate import evaluate, spread
-from embodied.interface import Episode
+from embodied.interface import VIEWS, Episode
 from embodied.records import save_lines
 from embodied.tables import as_json, markdown, save
 from embodied.teachers.hanna import HannaTeacher
@@ -51,7 +53,10 @@ FACES = 192
 # Vision ------------------------------------------------------------------------------------------
 
 def run_train_vision(args: argparse.Namespace, note: Note = print) -> int:
-    """Render strips of all houses, train on the training houses, judge on the others, save."""
+    """Render strips of all houses, train on the training houses, judge on the others, save.
+
+    What is there already, strips or an encoder of the same settings, is not made again.
+    """
     torch.set_num_threads(args.threads)
     data, config = Dataset(args.data), chosen(args, VisionConfig())
     train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
@@ -62,25 +67,41 @@ def run_train_vision(args: argparse.Namespace, note: Note = print) -> int:
         note(f"drawn: {name}")
     strips = {n: HouseStrips.load(_strips_path(args, n)) for n in (*train_names, *test_names)}
     seen = [strips[n] for n in train_names]
-    encoder, heads, classes = train_encoder(seen, config, note=note)
-    encoder = whitened(encoder, seen)
-    save_training(encoder, heads, classes, config, args.out)
+    classes = trained_classes(args.out, config)
+    if classes is None:
+        encoder, heads, classes = train_encoder(seen, config, note=note)
+        save_training(whitened(encoder, seen), heads, classes, config, args.out)
     encoder = load_encoder(args.out / "encoder.safetensors")
+    untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
     numbers = {}
-    for name, who in (("trained", encoder), ("random", whitened(random_encoder(config.network, seed=config.seed), seen))):
-        halves = [labelled(data, [strips[n] for n in names], who, classes) for names in (train_names, test_names)]
+    for name, who, alone in (("trained", encoder, False), ("trained, each view alone", encoder, True), ("random", untrained, False)):
+        began = time.perf_counter()
+        halves = [labelled(data, [strips[n] for n in names], who, classes, alone=alone) for names in (train_names, test_names)]
+        spent = time.perf_counter() - began
         reading = read(*halves, seed=config.seed)
         numbers[name] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
+        numbers[name]["nodes per second"] = sum(len(h.room) for h in halves) / spent
         numbers[name]["ap by class"] = dict(zip(classes, reading.ap, strict=True))
         note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
     write_json(args.out / "readings.json", numbers, indent=1)
     return 0
 
 
-def labelled(data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str]) -> Labelled:
-    """Features of houses and what a linear reader should read from them."""
+def labelled(
+    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str], *, alone: bool = False
+) -> Labelled:
+    """Features of houses and what a linear reader should read from them.
+
+    Args:
+      alone: the network looks at each of the 36 views by itself, four times the work, instead of
+        once at the strip that they overlap in.
+    """
     columns = [houses[0].classes.index(c) for c in classes]
-    features = [np.concatenate([encoder.encode_strips(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
+    encode = encoder.encode_strips
+    if alone:
+        encode = lambda strips: encoder.encode_views(
+            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips]))
+    features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
     return Labelled(
         np.concatenate(features), np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
         np.concatenate([h.room for h in houses]).astype(np.int64),

@@ -195,3 +195,12 @@ def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config
     with atomic_path(folder / "heads.safetensors") as temporary:
         safetensors.torch.save_file({k: v.half().contiguous() for k, v in heads.state_dict().items()}, temporary)
     write_json(folder / "classes.json", {"classes": list(classes), "config": json.loads(json.dumps(vars(config)))})
+
+
+def trained_classes(folder: Path, config: VisionConfig) -> list[str] | None:
+    """The classes of the encoder that `save_training` left in `folder` with these settings; None without one."""
+    path = folder / "classes.json"
+    if not path.exists():
+        return None
+    body = json.loads(path.read_text())
+    return body["classes"] if body["config"] == vars(config) else None
