@@ -74,6 +74,15 @@ class Catalogue:
         own = self._asset(key).size
         return self._scaled(key, tuple(own if size is None else size), tuple(params))
 
+    def parameters(self, key: str) -> Mapping[str, str | float]:
+        """What the maker of a built asset can be told, with its usual values; empty for models.
+
+        Raises:
+          CatalogueError: unknown key.
+        """
+        self._asset(key)
+        return _makers()[key].look if key not in self._recipes else {}
+
     def build(self, keys: Sequence[str] = ()) -> None:
         """Import the models `keys` (all if none) into the cache, with a progress bar; what is
         there already is only checked, so an interrupted run goes on where it stopped."""

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from assets.cache import digest
 from embodied import gl, navgraph
 from embodied.house import House
+from embodied.known import load_house
 from embodied.lit import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
@@ -233,7 +234,7 @@ def open_folder(folder: Path, catalogue: Catalogue, cache: Path, *, size: int = 
     folder = Path(folder)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
-    house = House.load(folder / "house.json")
+    house = load_house(folder / "house.json", catalogue)
     graph = navgraph.build_graph(house, catalogue)
     return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light,
                  file=folder / "panoramas.pano")

@@ -40,6 +40,8 @@ class Maker:
     """What it makes when nobody asks for anything else."""
     make: Callable[[tuple[float, float, float], tuple[tuple[str, str | float], ...], FinishOf], tuple[MeshPart, ...]]
     """make(size, params, finish): parts whose bounding box is exactly `size`."""
+    look: Look
+    """The parameters it takes, with the values they have where nobody names others."""
 
 
 def maker(
@@ -83,7 +85,8 @@ def maker(
         "",
         "Apache-2.0",
     )
-    return Maker(asset, functools.partial(_run, asset.key, build, dict(look or {})))
+    values = dict(look or {})
+    return Maker(asset, functools.partial(_run, asset.key, build, values), {"seed": 0.0, **values})
 
 
 def _run(key: str, build: Build, defaults: dict, size, params, finish: FinishOf) -> tuple[MeshPart, ...]:

@@ -28,16 +28,17 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.house import House
+    from embodied.known import load_house
     from embodied.light import bake, progress_bar
 
     path = args.folder / "house.json"
-    house = House.load(path)
+    catalogue = catalogue_of(args)
+    house = load_house(path, catalogue)
     changed = with_sky(house, args.time, args.weather, args.lamps)
     if changed.digest != house.digest:
         changed.save(path)
     with progress_bar() as progress:
-        result = bake(changed, catalogue_of(args), args.cache, "draft" if args.draft else "normal", progress=progress)
+        result = bake(changed, catalogue, args.cache, "draft" if args.draft else "normal", progress=progress)
     facts = {"house": changed.digest, "hour": changed.sky.hour, "weather": changed.sky.weather, "light": result.manifest["key"],
              "seconds": result.manifest["total_seconds"], "check": result.manifest["check"]}
     show(args, facts, f"{changed.name} is lit at {changed.sky.hour:g} h, {changed.sky.weather}")

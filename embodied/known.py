@@ -1,0 +1,81 @@
+"""Whether a house speaks of things that exist: assets, classes, surfaces, parameters, materials, styles."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+from assets.catalogue import Catalogue
+from assets.materials import MATERIALS
+from embodied.generate.finishes import STYLES
+from embodied.house import House, HouseError, Placement
+
+
+def load_house(path: Path, catalogue: Catalogue) -> House:
+    """House.load, refusing what `catalogue` does not know; raises HouseError with the file's name."""
+    house = House.load(path)
+    try:
+        check_known(house, catalogue)
+    except HouseError as e:
+        raise HouseError(f"{path}: {e}") from e
+    return house
+
+
+def check_known(house: House, catalogue: Catalogue) -> None:
+    """Refuse a house that names what neither the catalogue nor the materials hold.
+
+    `embodied.house.check` asks whether a house can be; this asks whether it can be drawn.
+
+    Raises:
+      HouseError: an unknown style, material, asset, object class, surface or parameter.
+    """
+    if house.style not in STYLES:
+        raise HouseError(f"the house has the unknown style {house.style!r}; use one of {tuple(STYLES)}")
+    for room in house.rooms:
+        for finish in (room.floor_finish, room.wall_finish, room.ceiling_finish, room.skirting_finish, room.accent_finish):
+            _check_material(f"room {room.id!r}", finish)
+    for opening in house.openings:
+        _check_material(f"opening {opening.id!r}", opening.leaf_finish)
+    for p in house.placements:
+        _check_placement(house, p, catalogue)
+
+
+def _check_material(owner: str, key: str | None) -> None:
+    if key is not None and key not in MATERIALS:
+        raise HouseError(f"{owner} wears the unknown material {key!r}; {_near(key, MATERIALS)}")
+
+
+def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
+    asset = catalogue.assets.get(p.asset)
+    if asset is None:
+        raise HouseError(f"object {p.id!r} is the unknown asset {p.asset!r}; {_near(p.asset, catalogue.assets)}; "
+                         "`embodied assets list` names them all, --packs adds folders of your own")
+    if p.object_class != asset.object_class:
+        raise HouseError(f"object {p.id!r} is called a {p.object_class!r}, its asset {p.asset!r} is a {asset.object_class!r}")
+    if p.surface is not None:
+        names = _surfaces(house, p, catalogue)
+        if p.surface not in names:
+            raise HouseError(f"object {p.id!r} lies on the unknown surface {p.surface!r} of {p.parent!r}, which has {names}; "
+                             "name one of these")
+    known = catalogue.parameters(p.asset)
+    for name, value in p.params:
+        if name not in known:
+            raise HouseError(f"object {p.id!r} has the unknown parameter {name!r}; {p.asset!r} takes {sorted(known) or 'none'}")
+        if isinstance(value, str) != isinstance(known[name], str) or (isinstance(value, float) and not math.isfinite(value)):
+            raise HouseError(f"object {p.id!r} has {name}={value!r}; a value like {known[name]!r} is wanted")
+        if isinstance(known[name], str) and known[name] in MATERIALS:
+            _check_material(f"object {p.id!r}", value)
+
+
+def _surfaces(house: House, p: Placement, catalogue: Catalogue) -> list[str]:
+    """Names of the surfaces of what `p` rests on; the parent's asset may be unknown too."""
+    parent = house.placement_by_id.get(p.parent)
+    below = catalogue.assets.get(parent.asset) if parent is not None else None
+    return [s.name for s in below.surfaces] if below is not None else []
+
+
+def _near(word: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(known), 3, 0.5)
+    return f"did you mean {' or '.join(map(repr, close))}?" if close else "none has a name like it"
