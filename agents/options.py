@@ -14,7 +14,9 @@ from pathlib import Path
 from agents.imitation.config import SCALES, TrainingConfig
 from agents.vision.config import VisionConfig
 from assets.cache import default_cache
+from embodied.fields import field_docs
 
+METAVARS = {int: "N", float: "X", str: "WORD"}
 WEIGHTS = Path(__file__).resolve().parent / "weights"
 """What this repository ships; see its README.md."""
 SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
@@ -36,17 +38,25 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
 
 
 def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
-    """One option per field of a configuration; without it, the field keeps its default."""
-    hints = typing.get_type_hints(config)
+    """One option per field of a configuration, explained by the sentence below the field; without it, the field
+    keeps its default, or that of --scale."""
+    hints, helps = typing.get_type_hints(config), field_docs(config)
     for f in dataclasses.fields(config):
         if f.name in skip:
             continue
-        option = f"--{f.name.replace('_', '-')}"
+        option, text = f"--{f.name.replace('_', '-')}", f"{helps[f.name]} (default: {default_of(config, f)})".replace("%", "%%")
         if hints[f.name] is bool:
-            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=f"default: {f.default}")
+            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
-            parser.add_argument(option, type=hints[f.name], default=None, metavar=hints[f.name].__name__.upper(),
-                                help=f"default: {f.default}")
+            parser.add_argument(option, type=hints[f.name], default=None, metavar=METAVARS[hints[f.name]], help=text)
+
+
+def default_of(config: type, field: dataclasses.Field) -> str:
+    """The field's default in words, for every --scale where they differ."""
+    of_scale = {name: getattr(c, field.name) for name, c in sorted(SCALES.items()) if isinstance(c, config)}
+    if len(set(of_scale.values())) > 1:
+        return ", ".join(f"{name}: {value}" for name, value in of_scale.items())
+    return str(field.default)
 
 
 def chosen(args: argparse.Namespace, config):
@@ -103,5 +113,5 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
     parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results")
+    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results (default: %(default)s)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")

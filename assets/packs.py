@@ -50,7 +50,7 @@ def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
             return pack
     if not found:
         raise PackError(
-            f"no furniture library in {SYSTEM_FOLDER}, so {key!r} cannot be imported; "
+            f"no furniture library in {', '.join(map(str, packs)) or SYSTEM_FOLDER}, so {key!r} cannot be imported; "
             "apt-get install sweethome3d-furniture, or name the .sh3f files with --pack"
         )
     raise PackError(

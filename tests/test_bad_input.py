@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import errno
 import json
 import os
@@ -17,12 +18,16 @@ import pytest
 from conftest import two_rooms
 
 import embodied
+from agents.imitation.config import TrainingConfig
+from agents.vision.config import VisionConfig
 from assets.cache import atomic_path
 from assets.catalogue import CatalogueError, load_catalogue
 from assets.materials import finish
 from assets.sh3f import CATALOGUE, PackError, open_pack
 from embodied import cli
 from embodied.errors import UnableError
+from embodied.fields import field_docs
+from embodied.generate import HouseConfig
 from embodied.house import House, HouseError
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, write_panoramas
@@ -225,6 +230,11 @@ def test_help_imports_no_subcommand_and_import_embodied_is_light():
             "print([m for m in ('numpy', 'shapely', 'mujoco', 'torch', 'embodied.cli.house') if m in sys.modules])")
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("kind", [HouseConfig, TrainingConfig, VisionConfig])
+def test_every_field_that_is_an_option_is_explained(kind):
+    assert [f.name for f in dataclasses.fields(kind) if not field_docs(kind).get(f.name)] == []
 
 
 def test_every_public_name_is_there():

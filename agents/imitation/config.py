@@ -25,14 +25,19 @@ class TrainingConfig:
     model: str = "hanna"
     """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
     hidden_size: int = 256
+    """Width of both networks."""
     navigation_embedding: int = 256
+    """Width of an embedded navigation action."""
     ask_embedding: int = 128
+    """Width of an embedded decision to ask."""
     self_heads: int = 8
     """Number of self-attention heads."""
     text_heads: int = 8
     """Number of instruction-attention heads."""
     dropout: float = 0.3
+    """Share of units that are silent in training."""
     iterations: int = 30_000
+    """Updates of the weights."""
     learning_rate: float = 1e-4
     """Of Adam."""
     weight_decay: float = 5e-4
@@ -50,10 +55,11 @@ class TrainingConfig:
     curiosity_floor: float = 0.0
     """Mistakes less likely than this are not pushed down further; 0 is Eq 4.13 as printed, without a bound."""
     evaluation_steps: int = 50
+    """Horizon of episodes that are judged."""
     evaluation_batch: int = 32
     """Has no influence on results here, only on speed."""
     ask_rule: str = "learned"
-    """Key of hanna.asking.RULES: who decides when to ask."""
+    """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
     reset_inter_task: bool = True
@@ -77,7 +83,9 @@ class TrainingConfig:
     validation_tasks: int = 200
     """Tasks of each validation."""
     checkpoint_minutes: float = 3.0
+    """How often the run is saved, so that it can go on after an interruption."""
     seed: int = 0
+    """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:

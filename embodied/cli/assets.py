@@ -14,7 +14,8 @@ from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, sh
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("action", choices=("build", "list", "sheet", "attribution"))
+    parser.add_argument("action", choices=("build", "list", "sheet", "attribution"),
+                        help="attribution writes who made which model, under which licence")
     parser.add_argument("--class", dest="object_class", metavar="NAME", help="only this object class")
     parser.add_argument("--out", type=Path, metavar="PATH", help="folder for sheets, file for the attribution")
     add_cache(parser)

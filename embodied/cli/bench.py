@@ -1,8 +1,8 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
-houses, pictures, steps and memory make the table of the main line; plays counts environment
-steps with help; light compares the ways of
-drawing with a path tracer. Close other programs first: the numbers are only as good as the quiet.
+houses, pictures, steps and memory make the table of the main line; plays counts environment steps
+with help; light compares the ways of drawing with a path tracer. Close other programs first: the
+numbers are only as good as the quiet.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PARTS = ("houses", "pictures", "steps", "plays", "memory", "light")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("part", nargs="*", help="what to measure (default: houses, pictures, steps)")
+    parser.add_argument("part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)")
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
     parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how pictures are drawn (default: unlit)")
     parser.add_argument("--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)")

@@ -12,6 +12,9 @@ from pathlib import Path
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import add_options, read_options
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.config import SHAPES
+from embodied.generate.finishes import STYLES
+from embodied.house import WEATHERS
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +22,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
-    add_options(parser.add_argument_group("what kind of house"), HouseConfig)
+    group = parser.add_argument_group("what kind of house", "what is not given is drawn from the seed")
+    add_options(group, HouseConfig, words={"shape": SHAPES, "style": tuple(STYLES), "weather": WEATHERS})
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

@@ -20,18 +20,28 @@ def add(parser: argparse.ArgumentParser) -> None:
     from agents import options
 
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    vision = kinds.add_parser("vision", help="the encoder, on renders of a data set's training houses")
+    vision = kinds.add_parser("vision", help="the encoder, on renders of a data set's training houses", description=run_vision.__doc__)
     options.add_train_vision(vision)
-    hanna = kinds.add_parser("hanna", help="the agent, on a HANNA data set with features")
+    hanna = kinds.add_parser("hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__)
     options.add_train_hanna(hanna)
     hanna.add_argument("--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder")
 
 
 def run(args: argparse.Namespace) -> int:
+    return run_vision(args) if args.what == "vision" else run_hanna(args)
+
+
+def run_vision(args: argparse.Namespace) -> int:
+    """Draw the houses of a data set, teach an encoder to name and place what is in them, and read how well it sees."""
     from agents import commands
 
-    if args.what == "vision":
-        return commands.run_train_vision(args, note)
+    return commands.run_train_vision(args, note)
+
+
+def run_hanna(args: argparse.Namespace) -> int:
+    """Teach an agent by imitation to navigate, to ask for help and to follow it, on data that `embodied features` prepared."""
+    from agents import commands
+
     return commands.run_train_hanna(args, note, on_validation=_recorder(args) if args.rrd else None)
 
 

@@ -27,19 +27,19 @@ class HouseConfig:
     bedrooms: int | None = None
     """Bedrooms of every sort (main, children's, guest), 1 to 12."""
     shape: str | None = None
-    """Footprint: one of SHAPES."""
+    """Footprint, seen from above."""
     storeys: int = 1
     """Only 1 is built so far."""
     open_plan: bool | None = None
     """Whether kitchen, dining and living flow into each other through wide openings."""
     style: str | None = None
-    """Name of a palette of embodied.generate.finishes.STYLES."""
+    """Palette and taste of materials and furniture."""
     disorder: float | None = None
     """0 is tidy, 1 is thoroughly lived in; read by the furnishing stages."""
     hour: float | None = None
     """Local solar time, hours in [0, 24)."""
     weather: str | None = None
-    """'clear', 'hazy' or 'overcast'."""
+    """Of the sky: it decides how light falls in."""
 
     def __post_init__(self) -> None:
         if self.area is not None:
