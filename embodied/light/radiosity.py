@@ -229,22 +229,24 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
     return total / directions
 
 
-def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarray, flux: np.ndarray, extent: np.ndarray) -> np.ndarray:
+def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarray, thin: np.ndarray, flux: np.ndarray,
+                extent: np.ndarray) -> np.ndarray:
     """(n, 3) e from sunlit patches, each a small disc light, the same for all points and so free of noise.
 
     Args:
-      position, normal: (k, 3). flux: (k, 3) radiosity times area. extent: (k,) area in square metres.
+      position, normal: (k, 3). thin: (k,) bool, shines to both sides. flux: (k, 3) radiosity times area. extent: (k,) area in square metres.
     """
     mi = mitsuba()
     import drjit as dr
 
     total = dr.zeros(mi.Color3f, p.n)
-    for q, n, f, a in zip(position + normal * LIFT, normal, flux, extent):
+    for q, n, both, f, a in zip(np.where(thin[:, None], position, position + normal * LIFT), normal, thin, flux, extent):
         d = mi.Point3f(*(constant(x) for x in q)) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-5)
         cos, side, active = facing(p, d)
         leaving = -dr.dot(mi.Vector3f(*(constant(x) for x in n)), d)
+        leaving = dr.abs(leaving) if both else leaving
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 3 * LIFT, 0.0, [])
         g = cos * leaving / (dr.pi * dr.square(far) + constant(a))

@@ -20,6 +20,8 @@ from embodied.light.unwrap import areas_of
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
+SPARKS = 0.01
+"""Share of a room's light that may be lost to keep its brightest spots from sparkling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +200,7 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
         return np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
     share = np.asarray(radiosity.sun_share(space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4))
     flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
-    power = flux.mean(1) * ~lux.thin
+    power = flux.mean(1)
     e = np.zeros((n, 3), np.float32)
     for unit in np.unique(lux.unit[power > 0]):
         mine = np.nonzero((lux.unit == unit) & (power > 0))[0]
@@ -216,7 +218,7 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
 
 
 def _patches(lux: Luxels, space: Space, pick: np.ndarray, strength: np.ndarray, extent: np.ndarray, i: np.ndarray, rays: int) -> np.ndarray:
-    return radiosity.patch_light(space, subset(lux, i), lux.position[pick], lux.normal[pick], strength, extent)
+    return radiosity.patch_light(space, subset(lux, i), lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent)
 
 
 def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell: Callable[[float], None]) -> Radiosity:
@@ -235,13 +237,17 @@ def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell
 
 
 def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
-    """Radiosity cut, room by room, at 6 times its 90th percentile: what is smaller than a hand
-    beside a bulb would show as sparks on far walls, one ray in hundreds."""
+    """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
+    than a hand beside a bulb would show as sparks on far walls, one ray in hundreds."""
     y = seen.mean(1)
     out = np.array(seen, np.float32)
     for unit in np.unique(lux.unit):
         mine = np.nonzero(lux.unit == unit)[0]
-        most = 6 * np.percentile(y[mine], 90)
+        order = mine[np.argsort(y[mine])]
+        rising, above = y[order], np.cumsum(lux.area[order][::-1])[::-1]
+        lost = np.cumsum((np.diff(rising, append=rising[-1]) * np.append(above[1:], 0.0))[::-1])[::-1]
+        allowed = SPARKS * float((y[order] * lux.area[order]).sum())
+        most = max(rising[min(np.searchsorted(-lost, -allowed), len(rising) - 1)], 1e-9)
         out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
     return out
 
