@@ -59,6 +59,10 @@ _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
 }
 
 
+PLAIN = 3.0
+"""How much likelier than its other templates the first few of a clause are: what most people say."""
+
+
 # Saying -----------------------------------------------------------------------------------------
 
 def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
@@ -78,7 +82,7 @@ def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator
 
 def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Generator) -> Template:
     fitting = [t for t in templates if t.habit in ("", speaker.habit)]
-    weights = np.array([3.0 if t.habit else 1.0 for t in fitting])
+    weights = np.array([3.0 if t.habit else PLAIN if i < 4 else 1.0 for i, t in enumerate(fitting)])
     return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
 
 
@@ -110,8 +114,14 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
         if n and length < speaker.clauses_per_sentence and rng.random() < 0.8 and "avoid" not in kinds:
             links = LINKS[speaker.habit] if rng.random() < 0.6 else LINKS[""]
             link = links[int(rng.integers(len(links)))]
-            if not link or rng.random() < 0.15:
+            if not link or rng.random() < 0.1:
                 current += f", {text}"
+            elif link.split()[0] not in ("and", "then"):  # 'after that', 'once there': no comma alone can join with these
+                if rng.random() < 0.5:
+                    sentences.append(current)
+                    current, length = f"{link}, {text}", 0
+                else:
+                    current += f", and {link} {text}"
             else:
                 pause = "" if link in ("and", "then", "and then") and rng.random() < 0.6 else ","
                 current += f"{pause} {link} {text}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.language.clauses import Thing
+from embodied.language.nouns import MORE_NOUNS
 from embodied.language.templates import PRAISE, SIZES
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class Lexicon:
         adjectives: set[str] = set()
         for asset in catalogue.assets.values():
             adjectives |= {w.lower() for w in (*asset.colours, *asset.materials)}
-            for noun in (asset.object_class, *asset.synonyms):
+            for noun in self._nouns(asset):
                 noun = noun.lower()
                 if noun in ROOM_OF_NOUN or not re.fullmatch(r"[a-z][a-z' -]*", noun):
                     continue
@@ -103,6 +104,11 @@ class Lexicon:
         self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
         self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
         self.adjectives = frozenset(adjectives - EMPTY)
+
+    @staticmethod
+    def _nouns(asset: Asset) -> tuple[str, ...]:
+        """The class's name first, then the asset's synonyms, then what else people say."""
+        return (asset.object_class, *asset.synonyms, *MORE_NOUNS.get(asset.object_class, ()))
 
     def thing(self, word: Word) -> Thing:
         """What a word may stand for.
@@ -119,7 +125,7 @@ class Lexicon:
           ornament: probability of one more adjective, of size or of praise, that tells nothing apart.
         """
         nouns = self.nouns_of[asset.object_class]
-        own = [n for n in nouns if n == asset.object_class or n in {s.lower() for s in asset.synonyms}] or list(nouns)
+        own = [n for n in nouns if n in {s.lower() for s in self._nouns(asset)}] or list(nouns)
         noun = own[0] if len(own) == 1 or rng.random() < 0.5 else own[int(rng.integers(1, len(own)))]
         spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
         extra = [*sizes_of(asset), *(PRAISE[int(rng.integers(len(PRAISE)))] for _ in range(3))]

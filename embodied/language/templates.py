@@ -78,7 +78,7 @@ TEMPLATES: tuple[Template, ...] = (
           "chatty: you'll spot {thing}", "{thing} should be nearby", "mind {thing}", "chatty: watch out for {thing} by the way",
           "formal: {thing} is visible ahead", "chatty: I love {thing} over there"),
     *_all("stop_by", "stop next to {thing}", "stop by {thing}", "wait by {thing}", "stop in front of {thing}", "wait near {thing}",
-          "stop beside {thing}", "stop at {thing}", "terse: stop {thing}", "chatty: you are done when you are right by {thing}",
+          "stop beside {thing}", "stop at {thing}", "chatty: you are done when you are right by {thing}",
           "formal: halt beside {thing}", "stand next to {thing} and wait", "stop when you are near {thing}",
           "come to a stop at {thing}", "chatty: {thing} is where you want to stop", "stop once you reach {thing}",
           "your spot is beside {thing}", "pause at {thing}", "wait there at {thing}", "stop close to {thing}", "finish near {thing}"),
@@ -134,11 +134,17 @@ VERBS = (
     "press on", "keep on", "scoot", "shuffle", "hike",
 )
 """What {walk} may be, the plainest first."""
-SOON = ("immediately", "right away", "at once", "straight away", "promptly", "directly", "sharply", "instantly", "quickly", "here", "again", "carefully")
+SOON = ("immediately", "right away", "at once", "straight away", "directly", "sharply", "instantly", "right there", "without delay")
 """What {soon} may be."""
 PRAISE = (
     "nice", "lovely", "pretty", "fancy", "cozy", "comfy", "stylish", "neat", "old", "modern", "simple", "elegant", "beautiful", "shiny", "sturdy",
     "charming", "plain", "tidy", "funny", "interesting", "classy", "vintage", "handsome", "gorgeous", "ordinary", "cute", "rustic", "sleek",
+    "graceful", "quaint", "solid", "heavy", "dainty", "delicate", "elaborate", "expensive", "cheap", "fashionable", "trendy", "contemporary",
+    "traditional", "classic", "antique", "retro", "dusty", "spotless", "gleaming", "glossy", "bulky", "chunky", "slender", "slim", "curvy",
+    "angular", "boxy", "rounded", "sizeable", "decorative", "practical", "handy", "useful", "familiar", "typical", "unusual", "odd", "quirky",
+    "weird", "amazing", "awesome", "wonderful", "splendid", "pleasant", "attractive", "inviting", "comfortable", "homely", "humble", "basic",
+    "standard", "regular", "polished", "worn", "weathered", "well-kept", "brand-new", "designer", "handmade", "imposing", "impressive",
+    "eye-catching", "striking", "subtle", "minimalist", "ornate", "posh", "swanky", "snazzy", "adorable", "delightful", "exquisite",
 )
 """Adjectives that say nothing which could be checked; chatty people like them."""
 SIZES = ("large", "big", "huge", "small", "little", "tiny", "tall", "high", "long", "wide", "low", "narrow")
