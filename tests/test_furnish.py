@@ -201,6 +201,26 @@ def test_a_kitchen_has_sink_cooker_and_fridge_and_a_bathroom_toilet_and_basin():
         assert of_class(bathroom, "bathtub", "shower", "corner bathtub")
 
 
+def test_worktops_of_all_kitchens_are_in_use():
+    worktops = ("base cabinet", "drawer cabinet", "kitchen sink", "cooker", "kitchen island")
+    for house in houses():
+        for room in house.rooms:
+            if room.kind == "kitchen":
+                carriers = {p.id for p in house.placements if p.room == room.id and p.object_class in worktops}
+                things = {p.object_class for p in house.placements if p.parent in carriers}
+                assert len(things) >= 4, (house.seed, room.id, things)
+
+
+def test_no_picture_hangs_twice_while_there_are_others():
+    """The framed print and the poster of one image are the same picture."""
+    for house in houses():
+        hung = [p.asset.rsplit("/", 1)[-1].removeprefix("paper_") for p in house.placements
+                if p.object_class in ("picture", "painting", "poster")]
+        rooms = [p.room for p in house.placements if p.object_class in ("picture", "painting", "poster")]
+        assert len(set(zip(rooms, hung))) == len(hung), house.seed
+        assert max(map(hung.count, hung)) == 1 or len(hung) > 60, house.seed
+
+
 def test_beds_have_their_head_at_a_wall():
     found = 0
     for house in houses():
