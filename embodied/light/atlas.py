@@ -92,7 +92,8 @@ class Texels:
 
 
 def things_of(
-    parts: Sequence, *, density: float, budget: float, cache: Path, progress: Callable[[int, int], None] = lambda i, n: None
+    parts: Sequence, *, density: float, budget: float, cache: Path, finest: int = 8,
+    progress: Callable[[int, int], None] = lambda i, n: None
 ) -> tuple[Thing, ...]:
     """Group parts by owner and unwrap each; furniture from the cache.
 
@@ -100,6 +101,7 @@ def things_of(
       parts: embodied.parts.Part of one house; kind 'outdoor' must be left out.
       density: luxels per metre of walls, floors and ceilings.
       budget: luxels per piece of furniture.
+      finest: texels per luxel at most.
     """
     groups: dict[tuple, list] = {}
     for p in parts:
@@ -115,15 +117,16 @@ def things_of(
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            things.append(Thing(owner, room, kind, flat, finishes, _fineness(kind, flat, finishes, density), glass))
+            things.append(Thing(owner, room, kind, flat, finishes, min(finest, _fineness(kind, flat, finishes, density)), glass))
     return tuple(things)
 
 
-def atlas_of(things: Sequence[Thing], widest: int = 4096) -> Atlas:
+def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000) -> Atlas:
     """Lay the things of a house out on pages, by room and fineness.
 
     Args:
       widest: a page's largest side in texels.
+      most: texels that a page may have, if one thing alone does not need more; composing a page takes 150 bytes for each.
     """
     owners = tuple(dict.fromkeys(t.owner for t in things))
     number = {o: i for i, o in enumerate(owners)}
@@ -135,9 +138,11 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096) -> Atlas:
     for (_, fineness, glass), mine in shelves.items():
         limit = widest // fineness
         while mine:
-            width = int(min(limit, max(128, 1.05 * np.sqrt(sum(int(t.flat.size.prod()) for t in mine)))))
+            whole = min(sum(int(t.flat.size.prod()) for t in mine), most / fineness**2)
+            width = int(min(limit, max(128, 1.05 * np.sqrt(whole))))
             places, _ = pack(np.array([t.flat.size for t in mine]), width)
-            inside = [bool(y + t.flat.size[1] <= limit) for t, (_, y) in zip(mine, places)]
+            tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in mine)))
+            inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(mine, places)]
             if not any(inside):
                 raise ValueError(f"{mine[0].owner!r} needs an atlas of {mine[0].flat.size} luxels, over {limit}; lower the density")
             pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
@@ -252,13 +257,19 @@ def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped
 
 
 def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float) -> int:
-    """Texels per luxel: floors 5, patterned walls 3, else 2; furniture by its pattern and density."""
+    """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain.
+
+    Floors get 200 texels per metre, patterned walls and ceilings 120 and 80, patterned furniture 180 where
+    its luxels are not too coarse, mirrors 400.
+    """
     used = np.bincount(flat.part, weights=areas_of(flat.corners), minlength=len(finishes))
     patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
     if kind in SHELL:
-        return {"floor": 5, "wall": 3, "ceiling": 2}[kind] if patterned else 2
+        return round({"floor": 200, "wall": 120, "ceiling": 80}[kind] / density) if patterned else 2
     side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
-    return int(np.clip(round(4.5 * density / side), 2, 4)) if patterned else 2
+    if sum(a for a, f in zip(used, finishes) if f.mirror) > 0.15 * used.sum():
+        return int(np.clip(round(400 / side), 2, 8))
+    return int(np.clip(round(180 / side), 2, max(4, round(160 / density)))) if patterned else 2
 
 
 def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:

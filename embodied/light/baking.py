@@ -1,7 +1,7 @@
 """Light a house once: from House to a folder of pages that renderers show and tracers read.
 
-A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the settings
-and the version. Every stage is a file of its own, so that an interrupted bake goes on where it
+A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the looks of
+all its meshes and materials, the settings and the version. Every stage is a file of its own, so that an interrupted bake goes on where it
 stopped; manifest.json is written last and lists every file with its checksum.
 """
 
@@ -14,7 +14,7 @@ import json
 import shutil
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +37,7 @@ from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
 from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import Exposure, expose
 from embodied.lit import LitMesh, LitPages
+from embodied.part import Part
 from embodied.parts import house_parts, owners
 
 Progress = Callable[[str, float], None]
@@ -107,9 +108,20 @@ def progress_bar() -> Iterator[Progress]:
         yield tell
 
 
-def key_of(house: House, settings: Settings) -> str:
-    """What a bake is filed under."""
-    return digest("light", VERSION, house.digest, dataclasses.asdict(settings))[:24]
+def key_of(house: House, catalogue, settings: Settings) -> str:
+    """What a bake is filed under: another catalogue, model or material makes another bake."""
+    return digest("light", VERSION, house.digest, looks_of(house_parts(house, catalogue)), dataclasses.asdict(settings))[:24]
+
+
+def looks_of(parts: Sequence[Part]) -> str:
+    """Hex digest of all meshes, finishes and colour maps by content, wherever they lie on disk."""
+    maps = {t: digest(Path(t).read_bytes()) for t in sorted({p.mesh.finish.texture for p in parts} - {None})}
+    meshes: dict[int, str] = {}
+    for mesh in (p.mesh for p in parts):
+        if id(mesh) not in meshes:
+            finish = dataclasses.replace(mesh.finish, texture=maps.get(mesh.finish.texture), normal_map=None, roughness_map=None)
+            meshes[id(mesh)] = digest(*(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)), repr(finish))
+    return digest([meshes[id(p.mesh)] for p in parts])
 
 
 def bake(house: House, catalogue, cache: Path, settings: Settings | str = "normal", *,
@@ -124,7 +136,7 @@ def bake(house: House, catalogue, cache: Path, settings: Settings | str = "norma
       LightError: Mitsuba or LLVM is missing, or the bake disagrees with the path tracer.
     """
     settings = settings_of(settings) if isinstance(settings, str) else settings
-    folder = Path(cache) / "light" / key_of(house, settings)
+    folder = Path(cache) / "light" / key_of(house, catalogue, settings)
     if (done := _open(folder, house)) is not None:
         return done
     return _make(house, catalogue, Path(cache), folder, settings, progress)
@@ -415,6 +427,6 @@ def _read_picture(path: Path) -> np.ndarray:
     return np.ascontiguousarray(image[..., ::-1])
 
 
-def forget(cache: Path, house: House, settings: Settings) -> None:
+def forget(cache: Path, house: House, catalogue, settings: Settings) -> None:
     """Delete the bake of `house`, finished or not."""
-    shutil.rmtree(Path(cache) / "light" / key_of(house, settings), ignore_errors=True)
+    shutil.rmtree(Path(cache) / "light" / key_of(house, catalogue, settings), ignore_errors=True)

@@ -101,9 +101,9 @@ def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels
         ball = mi.warp.square_to_uniform_sphere(u - dr.floor(u))
         d = dr.normalize(straight + ball * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
-        luxel, hit, front, _ = radiosity.hit_luxel(space, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
+        near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
         far = radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS
-        total += dr.select(hit, dr.gather(mi.Color3f, table, luxel, hit & front), far)
+        total += dr.select(hit, near, far)
         dr.eval(total)
     share = metal[i, None]
     tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])

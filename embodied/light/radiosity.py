@@ -295,6 +295,34 @@ def hit_luxel(space: Space, ray, active=True):
     mi = mitsuba()
     import drjit as dr
 
+    q, w, height, base, hit, front, near = _met(space, ray, active)
+    x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
+    y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
+    return dr.gather(mi.UInt32, space.luxel_of, base + y * w + x, hit), hit, front, near
+
+
+def hit_colour(space: Space, table, ray, active=True):
+    """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits anything."""
+    mi = mitsuba()
+    import drjit as dr
+
+    q, w, height, base, hit, front, _ = _met(space, ray, active)
+    x, y = dr.clip(q.x - 0.5, 0.0, mi.Float(w) - 1), dr.clip(q.y - 0.5, 0.0, mi.Float(height) - 1)
+    x0, y0 = mi.UInt32(x), mi.UInt32(y)
+    fx, fy = x - mi.Float(x0), y - mi.Float(y0)
+    out = mi.Color3f(0.0)
+    for dx, wx in ((0, 1 - fx), (1, fx)):
+        for dy, wy in ((0, 1 - fy), (1, fy)):
+            spot = base + dr.minimum(y0 + dy, height - 1) * w + dr.minimum(x0 + dx, w - 1)
+            out += dr.gather(mi.Color3f, table, dr.gather(mi.UInt32, space.luxel_of, spot, hit), hit & front) * (wx * wy)
+    return out, hit
+
+
+def _met(space: Space, ray, active):
+    """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the front, within 12 mm."""
+    mi = mitsuba()
+    import drjit as dr
+
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     hit = h.is_valid() & active
     f = h.prim_index
@@ -303,12 +331,9 @@ def hit_luxel(space: Space, ray, active=True):
     at = lambda c: dr.gather(mi.Point2f, space.luxel_xy, f * 3 + c, hit)
     q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
     w, height = dr.gather(mi.UInt32, space.width, page, hit), dr.gather(mi.UInt32, space.height, page, hit)
-    x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
-    y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
-    luxel = dr.gather(mi.UInt32, space.luxel_of, dr.gather(mi.UInt32, space.base, page, hit) + y * w + x, hit)
     n = dr.gather(mi.Normal3f, space.normal, f, hit)
     front = (dr.dot(n, ray.d) < 0) | dr.gather(mi.Bool, space.thin, f, hit)
-    return luxel, hit, front, h.t < 0.012
+    return q, w, height, dr.gather(mi.UInt32, space.base, page, hit), hit, front, h.t < 0.012
 
 
 def portal_scene(portals: Sequence[Portal]):

@@ -29,6 +29,8 @@ DARKEST = 2e-3
 """Light of a room (100 cd/m2) below which exposure follows no more: by moonlight rooms stay dark."""
 WHITE = 5.0
 """Value that the curve brings to full white."""
+LIFT, SHOULDER = 1.12, 0.78
+"""Factor on sRGB values, and the value above which they are bent so that white stays 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +104,16 @@ def _gain(light: np.ndarray, level: float) -> np.ndarray:
 def develop(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Radiance times gain as sRGB in [0, 1]: extended Reinhard, half on luminance and half per channel.
 
+    Then lifted a little, with a shoulder that keeps sunlit walls short of plain white.
+
     Source: Reinhard et al. 2002, eq. 4, with white at `WHITE`.
     """
     x = np.asarray(radiance, np.float32) * np.asarray(gain, np.float32)
     y = np.maximum(x @ np.array([0.2126, 0.7152, 0.0722], np.float32), 1e-9)[..., None]
     by_luminance = x * (_curve(y) / y)
-    return gamma(0.5 * (np.minimum(by_luminance, 1.0) + _curve(x)) * np.float32(1.12))
+    shown = gamma(0.5 * (np.minimum(by_luminance, 1.0) + _curve(x))) * np.float32(LIFT)
+    over = np.maximum(shown - np.float32(SHOULDER), 0.0)
+    return shown - over**2 * np.float32((LIFT - 1) / (LIFT - SHOULDER) ** 2)
 
 
 def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
