@@ -58,6 +58,6 @@ def light(args: argparse.Namespace, catalogue) -> int:
     """The comparison of all ways of drawing."""
     from embodied.light.bench import compare
 
-    report = compare(catalogue, args.cache, args.out, seed=args.seed)
+    report = compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
     show(args, report.facts, report.text)
     return 0

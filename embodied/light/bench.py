@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes.util
-import dataclasses
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -15,17 +14,20 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from assets.cache import write_bytes, write_json
-from embodied.generate import generate_house
-from embodied.house import House, Sky
+from embodied import gl
+from embodied.generate import HouseConfig, generate_house
+from embodied.house import House
 from embodied.light.backend import device
 from embodied.light.baking import Bake, bake
 from embodied.light.reference import Tracer
 from embodied.navgraph import build_graph
 from embodied.render import Renderer, camera_at
 
+AREA = (35.0, 70.0)
+"""Square metres of the bench's flats, each of which is baked and path-traced."""
 DRAWN = ("unlit", "baked", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
 WAYS = (*DRAWN, "glossy", "diffuse", "reference")
-TIMES = (Sky(10.5, "clear"), Sky(13.0, "overcast"), Sky(18.6, "clear"), Sky(22.0, "clear"))
+TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
 VFOV = math.radians(65.0)
 
@@ -51,7 +53,7 @@ class Report:
 
 def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4, views: int = 3, settings: str = "normal",
             size: tuple[int, int] = (160, 240), rays: int = 96, progress: Callable[[str], None] = lambda text: None) -> Report:
-    """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.png and `out`/light.json.
+    """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Args:
       houses: seeds from `seed` on, each at another time of day.
@@ -60,27 +62,33 @@ def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4
     """
     shots: list[Shot] = []
     bakes: list[Bake] = []
+    kinds: list[str] = []
     for k in range(houses):
-        house = generate_house(seed + k, catalogue=catalogue)
-        sky = dataclasses.replace(TIMES[k % len(TIMES)], north=house.sky.north)
-        house = dataclasses.replace(house, sky=sky)
-        progress(f"house {seed + k} at {sky.hour:g} h")
+        hour, weather = TIMES[k % len(TIMES)]
+        house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
+        progress(f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects")
         bakes.append(bake(house, catalogue, cache, settings))
-        shots += draw(house, catalogue, bakes[-1], viewpoints(house, catalogue, views), size, rays)
+        chosen = viewpoints(house, catalogue, views, kinds)
+        kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
+        shots += draw(house, catalogue, bakes[-1], chosen, size, rays)
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / "light.png", cv2.imencode(".png", sheet(shots)[..., ::-1])[1].tobytes())
+    write_bytes(out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes())
     write_json(out / "light.json", facts, indent=1)
     return Report(facts, table(facts))
 
 
-def viewpoints(house: House, catalogue, count: int) -> list[tuple[str, np.ndarray, float]]:
-    """Rooms of different kinds, largest first: id, eye, and the yaw with the longest view."""
+def viewpoints(house: House, catalogue, count: int, shown: Sequence[str] = ()) -> list[tuple[str, np.ndarray, float]]:
+    """Rooms of different kinds: id, eye, and the yaw with the longest view.
+
+    Args:
+      shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the largest.
+    """
     graph = build_graph(house, catalogue)
     area = {r.id: abs(float(np.ptp(np.array(r.polygon), axis=0).prod())) for r in house.rooms}
     found, kinds = [], set()
-    for room in sorted(house.rooms, key=lambda r: -area[r.id]):
+    for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
         if not nodes or room.kind in kinds or len(found) == count:
             continue
@@ -127,7 +135,7 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
         rows.append(row)
     pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
     return {
-        "rows": rows, "views": [list(v) for v in views], "device": device(),
+        "rows": rows, "views": [list(v) for v in views], "device": device(), "renderer": str(gl.info()),
         "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),
         "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
         "disk_mb": float(np.median(pages)), "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
@@ -138,12 +146,12 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
 def table(facts: dict) -> str:
     """The measures as Markdown."""
     number = lambda x, form: "" if x is None else format(x, form)
-    lines = ["| way | ms per 256 x 256 | PSNR / SSIM to reference | PSNR / SSIM to diffuse reference |", "|---|---|---|---|"]
+    lines = ["| way | ms per 256 × 256 | PSNR / SSIM to reference | PSNR / SSIM to diffuse reference |", "|---|---|---|---|"]
     for r in facts["rows"]:
         cells = [f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}" for t in ("reference", "diffuse")]
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {cells[0]} | {cells[1]} |")
     lines.append(
-        f"\nMedians of {len(facts['views'])} views. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
+        f"\nMedians of {len(facts['views'])} views of one run; {facts['renderer']}. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
         f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
     )
     return "\n".join(lines)

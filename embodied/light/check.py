@@ -12,12 +12,20 @@ from embodied.seeds import stream
 
 LUXELS, PATHS = 20, 6000
 LIMIT = 0.10
-"""Largest relative difference that passes, for the median of the signed differences (a bias) and for the
-median of their sizes less twice the path tracer's own standard error (a scatter). Medians, because a
-luxel at a shadow's edge or behind a wardrobe may well differ more: it is smoothed with its neighbours."""
+"""Largest relative difference that passes, for the median of the signed differences (a bias) and, luxel by
+luxel, beyond twice the path tracer's own standard error."""
+MOST = 0.25
+"""Share of luxels that may differ by more than `LIMIT`.
+
+Why not none: a luxel is smoothed with its neighbours, which is what takes the noise out, so that one in ten of a
+good bake, in the narrow shadow below a shelf or behind a wardrobe, differs by more (measured on 60 luxels of a
+flat of 46 m2 with 16,000 paths each: 10 % of them by more than 10 % beyond two standard errors, 5 % by more than 25 %).
+"""
+AGAIN = 5
+"""A bake that seems wrong is judged by this many times more luxels before it is refused."""
 
 
-def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first") -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and (k, 3).
 
     Luxels that get less than a twentieth of the house's middle light are left out: there the
@@ -29,7 +37,7 @@ def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS) -> tuple[n
     fit = s.lux.shell & s.light.good & (whole @ y > 0.05 * np.median(whole[s.lux.shell] @ y))
     # beside a shadow's edge a luxel's mean and its centre differ by nature
     fit &= (s.light.sun < 1e-3) | (s.light.sun > 0.98 * np.clip(s.lux.normal @ s.outdoors.sun_direction, 0, 1))
-    rng = stream(s.house.seed, "light", "check")
+    rng = stream(s.house.seed, "light", "check", name)
     pick = rng.choice(np.nonzero(fit)[0], min(luxels, int(fit.sum())), replace=False)
     space = radiosity.space_of(s.atlas, s.lux.texels, s.outdoors.picture)
     lights = paths.lights_of(s.atlas, s.lux, space, portals_of(s.house), s.lamps, s.outdoors)
@@ -40,22 +48,31 @@ def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS) -> tuple[n
 
 
 def check(solved) -> dict:
-    """How far the bake is off: {'luxels', 'bias', 'scatter'}.
+    """How far the bake is off: {'luxels', 'bias', 'beyond'}, the last being the share of luxels that differ too much.
 
     Raises:
-      LightError: either is over `LIMIT`.
+      LightError: the bias is over `LIMIT` or that share over `MOST`, at `LUXELS` random luxels and again at `AGAIN` times as many.
     """
     if not solved.lux.shell.any():
         return {"luxels": 0}
-    baked, traced, error, position = compare(solved)
-    off = (baked - traced) / np.maximum(traced, 1e-6)
-    beyond = np.maximum(np.abs(off) - 2 * error / np.maximum(traced, 1e-6), 0.0)
-    result = {"luxels": len(off), "bias": round(float(np.median(off)), 4), "scatter": round(float(np.median(beyond)), 4)}
-    if abs(result["bias"]) > LIMIT or result["scatter"] > LIMIT:
-        worst = int(np.argmax(beyond))
+    result, told = judge(*compare(solved))
+    if told:
+        result, told = judge(*compare(solved, luxels=AGAIN * LUXELS, name="again"))
+    if told:
         raise LightError(
-            f"the bake of house {solved.house.name!r} disagrees with the path tracer at {len(off)} luxels: bias {result['bias']:+.1%}, "
-            f"scatter {result['scatter']:.1%} (at most {LIMIT:.0%} each); worst at {position[worst].round(2).tolist()}: "
-            f"baked {baked[worst]:.3g}, traced {traced[worst]:.3g}; raise the settings' rays, or report the house's seed"
+            f"the bake of house {solved.house.name!r} disagrees with the path tracer at {result['luxels']} luxels: bias {result['bias']:+.1%} "
+            f"(at most {LIMIT:.0%}), {result['beyond']:.0%} of them by more than {LIMIT:.0%} (at most {MOST:.0%}); {told}; "
+            "raise the settings' rays, or report the house's seed"
         )
     return result
+
+
+def judge(baked: np.ndarray, traced: np.ndarray, error: np.ndarray, position: np.ndarray) -> tuple[dict, str]:
+    """The verdict on what `compare` returns: numbers, and the worst luxel in words; no words if the bake passes."""
+    off = (baked - traced) / np.maximum(traced, 1e-6)
+    beyond = np.abs(off) - 2 * error / np.maximum(traced, 1e-6) - LIMIT
+    result = {"luxels": len(off), "bias": round(float(np.median(off)), 4), "beyond": round(float(np.mean(beyond > 0)), 4)}
+    if abs(result["bias"]) <= LIMIT and result["beyond"] <= MOST:
+        return result, ""
+    worst = int(np.argmax(beyond))
+    return result, f"worst at {position[worst].round(2).tolist()}: baked {baked[worst]:.3g}, traced {traced[worst]:.3g}"
