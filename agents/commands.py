@@ -11,7 +11,7 @@ import dataclasses
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import joblib
@@ -217,8 +217,12 @@ def train_agent(
     return train(agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation)
 
 
-def run_eval(args: argparse.Namespace, note: Note = print) -> int:
-    """Tables 4.3 to 4.5 for one agent and the agents without learning, and why its episodes fail."""
+def run_eval(args: argparse.Namespace, note: Note = print, watch: Callable[[Iterable[str]], Iterable[str]] = iter) -> int:
+    """Tables 4.3 to 4.5 for one agent and the agents without learning, and why its episodes fail.
+
+    Args:
+      watch: wraps the iterator over agent names (a progress bar).
+    """
     torch.set_num_threads(args.threads)
     data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
     rows, extra = [], {}
@@ -236,13 +240,18 @@ def run_eval(args: argparse.Namespace, note: Note = print) -> int:
                 extra[split] = about(episodes, worlds)
 
         rows += evaluate(
-            data, split, {n: judged[n] for n in names}, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep
+            data, split, {n: judged[n] for n in names}, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep,
+            watch=watch,
         )
-    note(markdown(rows, ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")))
-    note(json.dumps(extra, indent=1))
+    facts = {"rows": json.loads(as_json(rows)), "behaviour": extra}
+    if args.json:
+        note(json.dumps(facts, indent=1))
+    else:
+        note(markdown(rows, ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")))
+        note(json.dumps(extra, indent=1))
     if args.out:
         save(rows, args.out, "table")
-        write_json(args.out / "behaviour.json", {"rows": json.loads(as_json(rows)), "behaviour": extra}, indent=1)
+        write_json(args.out / "behaviour.json", facts, indent=1)
     return 0
 
 

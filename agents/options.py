@@ -115,3 +115,4 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results (default: %(default)s)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")

@@ -20,9 +20,10 @@ from tqdm import tqdm
 from assets.cache import default_cache
 from assets.importer import Recipe, import_model, scaled
 from assets.own import OwnModel, import_own, read_own
-from assets.packs import pack_of
+from assets.packs import find_packs, pack_of
 from assets.records import Asset, Finish, MeshPart
 from assets.rows import CatalogueError, check_classes, read_json, read_models
+from assets.sh3f import open_pack
 
 DATA = Path(__file__).parent / "data"
 
@@ -82,6 +83,12 @@ class Catalogue:
         """
         self._asset(key)
         return _makers()[key].look if key not in self._recipes else {}
+
+    def missing(self) -> tuple[str, ...]:
+        """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
+        libraries = [open_pack(p) for p in find_packs(self.packs)]
+        wanted = {k: self._recipes[k].model or k for k in self._recipes if k not in self._own}
+        return tuple(sorted(k for k, model in wanted.items() if not any(model in p.entries for p in libraries)))
 
     def build(self, keys: Sequence[str] = ()) -> None:
         """Import the models `keys` (all if none) into the cache, with a progress bar; what is

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Self, TypeVar
+
+from tqdm import tqdm
 
 from assets.cache import default_cache
+
+T = TypeVar("T")
+PATIENCE = 2.0
+"""Seconds after which a bar appears."""
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +49,40 @@ def catalogue_of(args: argparse.Namespace):
     from assets.catalogue import load_catalogue
 
     return load_catalogue(args.cache, tuple(args.pack), tuple(args.own))
+
+
+class Stages:
+    """A bar over the named stages of a command; it appears when they take longer than two seconds."""
+
+    def __init__(self, *names: str) -> None:
+        self._names, self._bar = iter(names), tqdm(total=len(names), delay=PATIENCE, leave=False, unit="stage")
+        self._bar.set_description_str(next(self._names))
+
+    def next(self) -> None:
+        """The present stage is done."""
+        self._bar.update()
+        self._bar.set_description_str(next(self._names, "done"))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+
+def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> Iterable[T]:
+    """`items`, with a progress bar that appears when they take longer than two seconds."""
+    return tqdm(items, name, total=total, unit=unit, delay=PATIENCE, leave=False)
+
+
+def fetch(catalogue, house) -> None:
+    """Import all models and materials that `house` needs into the cache, with a bar if that takes a while."""
+    surfaces = (*house.rooms, *house.openings)
+    finishes = {getattr(s, f.name) for s in surfaces for f in dataclasses.fields(s) if f.name.endswith("finish")} - {None}
+    models = dict.fromkeys((p.asset, p.size, p.params) for p in house.placements)
+    jobs = [(catalogue.finish, (key,)) for key in sorted(finishes)] + [(catalogue.mesh, m) for m in models]
+    for job, arguments in bar(jobs, "furniture and materials", "model"):
+        job(*arguments)
 
 
 def show(args: argparse.Namespace, result: dict, text: str) -> None:

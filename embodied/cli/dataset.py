@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     config = DatasetConfig(args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language)
 
     def watch(jobs, total):
-        return tqdm(jobs, "houses", total=total, unit="house", disable=args.json)
+        return tqdm(jobs, "houses", total=total, unit="house")
 
     build_dataset(
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray,

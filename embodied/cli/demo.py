@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.recording import add_sinks, viewers_of
 
 SEED = 3
@@ -45,7 +45,9 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     catalogue, seconds = catalogue_of(args), {}
     args.out.mkdir(parents=True, exist_ok=True)
     with timed("a house with people in it", seconds):
-        house, graph, routes = inhabited(generate_house(args.seed, catalogue=catalogue), catalogue, args)
+        house = generate_house(args.seed, catalogue=catalogue)
+        fetch(catalogue, house)
+        house, graph, routes = inhabited(house, catalogue, args)
         house.save(args.out / "house.json")
         save_plan(house, args.out / "plan.png", graph=graph)
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, {len(graph.ids)} viewpoints")
@@ -113,7 +115,8 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
 
     agent, encoder = load_agent(), load_encoder()
     with open_world(world.house, world.catalogue, args.cache, graph=world.graph, size=FACES) as plain:
-        features = encode_panoramas(encoder, (plain.panorama(n) for n in range(len(world.graph.ids))))
+        nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
+        features = encode_panoramas(encoder, (plain.panorama(n) for n in nodes))
     bank = FeatureBank({world.name: features}, encoder.digest)
     pool = hanna_pool(world, seed=args.seed)
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
@@ -130,7 +133,7 @@ def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
     from viz.sinks import Sinks, open_recording
 
     with open_recording(Sinks(path, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as stream:
-        for _ in record(stream, world, episode.task, episode.steps):
+        for _ in record(stream, world, episode.task, bar(episode.steps, "recording", "step")):
             pass
     return {
         "agent": episode.agent, "request": episode.task.request, "success": bool(success(episode, world.graph)),

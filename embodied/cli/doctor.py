@@ -12,7 +12,8 @@ import platform
 import shutil
 from dataclasses import asdict, dataclass
 
-from embodied.cli.common import add_cache, add_json, add_packs, show
+from embodied.cli import message_of
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 
 LIBRARIES = (
     "embodied", "mujoco", "dm-control", "trimesh", "torch", "opencv-python-headless",
@@ -41,20 +42,24 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    findings = [versions(), renderer(), packs(args), path_tracer(), vulkan(), disk(args)]
+    findings = []
+    for look in (versions, renderer, packs, path_tracer, vulkan, disk):
+        findings.append(look(args))
+        if not args.json:
+            print(line(findings[-1]), flush=True)
     ok = all(f.ok for f in findings if f.needed)
-    lines = []
-    for f in findings:
-        mark = "ok  " if f.ok else ("FAIL" if f.needed else "note")
-        lines.append(f"[{mark}] {f.name:<12} {f.text}")
-        if not f.ok:
-            lines.append(f"       {'':<12} -> {f.remedy}")
-    lines.append("Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.")
-    show(args, {"ok": ok, "findings": [asdict(f) for f in findings]}, "\n".join(lines))
+    show(args, {"ok": ok, "findings": [asdict(f) for f in findings]},
+         "Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.")
     return 0 if ok else 1
 
 
-def versions() -> Finding:
+def line(f: Finding) -> str:
+    """What is shown of a finding, with the remedy below it."""
+    mark = "ok  " if f.ok else ("FAIL" if f.needed else "note")
+    return f"[{mark}] {f.name:<12} {f.text}" + ("" if f.ok else f"\n       {'':<12} -> {f.remedy}")
+
+
+def versions(_: argparse.Namespace) -> Finding:
     """Python and library versions; every one listed is needed."""
     found, missing = [f"Python {platform.python_version()}"], []
     for name in LIBRARIES:
@@ -66,7 +71,7 @@ def versions() -> Finding:
     return Finding("versions", not missing, text, "run `make setup`, or pip install -e . -c constraints.txt")
 
 
-def renderer() -> Finding:
+def renderer(_: argparse.Namespace) -> Finding:
     """The off-screen renderer that MuJoCo gets."""
     from embodied.gl import REMEDY, GLError, info
 
@@ -78,18 +83,21 @@ def renderer() -> Finding:
 
 
 def packs(args: argparse.Namespace) -> Finding:
-    """The furniture libraries."""
-    from assets.packs import PackError, find_packs
+    """The furniture libraries, and whether they hold every model of the catalogue."""
+    from assets.packs import find_packs
 
+    remedy = "apt-get install sweethome3d-furniture (version 1.8 or later), or name existing files with --pack and folders with --own"
     try:
-        found = find_packs(tuple(args.pack))
-    except PackError as e:
-        return Finding("furniture", False, str(e), "name existing files with --pack, or none for those of the system")
+        found, missing = find_packs(tuple(args.pack)), catalogue_of(args).missing()
+    except (ValueError, OSError) as e:
+        return Finding("furniture", False, message_of(e), remedy)
     text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
-    return Finding("furniture", bool(found), text, "apt-get install sweethome3d-furniture, or name files with --pack")
+    if missing:
+        text += f"; {len(missing)} models of the catalogue are in none of them, e.g. {', '.join(missing[:3])}"
+    return Finding("furniture", not missing, text, remedy)
 
 
-def path_tracer() -> Finding:
+def path_tracer(_: argparse.Namespace) -> Finding:
     """Mitsuba's back end: CUDA or LLVM; without it houses are drawn unlit."""
     from embodied.light.backend import LightError, device
 
@@ -99,7 +107,7 @@ def path_tracer() -> Finding:
         return Finding("path tracer", False, str(e), "apt-get install libllvm19; until then use --quality unlit", False)
 
 
-def vulkan() -> Finding:
+def vulkan(_: argparse.Namespace) -> Finding:
     """The loader that the Filament back end needs."""
     import ctypes.util
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, show
 from embodied.datasets.scale import KINDS
 
 COLUMNS = {
@@ -46,6 +46,10 @@ def run(args: argparse.Namespace) -> int:
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names = args.agent or list(AGENTS[args.kind])
+
+    def watch(agents):
+        return bar(agents, "agents", "agent")
+
     rows = []
     for split in args.split:
         def keep(name, episodes, split=split):
@@ -56,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         if set(names) & set(LOOKING):
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
-        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds)
+        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
         facts = fingerprint(data=data.digest, seed=args.seed, splits=args.split, agents=names, tasks=args.tasks)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, show
 from embodied.cli.options import add_options, read_options
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
@@ -34,18 +34,25 @@ def run(args: argparse.Namespace) -> int:
     from embodied.navgraph import build_graph, to_matterport
     from embodied.plan import save_plan
 
-    catalogue = catalogue_of(args)
-    house = generate_house(args.seed, read_options(args, HouseConfig), catalogue)
-    graph = build_graph(house, catalogue)
-    args.out.mkdir(parents=True, exist_ok=True)
-    house.save(args.out / "house.json")
-    to_matterport(graph, house, args.out / "connectivity.json")
-    save_plan(house, args.out / "plan.png", graph=graph)
-    if not args.no_mjcf:
-        note("writing house.xml with its meshes and textures")
-        export_mjcf(house, catalogue, args.out)
-    if args.glb:
-        export_glb(house, catalogue, args.out / "house.glb")
+    catalogue, config = catalogue_of(args), read_options(args, HouseConfig)
+    with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
+        house = generate_house(args.seed, config, catalogue)
+        stages.next()
+        graph = build_graph(house, catalogue)
+        stages.next()
+        args.out.mkdir(parents=True, exist_ok=True)
+        house.save(args.out / "house.json")
+        to_matterport(graph, house, args.out / "connectivity.json")
+        save_plan(house, args.out / "plan.png", graph=graph)
+        stages.next()
+        if args.glb or not args.no_mjcf:
+            fetch(catalogue, house)
+        stages.next()
+        if not args.no_mjcf:
+            export_mjcf(house, catalogue, args.out)
+        stages.next()
+        if args.glb:
+            export_glb(house, catalogue, args.out / "house.glb")
     facts = {
         "seed": args.seed, "digest": house.digest, "area_m2": round(house.area, 1), "rooms": len(house.rooms),
         "objects": len(house.placements), "nodes": len(graph.ids), "out": str(args.out),

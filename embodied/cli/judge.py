@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from embodied.cli.common import bar
+
 
 def add(parser: argparse.ArgumentParser) -> None:
     from agents import options
@@ -14,4 +16,4 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from agents import commands
 
-    return commands.run_eval(args)
+    return commands.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))

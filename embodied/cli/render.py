@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
 
 QUALITIES = ("unlit", "baked", "glossy", "reference")
 BACKENDS = ("classic", "filament")
@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError("--node and --equirect go together: --node 3 --equirect node3.png")
     catalogue = catalogue_of(args)
     with open_folder(args.folder, catalogue, args.cache, size=args.size, quality=args.quality, backend=args.backend) as world:
+        fetch(catalogue, world.house)
         if args.node is not None:
             return one(args, world)
         path = world.render_all(progress=True)

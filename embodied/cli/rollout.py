@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.demo import texts
 from embodied.cli.recording import add_sinks, viewers_of
 
@@ -48,11 +48,12 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     if args.episodes < 1:
         raise ValueError(f"--episodes should be at least 1, got {args.episodes}")
     with world_of(args) as world:
+        fetch(world.catalogue, world.house)
         pool = find_pool(world, seed=args.seed)
         if args.episodes > len(pool):
             raise ValueError(f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house")
         tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
-        episodes = play(lambda: HelpEnv({world.name: world}), policy_of(args.agent), tasks, seed=args.seed, agent=args.agent)
+        episodes = play(lambda: HelpEnv({world.name: world}), policy_of(args.agent), bar(tasks, "episodes", "episode"), seed=args.seed, agent=args.agent)
         rows = []
         for number, episode in enumerate(episodes):
             row = {"task": episode.task.id, "request": episode.task.request}
@@ -98,15 +99,13 @@ def numbered(path: Path, number: int, total: int) -> Path:
 
 def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
     """Write what the agent saw as a video with smooth motion; returns the path."""
-    from tqdm import tqdm
-
     from viz.video import camera_track, captioned, write_video
 
     poses = [episode.task.start, *(s.next_pose for s in episode.steps)]
     track = camera_track(world.graph.positions, poses)
     drawn = (
         captioned(world.renderer.view(c[:3], c[3], c[4], 1.2, size).rgb, episode.task.request)
-        for c in tqdm(track, "video", unit="frame", leave=False)
+        for c in bar(track, "video", "frame")
     )
     write_video(path, drawn, size)
     note(f"{path}: {len(track)} frames")
@@ -120,6 +119,6 @@ def record_episode(world, episode, rrd: Path | None, viewers: tuple[str, ...]) -
     from viz.sinks import Sinks, open_recording
 
     with open_recording(Sinks(rrd, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
-        for _ in record(r, world, episode.task, episode.steps):
+        for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):
             pass
     return str(rrd or ", ".join(viewers))

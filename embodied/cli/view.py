@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
 from embodied.cli.recording import add_sinks, viewers_of
 
 
@@ -76,7 +76,7 @@ def record_one(args: argparse.Namespace, found) -> int:
         with Dataset(args.data).open_world(episode.task.world, catalogue, args.cache, quality=args.quality, size=384) as world:
             sinks, blueprint, about = Sinks(path, viewers), blueprint_of(world.house, episode), texts(world.fingerprint)
             with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as r:
-                for _ in record(r, world, episode.task, episode.steps):
+                for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):
                     pass
         note(f"recorded {episode.task.id}")
         show(args, {"recording": str(path)}, f"wrote {path}; open it with: embodied view {path}")
