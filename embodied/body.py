@@ -13,7 +13,11 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from dm_control import composer, mjcf
+
+try:
+    from dm_control import composer, mjcf
+except ImportError as e:
+    raise ImportError(f"a driven body needs dm-control ({e}); pip install --no-deps dm-control") from e
 
 from embodied.env import HannaEnv, HelpEnv
 from embodied.geometry import wrap

@@ -16,7 +16,7 @@ from embodied.cli import message_of
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 
 LIBRARIES = (
-    "embodied", "mujoco", "dm-control", "trimesh", "torch", "opencv-python-headless",
+    "embodied", "mujoco", "trimesh", "torch", "opencv-python-headless",
     "rerun-sdk", "gymnasium", "mitsuba", "numpy", "shapely",
 )
 FREE_DISK = 2.0
@@ -43,7 +43,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     findings = []
-    for look in (versions, renderer, packs, path_tracer, vulkan, disk):
+    for look in (versions, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -116,6 +116,15 @@ def vulkan(_: argparse.Namespace) -> Finding:
         "Vulkan", found is not None, found or "no Vulkan loader",
         "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers", False,
     )
+
+
+def body(_: argparse.Namespace) -> Finding:
+    """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
+    try:
+        text, found = f"dm-control {importlib.metadata.version('dm-control')}", True
+    except importlib.metadata.PackageNotFoundError:
+        text, found = "no dm-control", False
+    return Finding("driven body", found, text, "only environments with wheels=True need it: pip install --no-deps dm-control", False)
 
 
 def disk(args: argparse.Namespace) -> Finding:
