@@ -336,7 +336,11 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
         depth = 1.0
     if swings_here:
         depth = max(depth, width + 0.05)
-    return [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
+    found = [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
+    if swings_here and o.angle > 0.6 * math.pi:  # folded back against the wall beside the door
+        leaf = _leaf(wall, s0, s1, o)
+        found.append(box(leaf.x, leaf.y, width, 0.12, leaf.yaw, z, z + o.head))
+    return found
 
 
 def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
