@@ -1,6 +1,9 @@
 """Colours by Filament, MuJoCo's physically based renderer, through Vulkan. Depth and ids stay with the classic one.
 
-The baked pages are shown as emissive textures. Vulkan needs no X server; on the CPU it is Mesa's lavapipe.
+The baked pages are shown as emissive textures. Above them lie reflections of the room the camera is in: a small
+picture of its surroundings, taken from its middle, is Filament's image light. MuJoCo 4.0 shines one image light on
+the whole scene and lets nothing stand in its way, so the light is exchanged from room to room, and what lies under a
+table shines as much as the table. Vulkan needs no X server; on the CPU it is Mesa's lavapipe.
 """
 
 from __future__ import annotations
@@ -16,14 +19,28 @@ gl.prepare()
 
 import mujoco
 import numpy as np
+import shapely
 
 from embodied.errors import UnableError
 from embodied.house import House
 from embodied.lit import LitPages
+from embodied.render import Camera
 from embodied.scene import build_spec, compile_spec
 
 EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""
+PROBE = 64
+"""Side of a cube face of a room's surroundings, pixels."""
+EYE = 1.5
+"""Height above the floor that they are seen from, metres."""
+MIRROR = 11_700.0
+"""Intensity of an image light at which a mirror shows its texels as they are (measured: sRGB 188 comes out as 188)."""
+DULL = 0.05
+"""Specular below which a mesh reflects nothing."""
+CUBE = (((1, 0, 0), (0, 0, 1)), ((-1, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, 1, 0)), ((0, 0, -1), (0, -1, 0)),
+        ((0, -1, 0), (0, 0, 1)), ((0, 1, 0), (0, 0, 1)))
+"""Forward and up, world, of the faces of an image light: OpenGL's order and (mirrored) layout with y up, found with
+coloured faces on a mirroring ball."""
 REMEDY = "install Vulkan (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers), or use backend 'classic'"
 
 
@@ -53,11 +70,41 @@ class Painter:
         self._renderables = mjrf.ModelRenderables(self._scene, self._resources)
         self._lights.update(data)
         self._renderables.update(data)
-        self._model = model
+        self._model, self._house = model, house
         self._targets: dict[tuple[int, int], object] = {}
+        self._lights_of_room: dict[str, tuple] = {}
+        self._room: str | None = None
 
     def rgb(self, camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
         """(h, w, 3) uint8 as an embodied.render.Camera sees it, top row first."""
+        room = room_at(self._house, camera.position)
+        if room != self._room:
+            self._reflect(room, near, far)
+        return self._draw(camera, size, near, far)
+
+    def _reflect(self, room: str | None, near: float, far: float) -> None:
+        """Exchange the image light for that of `room`; made on first need. None takes it away."""
+        mjrf = self._mjrf
+        if self._room is not None:
+            self._scene.remove_light(self._lights_of_room[self._room][0])
+            self._room = None
+        if room is None:
+            return
+        if room not in self._lights_of_room:
+            eye = middle_of(self._house, room)
+            faces = [self._draw(Camera(eye, forward, up), (PROBE, PROBE), near, far)[:, ::-1] for forward, up in CUBE]
+            texture = self._context.create_texture(mjrf.TextureConfig(
+                width=PROBE, height=6 * PROBE, format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+                color_space=mjrf.ColorSpace.COLORSPACE_SRGB, sampler_type=mjrf.SamplerType.TEXTURE_CUBE))
+            data = mjrf.TextureData()
+            data.set_image(np.ascontiguousarray(np.concatenate(faces)).tobytes())
+            texture.upload(data)
+            light = self._context.create_light(mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=MIRROR))
+            self._lights_of_room[room] = light, texture
+        self._scene.add_light(self._lights_of_room[room][0])
+        self._room = room
+
+    def _draw(self, camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
         mjrf = self._mjrf
         if size not in self._targets:
             config = mjrf.RenderTargetConfig(color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8)
@@ -80,19 +127,23 @@ class Painter:
 
     def close(self) -> None:
         """Free what lies on the graphics side, in the order Filament asks for."""
-        for name in ("_targets", "_renderables", "_lights", "_scene", "_resources"):
+        if self._room is not None:
+            self._scene.remove_light(self._lights_of_room[self._room][0])
+        for name in ("_lights_of_room", "_targets", "_renderables", "_lights", "_scene", "_resources"):
             if hasattr(self, name):
                 delattr(self, name)
 
 
 def emissive_model(house: House, catalogue, lit: LitPages) -> mujoco.MjModel:
-    """The lit house with its pages as light sources and nothing else shining."""
+    """The lit house with its pages as light sources, and a black, smooth coat over what is glossy."""
     spec = build_spec(house, catalogue, collisions=False, lit=lit)
     role = mujoco.mjtTextureRole
     for material in spec.materials:
         material.textures[role.mjTEXROLE_EMISSIVE] = material.textures[role.mjTEXROLE_RGB]
         material.textures[role.mjTEXROLE_RGB] = ""
-        material.rgba, material.emission, material.roughness, material.metallic = [0, 0, 0, 1], 1, 1, 0
+        material.rgba, material.emission = [0, 0, 0, 1], 1
+        material.roughness, material.metallic = 1, 1  # a black metal reflects nothing
+    _add_coats(spec, lit)
     for texture in spec.textures:
         texture.colorspace = mujoco.mjtColorSpace.mjCOLORSPACE_SRGB
     for name, value in (("ao.enabled", 0.0), ("cg.exposure", EXPOSURE)):
@@ -102,6 +153,40 @@ def emissive_model(house: House, catalogue, lit: LitPages) -> mujoco.MjModel:
     light = spec.worldbody.add_light(name="faint", pos=[0, 0, -50], dir=[0, 0, -1], castshadow=False)
     light.intensity = 1e-3
     return compile_spec(spec)
+
+
+def _add_coats(spec: mujoco.MjSpec, lit: LitPages) -> None:
+    """Meshes that shine get a material like their page's, as rough as they are."""
+    geoms = [g for g in spec.geoms if g.material.startswith("page_")]
+    meshes = [m for m in lit.meshes if len(m.faces)]
+    known: dict[tuple[str, float], str] = {}
+    for geom, mesh in zip(geoms, meshes, strict=True):
+        geom.rgba = [0, 0, 0, geom.rgba[3]]  # a geom's own colour would hide its material's
+        if mesh.gloss is None or mesh.gloss[1] < DULL or mesh.kind == "outdoor":
+            continue
+        key = geom.material, round(mesh.gloss[0], 1)
+        if key not in known:
+            known[key] = f"{key[0]}_{key[1]:g}"
+            coat = spec.add_material(name=known[key], rgba=[0, 0, 0, 1], emission=1, roughness=key[1], metallic=0)
+            coat.textures[mujoco.mjtTextureRole.mjTEXROLE_EMISSIVE] = key[0]
+        geom.material = known[key]
+
+
+def room_at(house: House, position) -> str | None:
+    """The room that `position` (x, y, z) is in; None outdoors."""
+    at = shapely.Point(position[:2])
+    for room in house.rooms:
+        floor = house.storey_of(room).elevation
+        if floor <= position[2] <= floor + house.storey_of(room).height and shapely.Polygon(room.polygon).covers(at):
+            return room.id
+    return None
+
+
+def middle_of(house: House, room: str) -> tuple[float, float, float]:
+    """Where a room's surroundings are seen from."""
+    r = house.room_by_id[room]
+    x, y = shapely.Polygon(r.polygon).representative_point().coords[0]
+    return x, y, house.storey_of(r).elevation + EYE
 
 
 @functools.cache

@@ -27,6 +27,8 @@ class LitMesh:
     """(n, 2) float32 in [0, 1]: u to the right, v DOWN (v = 0 is the upper edge of row 0 of the page)."""
     alpha: float = 1.0
     """Opacity; below 1 for glass and sheer curtains."""
+    gloss: tuple[float, float] | None = None
+    """Mean roughness and specular (0.5 is F0 = 0.04, 0 reflects nothing) over its area; None: unknown, taken as matte."""
 
 
 @dataclass(frozen=True, eq=False)

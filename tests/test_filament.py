@@ -10,6 +10,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished, painted
 
 from embodied import filament
+from embodied.parts import owners
 from embodied.render import Renderer
 
 EYE = (2.5, 2.6, 1.2)
@@ -45,6 +46,25 @@ def test_back_ends_agree(house, lit):
     assert np.array_equal(a.ids, b.ids) and np.array_equal(a.depth, b.depth)
     assert np.median(np.abs(a.rgb.astype(int) - b.rgb)) <= 6
     assert np.abs(a.rgb.astype(int) - b.rgb).mean() < 5, "not mirrored, not upside down, not in other colours"
+
+
+def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
+    """Only the floor changes, nowhere darker; where one looks along it, it takes on what stands behind (Fresnel)."""
+    shiny = dataclasses.replace(lit, meshes=tuple(
+        dataclasses.replace(m, gloss=(0.05, 0.5)) if "/floor" in m.owner else m for m in lit.meshes))
+    shots = []
+    for pages in (lit, shiny):
+        with Renderer(house, HandCatalogue(), size=96, quality="baked", lit=pages, backend="filament") as r:
+            shots.append(r.view(EYE, 0.6, -0.5, 1.2, (96, 96)))
+    floors = np.array([i + 1 for i, o in enumerate(lit.owners or owners(house)) if "/floor" in o])
+    on_floor = np.isin(shots[0].ids, floors)
+    gain = shots[1].rgb.astype(int) - shots[0].rgb
+    inside = on_floor & np.roll(on_floor, 1, 0) & np.roll(on_floor, -1, 0) & np.roll(on_floor, 1, 1) & np.roll(on_floor, -1, 1)
+    assert np.abs(gain[~on_floor]).mean() < 1 and np.median(gain[inside].max(-1)) >= 2 and gain[inside].min() > -4
+
+
+def test_the_camera_is_in_the_room_around_it_and_in_none_outdoors(house):
+    assert filament.room_at(house, EYE) == "living_room_1" and filament.room_at(house, (-30.0, 0.0, 1.0)) is None
 
 
 def test_unlit_is_left_to_the_classic_back_end(house):

@@ -36,6 +36,7 @@ from embodied.light.sky import outdoors as outdoors_of
 from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
 from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import Exposure, expose
+from embodied.light.unwrap import areas_of
 from embodied.lit import LitMesh, LitPages
 from embodied.part import Part
 from embodied.parts import house_parts, owners
@@ -66,7 +67,7 @@ class Bake:
         pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
         with np.load(self.folder / "meshes.npz", allow_pickle=False) as z:
             meshes = tuple(
-                LitMesh(m["owner"], m["kind"], m["room"], m["page"], z[f"v{i}"], z[f"f{i}"], z[f"t{i}"], m["alpha"])
+                LitMesh(m["owner"], m["kind"], m["room"], m["page"], z[f"v{i}"], z[f"f{i}"], z[f"t{i}"], m["alpha"], m["gloss"])
                 for i, m in enumerate(self.manifest["meshes"])
             )
         return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
@@ -288,7 +289,8 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
         "total_seconds": round(time.perf_counter() - start, 1), "luxels": len(s.lux.position), "check": error,
         "exposure": {"polygons": s.exposure.polygons, "levels": s.exposure.levels.tolist(), "gains": s.exposure.gains.tolist(),
                      "outdoors": s.exposure.outdoors.tolist()},
-        "meshes": [{"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha} for m in meshes],
+        "meshes": [{"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha,
+                    "gloss": m.gloss} for m in meshes],
         "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
         "probes": _probes(s, space), "files": files,
     }
@@ -392,6 +394,9 @@ def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
             out.append(LitMesh(atlas.owners[o], atlas.kinds[o], atlas.rooms[o], number, both[corner, :3].astype(np.float32),
                                faces[real], both[corner, 3:].astype(np.float32), float(alpha)))
             kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
+            area = areas_of(page.corners[mine])
+            mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
+            out[-1] = dataclasses.replace(out[-1], gloss=mean)
             shine.append(np.concatenate([kind, kind[thin]])[real])
     return out, shine
 
