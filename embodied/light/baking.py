@@ -347,7 +347,7 @@ def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clo
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
-    """85th percentile of e (without the sun's own) on the shell of every room; up to half more where much is far brighter than that."""
+    """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far brighter than that."""
     e = light.soft
     room_of_owner = np.array([[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms])
     room = room_of_owner[lux.owner]
@@ -355,7 +355,7 @@ def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -
     for i, r in enumerate(house.rooms):
         mine = (room == i) & lux.shell & light.good
         full, brightest = np.percentile(e[mine], (85, 97), axis=0) if mine.any() else np.zeros((2, 3))
-        out[r.id] = full * np.clip(0.5 * brightest.mean() / max(full.mean(), 1e-9), 1.0, 1.5)
+        out[r.id] = full * np.clip(0.45 * brightest.mean() / max(full.mean(), 1e-9), 1.0, 1.35)
     return out
 
 
