@@ -22,7 +22,7 @@ from agents.evaluate import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent, new_agent
 from agents.imitation.checkpoint import Progress
 from agents.imitation.config import SCALES, TrainingConfig
-from agents.imitation.parallel import join_launcher
+from agents.imitation.parallel import check_device, join_launcher
 from agents.imitation.training import Split, train
 from agents.options import chosen
 from agents.vision.config import VisionConfig
@@ -137,6 +137,7 @@ def encoder_of(args: argparse.Namespace) -> Encoder:
 
 def run_features(args: argparse.Namespace, note: Note = print) -> int:
     """Features of every house of a data set; houses that have them are skipped."""
+    check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
     missing = [n for n in _houses(data, data.splits) if not _has_features(data, n, encoder)]
     jobs = (joblib.delayed(_make_features)(data, n, encoder, args) for n in missing)

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 QUALITIES = ("unlit", "baked", "glossy", "reference")
 TRACED = ("glossy", "reference")
 """Qualities whose panoramas are ray-traced; everything else, free cameras too, is drawn by a Renderer."""
+SIZES = (8, 4096)
+"""Sides of a cube face that can be drawn, pixels."""
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
@@ -49,6 +51,8 @@ class World:
         """See `open_world`."""
         if quality not in QUALITIES:
             raise ValueError(f"quality {quality!r} is unknown; use one of {QUALITIES}")
+        if not SIZES[0] <= size <= SIZES[1]:  # said now, not after the house was lit
+            raise ValueError(f"size is {size} pixels; a cube face needs {SIZES[0]} to {SIZES[1]}")
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.size, self.quality, self.backend, self.light = size, quality, backend, light
         self._path = file

@@ -13,6 +13,8 @@ from typing import TypeVar
 import torch
 import torch.distributed as dist
 
+from embodied.errors import UnableError
+
 T = TypeVar("T")
 
 
@@ -26,11 +28,28 @@ def processes() -> int:
 
 
 def join_launcher(device: str) -> str:
-    """Join the other processes if torchrun started this one; returns the device to use."""
+    """Join the other processes if torchrun started this one; returns the device to use.
+
+    Raises:
+      UnableError: there is no such device.
+    """
+    check_device(device)
     if not dist.is_torchelastic_launched():
         return device
     dist.init_process_group("nccl" if device.startswith("cuda") else "gloo")
     return f"cuda:{dist.get_node_local_rank()}" if device == "cuda" else device
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that PyTorch cannot use here.
+
+    Raises:
+      UnableError: it is none, or there is no GPU.
+    """
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as e:
+        raise UnableError(f"--device {device} cannot be used here ({str(e).splitlines()[0]}); use --device cpu") from e
 
 
 def share(items: Sequence[T]) -> Sequence[T]:

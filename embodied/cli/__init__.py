@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from embodied.errors import UnableError
 
@@ -36,9 +37,16 @@ REMEDIES = {
 """What to do about an error of the operating system."""
 
 
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all commands do, instead of the whole usage."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"error: {message}; `{self.prog} --help` explains\n")
+
+
 def parser(chosen: str | None = None) -> argparse.ArgumentParser:
     """The argument parser; of the subcommands, only `chosen` gets its options (and is imported)."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="embodied",
         description="Generated houses in MuJoCo, panoramas, and agents that ask people for help.",
         epilog="Start with `embodied doctor`, then `embodied demo`. `embodied COMMAND --help` explains each.",
