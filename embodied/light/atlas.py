@@ -139,8 +139,9 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000)
         limit = widest // fineness
         while mine:
             whole = min(sum(int(t.flat.size.prod()) for t in mine), most / fineness**2)
-            width = int(min(limit, max(128, 1.05 * np.sqrt(whole))))
-            places, _ = pack(np.array([t.flat.size for t in mine]), width)
+            sizes = np.array([t.flat.size for t in mine])
+            widths = [int(min(limit, max(128, x * np.sqrt(whole)))) for x in (0.8, 0.9, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)]
+            width, places = min(((w, pack(sizes, w)[0]) for w in widths), key=lambda x: _sheet(sizes, x[1]))
             tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in mine)))
             inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(mine, places)]
             if not any(inside):
@@ -148,6 +149,11 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000)
             pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
             mine = [t for t, ok in zip(mine, inside) if not ok]
     return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
+
+
+def _sheet(sizes: np.ndarray, places: np.ndarray) -> int:
+    """Luxels of the rectangle that holds packed rectangles."""
+    return int((places + sizes).max(0).prod())
 
 
 OFFSETS = ((0.0, 0.0), (-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0),
@@ -257,7 +263,7 @@ def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped
 
 
 def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float) -> int:
-    """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain.
+    """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain, 1 where luxels are small.
 
     Floors get 200 texels per metre, patterned walls and ceilings 120 and 80, patterned furniture 180 where
     its luxels are not too coarse, mirrors 400.
@@ -269,7 +275,7 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
     if sum(a for a, f in zip(used, finishes) if f.mirror) > 0.15 * used.sum():
         return int(np.clip(round(400 / side), 2, 8))
-    return int(np.clip(round(180 / side), 2, max(4, round(160 / density)))) if patterned else 2
+    return int(np.clip(round(180 / side), 2, max(4, round(160 / density)))) if patterned else 1 if side > 80 else 2
 
 
 def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:

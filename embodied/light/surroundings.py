@@ -44,7 +44,7 @@ def surroundings(house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoo
     area = sum(float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
                for c in (p.mesh.vertices[p.mesh.faces] for p in parts))
     density = float(min(14.0, np.sqrt(LUXELS / max(area, 1.0))))
-    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=4000, cache=cache, finest=3))
+    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=1500, cache=cache, finest=2))
     blockers = scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass]))
     pages = []
     for page in atlas.pages:
