@@ -13,7 +13,8 @@ STOPPED = b"\nstopped; finished parts are kept and the same command goes on from
 
 def start() -> int:
     """Run the console command; returns its exit status."""
-    signal.signal(signal.SIGINT, stop)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     try:
         from embodied.cli import main
 
@@ -23,7 +24,7 @@ def start() -> int:
 
 
 def stop(number: int, frame) -> None:
-    """What Ctrl-C does: end the program if something is being imported, else raise KeyboardInterrupt."""
+    """What Ctrl-C and a polite kill do: end the program if something is being imported, else raise KeyboardInterrupt."""
     import os
 
     while frame is not None:

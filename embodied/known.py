@@ -51,7 +51,7 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
     asset = catalogue.assets.get(p.asset)
     if asset is None:
         raise HouseError(f"object {p.id!r} is the unknown asset {p.asset!r}; {_near(p.asset, catalogue.assets)}; "
-                         "`embodied assets list` names them all, --packs adds folders of your own")
+                         "`embodied assets list` names them all, --own adds folders of your own")
     if p.object_class != asset.object_class:
         raise HouseError(f"object {p.id!r} is called a {p.object_class!r}, its asset {p.asset!r} is a {asset.object_class!r}")
     if p.surface is not None:

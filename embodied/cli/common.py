@@ -56,12 +56,12 @@ class Stages:
 
     def __init__(self, *names: str) -> None:
         self._names, self._bar = iter(names), tqdm(total=len(names), delay=PATIENCE, leave=False, unit="stage")
-        self._bar.set_description_str(next(self._names))
+        self._bar.set_description_str(next(self._names), refresh=False)
 
     def next(self) -> None:
         """The present stage is done."""
         self._bar.update()
-        self._bar.set_description_str(next(self._names, "done"))
+        self._bar.set_description_str(next(self._names, "done"), refresh=False)
 
     def __enter__(self) -> Self:
         return self
