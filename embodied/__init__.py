@@ -13,15 +13,17 @@ Pictures: open_world, World, Renderer, Panorama. Randomness: stream.
 Tasks and people are in embodied.interface; read it first when you write an agent.
 
 Each name is imported when it is first used, so that `import embodied` costs nothing; and off-screen
-OpenGL is chosen before mujoco is imported, whichever name comes first. Gymnasium is not imported
-here: `import embodied.gym_env` registers the environments, or let Gymnasium do it by
-gymnasium.make("embodied.gym_env:embodied/HANNA-v0").
+OpenGL is chosen before mujoco is imported, whichever name comes first. The Gymnasium environments
+embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0 are registered by `import embodied`; Gymnasium
+itself is not imported for that (embodied.registration).
 """
 
 from __future__ import annotations
 
 import importlib
 from typing import TYPE_CHECKING
+
+from embodied.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
     from assets.cache import default_cache
@@ -56,3 +58,6 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted([*globals(), *__all__])
+
+
+register_with_gymnasium()

@@ -1,4 +1,4 @@
-"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0, registered on import.
+"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0, registered by `import embodied`.
 
     env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train")
 
@@ -27,7 +27,6 @@ from embodied.spaces import Layout, action_space, decode, encode, observation_sp
 if TYPE_CHECKING:
     from embodied.world import World
 
-IDS = {"find": "Find", "vln": "VLN", "vnla": "VNLA", "hanna": "HANNA", "hari": "HARI"}
 STEP_COST = 0.01
 LAYOUT = Layout()
 VIEW = (480, 640)
@@ -198,13 +197,3 @@ def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Calla
         return driven(kinds[kind], catalogue, env.worlds, env.assistant, env.moves)
 
     return make_driven
-
-
-def register() -> None:
-    """Make the environments known to gymnasium.make; done on import."""
-    for kind, name in IDS.items():
-        if f"embodied/{name}-v0" not in gym.registry:
-            gym.register(f"embodied/{name}-v0", entry_point="embodied.gym_env:make", kwargs={"kind": kind})
-
-
-register()

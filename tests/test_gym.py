@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import subprocess
+import sys
 import warnings
 
 import gymnasium as gym
@@ -15,6 +17,7 @@ from hand_worlds import grid_world
 import embodied.gym_env
 from embodied.env import ActionError
 from embodied.interface import Ask, Intention, Move, Stop
+from embodied.registration import IDS
 from embodied.spaces import Layout, Numbers, decode, number, text_of
 from embodied.teachers.shortest import shortest_action
 
@@ -35,7 +38,7 @@ def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gym.make(
-            f"embodied/{embodied.gym_env.IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array"
+            f"embodied/{IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array"
         )
         check_env(env.unwrapped, skip_render_check=False)
 
@@ -43,6 +46,20 @@ def test_the_environment_checker_has_nothing_to_say(kind, tmp):
 def test_all_are_registered():
     for name in ("Find", "VLN", "VNLA", "HANNA", "HARI"):
         assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym_env:make"
+
+
+@pytest.mark.parametrize("imports", ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"])
+def test_import_embodied_registers_in_any_order(imports):
+    code = (f"import {imports}; import gymnasium; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
+            "('Find', 'VLN', 'VNLA', 'HANNA', 'HARI')], sys.modules.keys() & {'mujoco', 'torch', 'embodied.gym_env'})")
+    done = subprocess.run([sys.executable, "-c", f"import sys; {code}"], check=True, capture_output=True, text=True, timeout=120)
+    assert done.stdout.strip() == f"{[{'kind': kind} for kind in KINDS]} set()"
+
+
+def test_import_embodied_does_not_import_gymnasium():
+    code = "import sys, embodied; print(sys.modules.keys() & {'gymnasium', 'numpy'})"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=120)
+    assert done.stdout.strip() == "set()"
 
 
 @pytest.mark.parametrize("vector", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
