@@ -41,8 +41,9 @@ def content(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-def test_paper_sizes_are_those_of_tables_4_2_and_e_1():
+def test_paper_sizes_are_those_of_tables_4_2_and_e_1_and_of_room_to_room():
     assert [s.tasks for s in PAPER["hanna"][1]] == [82_484, 5_001, 5_017, 5_004, 5_012]
+    assert [s.tasks for s in PAPER["vln"][1]] == [14_025, 1_020, 2_349, 1_020, 4_173]
     assert sum(PAPER["hanna"][0].values()) == 68
     assert sum(PAPER["hari"][0].values()) == 72
     assert {s.name: s.tasks for s in PAPER["hari"][1]}["test_unseen_object"] == 1_913
