@@ -117,7 +117,7 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
             if not link or rng.random() < 0.1:
                 current += f", {text}"
             elif link.split()[0] not in ("and", "then"):  # 'after that', 'once there': no comma alone can join with these
-                if rng.random() < 0.5:
+                if rng.random() < 0.3:
                     sentences.append(current)
                     current, length = f"{link}, {text}", 0
                 else:

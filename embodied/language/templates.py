@@ -134,7 +134,7 @@ VERBS = (
     "press on", "keep on", "scoot", "shuffle", "hike",
 )
 """What {walk} may be, the plainest first."""
-SOON = ("immediately", "right away", "at once", "straight away", "directly", "sharply", "instantly", "right there", "without delay")
+SOON = ("immediately", "at once", "straight away", "directly", "sharply", "instantly", "without delay", "without hesitation")
 """What {soon} may be."""
 PRAISE = (
     "nice", "lovely", "pretty", "fancy", "cozy", "comfy", "stylish", "neat", "old", "modern", "simple", "elegant", "beautiful", "shiny", "sturdy",

@@ -49,7 +49,7 @@ class People:
           yaw: the walker's first direction, radians.
         """
         speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
-        wanted = max(round(rng.normal(speaker.clauses, 1.2)), 3)
+        wanted = max(round(rng.normal(speaker.clauses, 1.0)), 2)
         for attempt in range(self.tries):
             phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + attempt)
             text = say(phrases, speaker, rng=rng)
