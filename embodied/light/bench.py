@@ -52,7 +52,7 @@ class Report:
 
 
 def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4, views: int = 3, settings: str = "normal",
-            size: tuple[int, int] = (160, 240), rays: int = 96, progress: Callable[[str], None] = lambda text: None) -> Report:
+            size: tuple[int, int] = (160, 240), rays: int = 64, progress: Callable[[str], None] = lambda text: None) -> Report:
     """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Args:
