@@ -74,7 +74,7 @@ def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes())
+    write_bytes(out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes())
     write_json(out / "light.json", facts, indent=1)
     return Report(facts, table(facts))
 

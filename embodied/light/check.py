@@ -43,7 +43,7 @@ def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str 
     rng = stream(s.house.seed, "light", "check", name)
     pick = rng.choice(np.nonzero(fit)[0], min(luxels, int(fit.sum())), replace=False)
     space = radiosity.space_of(s.atlas, s.lux.texels, s.outdoors.picture)
-    lights = paths.lights_of(s.atlas, s.lux, space, portals_of(s.house), s.lamps, s.outdoors)
+    lights = paths.lights_of(space, lambda o: radiosity.without(space, s.atlas, o), portals_of(s.house), s.lamps, s.outdoors)
     p = subset(s.lux, np.repeat(pick, paths_each))
     e = array(paths.irradiance(space, lights, paths.surfaces_of(s.lux), p, rng=rng))
     traced = np.nan_to_num(e).reshape(len(pick), paths_each, 3) @ y

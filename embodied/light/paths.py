@@ -6,7 +6,7 @@ diffuse below one GGX lobe (Walter et al. 2007) with Schlick's Fresnel term.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,15 +75,19 @@ def surfaces_of(lux: Luxels) -> Surfaces:
     return Surfaces(flat(lux.albedo), flat(np.where(lux.sampled[:, None], 0.0, lux.glow)), flat(lux.normal))
 
 
-def lights_of(atlas, lux: Luxels, space: Space, portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors) -> Lights:
-    """Pool what shines."""
+def lights_of(space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors) -> Lights:
+    """Pool what shines.
+
+    Args:
+      without: the space without all that belongs to an owner: a bare bulb's own lamp does not stand in its way.
+    """
     mi = mitsuba()
     k = len(portals) + len(lamps)
     zero = np.zeros(3)
     spaces, index = [space], [0] * len(portals)
     for x in lamps:
-        if x.owner is not None and x.owner in atlas.owners:
-            spaces.append(radiosity.without(space, atlas, x.owner))
+        if x.owner is not None:
+            spaces.append(without(x.owner))
             index.append(len(spaces) - 1)
         else:
             index.append(0)

@@ -96,6 +96,8 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray) -> Space:
 
 def without(space: Space, atlas: Atlas, owner: str) -> Space:
     """The same space for shadow rays that pass through everything of `owner`."""
+    if owner not in atlas.owners:
+        return space
     corners = np.concatenate([p.corners for p in atlas.pages])[space.opaque_faces]
     owners = np.concatenate([p.owner for p in atlas.pages])[space.opaque_faces]
     return replace(space, scene=scene_of(corners[owners != atlas.owners.index(owner)]))

@@ -21,7 +21,7 @@ from embodied.seeds import stream
 BRIGHTEST = 12.0
 """Reflected light is cut at this multiple of the exposure's white."""
 QUALITIES = ("glossy", "reference", "diffuse")
-"""'diffuse' is the reference without gloss, which the classic renderer's pages should equal."""
+"""'diffuse' is the reference without gloss but for mirrors and metals, which the classic renderer's pages should equal."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
 
@@ -91,8 +91,7 @@ class Tracer:
         inside = hit.ok & ~hit.outdoor
         e = hit.e if self.quality == "glossy" else self._traced(hit, ray, rng)
         diffuse = hit.albedo * e
-        if self.quality != "diffuse":
-            diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
+        diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
         radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
         shown = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
         keep = np.asarray(inside)[:, None]
@@ -118,6 +117,8 @@ class Tracer:
 
         mi, world = mitsuba(), self._world
         rough, specular, metal = hit.gloss.x, hit.gloss.y, hit.gloss.z
+        if self.quality == "diffuse":
+            specular = mi.Float(0.0)
         n = len(np.asarray(hit.distance))
         u = rng.random((2, n), np.float32)
         a = dr.maximum(dr.square(rough), 1e-3)
@@ -131,12 +132,14 @@ class Tracer:
         f0 = mi.Color3f(0.08 * specular) * (1 - metal) + hit.albedo * metal
         f = f0 + (1 - f0) * dr.power(1 - c, 5) * (1 - dr.square(rough) * 0.9)
         active = inside & (dr.max(f0) > 1e-3) & (dr.dot(d, hit.normal) > 0)
+        if not dr.any(active):
+            return diffuse
         onward = mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d)
         second = look(world, onward, active)
         far = picture_at(world.sky, world.rows, d, active) * radiosity.GLASS
         seen = dr.select(second.ok, second.albedo * second.e + second.glow, far)
         seen = dr.select(second.ok & second.outdoor, far * 0.3, seen)
-        if self.quality == "reference":
+        if self.quality != "glossy":
             e = self._traced(second, onward, rng)
             seen = dr.select(second.ok & ~second.outdoor & second.front, second.albedo * e + second.glow, seen)
         limit = BRIGHTEST * float(1 / np.median(world.exposure.gains))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -111,7 +111,8 @@ def world_of(bake: Bake, house: House) -> World:
     )
     hit_by_lamp = glow_coarse if not sampled else np.zeros_like(glow_coarse)
     surfaces = Surfaces(flat(np.concatenate(coarse_albedo)), flat(hit_by_lamp), flat(np.zeros_like(glow_coarse)))
-    lights = lights_of(None, None, space, portals_of(house), lamps, sun)
+    without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
+    lights = lights_of(space, without, portals_of(house), lamps, sun)
     any_glow = np.concatenate(glow)
     return World(
         space, surfaces, lights, owner, mi.Bool(outer), flat(np.concatenate([g for _, g in solid]) / 255), flat(uv), u32(page),
@@ -123,7 +124,7 @@ def world_of(bake: Bake, house: House) -> World:
 def _lamps(bake: Bake) -> tuple[Lamp, ...]:
     with np.load(bake.folder / "lamps.npz", allow_pickle=False) as z:
         return tuple(
-            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), None, z[f"weights{i}"])
+            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), x["owner"], z[f"weights{i}"])
             for i, x in enumerate(bake.manifest["lamps"])
         )
 
