@@ -104,6 +104,8 @@ def build_dataset(
     work = units(wanted)
     arguments = (config, folder, Path(cache), make_house or make_dataset_house, packs)
     for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+    for draft in sorted((folder / "houses").glob(".*")):  # of processes killed outright; every house is whole now
+        shutil.rmtree(draft)
     return write_index(config, folder)
 
 
