@@ -1,7 +1,11 @@
 """Units of work on Ray: what is asked of it, with a stand-in; without Ray the error names the remedy.
 
-The real thing was run by hand on a local cluster of two nodes, one of which was killed half-way:
-all houses were there in the end, byte for byte those of a build without Ray.
+The real thing was run by hand with Ray 2.60 on a local cluster of two nodes (ray.cluster_utils.Cluster,
+one processor each), `embodied dataset hanna --scale tiny --area 60 90 --seed 4 --ray ADDRESS`. When one
+house of four was whole and both nodes held a draft, the second node's raylet and worker were killed with
+SIGKILL. Ray reported "Task build_unit failed because the node it was running on is dead ... will be
+retried", the first node built the rest, the command ended with 0, no draft was left, and `diff -r`
+found no difference from a build with one process (digest 4b6783e58d002317).
 """
 
 from __future__ import annotations
