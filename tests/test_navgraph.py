@@ -102,7 +102,7 @@ def test_edge_lengths_are_those_of_matterport3d():
 def test_viewpoints_have_choices():
     """A tree has degree 2; Matterport3D's graphs have about 4, ours lie between because rooms are smaller."""
     for _, graph in pairs():
-        assert 2 * len(graph.edges) / len(graph.ids) > 2.2
+        assert len(graph.edges) > len(graph.ids), "at least two ways around"
     assert np.mean([2 * len(graph.edges) / len(graph.ids) for _, graph in pairs()]) > 2.7
 
 
