@@ -64,6 +64,9 @@ class HandCatalogue:
         color = {"hand/red_box": RED, "hand/mug": BLUE}.get(key, WOOD)
         return (box_mesh((-w / 2, -d / 2, 0), (w / 2, d / 2, h), color),)
 
+    def parameters(self, key: str) -> dict[str, float | str]:
+        return {}
+
     def finish(self, key: str) -> Finish:
         return Finish({"oak_planks/0": (0.72, 0.55, 0.38, 1.0)}.get(key, (0.93, 0.92, 0.9, 1.0)))
 
