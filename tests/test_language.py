@@ -68,7 +68,7 @@ def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
 
 def test_every_template_means_the_clauses_it_is_for(lexicon):
     for t in TEMPLATES:
-        text = t.text.format(side="left", room="kitchen", other="study", n="3", thing="the nice red sofa", walk="make your way", soon="at once")
+        text = t.text.format(side="left", room="kitchen", other="study", metres="three meters", steps="one big step", nth="second", thing="the nice red sofa", walk="make your way", soon="at once")
         assert tuple(kind_of(c) for c in parse(text, lexicon).clauses) == t.kinds, t.text
 
 

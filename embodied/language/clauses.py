@@ -39,6 +39,9 @@ class Enter:
     """Walk into a room of this kind."""
 
     kind: str
+    side: str | None = None
+    nth: int = 0
+    """Through which of the doors on that side, counted along the way; 0 where nobody counts."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,20 @@ from embodied.language.clauses import (
     Turn,
 )
 from embodied.language.lexicon import ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
-from embodied.language.templates import FILLERS, HEDGES, LINKS, NUMBERS, SLIPS, SOON, TEMPLATES, VERBS, Template
+from embodied.language.templates import (
+    ARRIVED_LINKS,
+    FILLERS,
+    HEDGES,
+    LINKS,
+    NUMBERS,
+    ORDINALS,
+    PLAYFUL,
+    SLIPS,
+    SOON,
+    TEMPLATES,
+    VERBS,
+    Template,
+)
 
 if TYPE_CHECKING:
     from embodied.language.speakers import Speaker
@@ -50,7 +63,9 @@ def kind_of(clause: Clause) -> str:
         return {45: "slight", 90: "turn", 180: "around"}[clause.angle]
     if isinstance(clause, Past):
         return "past" if clause.side is None else "past_side"
-    return {Exit: "exit", Enter: "enter", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid", Notice: "notice",
+    if isinstance(clause, Enter):
+        return "door" if clause.nth else "enter"
+    return {Exit: "exit", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid", Notice: "notice",
             StopBy: "stop_by", StopIn: "stop_in", StopHere: "stop_here"}[type(clause)]
 
 
@@ -87,8 +102,9 @@ def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Genera
 
 
 def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: np.random.Generator) -> str:
+    verbs = VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS
     slots = {
-        "walk": VERBS[0] if rng.random() < speaker.plainness else VERBS[int(rng.integers(len(VERBS)))],
+        "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": SOON[int(rng.integers(len(SOON)))],
     }
     rooms = [p.clause.kind for p in phrases if hasattr(p.clause, "kind")]
@@ -97,7 +113,11 @@ def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: 
         slots[name] = nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))]
     for p in phrases:
         if isinstance(p.clause, Metres):
-            slots["n"] = NUMBERS[p.clause.count] if p.clause.count < len(NUMBERS) and rng.random() < 0.7 else str(p.clause.count)
+            n, many = p.clause.count, "s" * (p.clause.count != 1)
+            spelt = NUMBERS[n] if n < len(NUMBERS) and (n == 1 or rng.random() < 0.7) else str(n)
+            slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
+        if getattr(p.clause, "nth", 0):
+            slots["nth"] = ORDINALS[p.clause.nth]
         if getattr(p.clause, "side", None):
             slots["side"] = p.clause.side
         if p.word is not None:
@@ -108,34 +128,50 @@ def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: 
 def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, rng: np.random.Generator) -> str:
     """Pieces joined by links and full stops; a stop and a warning begin sentences of their own more often."""
     sentences: list[str] = []
-    current = ""
-    length = 0
+    current, length, hedged = "", 0, False
     for n, (text, kinds) in enumerate(pieces):
-        if n and length < speaker.clauses_per_sentence and rng.random() < 0.8 and "avoid" not in kinds:
-            links = LINKS[speaker.habit] if rng.random() < 0.6 else LINKS[""]
-            link = links[int(rng.integers(len(links)))]
-            if not link or rng.random() < 0.1:
+        before = pieces[n - 1][1] if n else ()
+        if n and length < speaker.clauses_per_sentence and rng.random() < 0.85 and not _stands_alone(text, kinds, before):
+            link = _link(speaker, bool(set(before) & ARRIVING), rng)
+            if text.startswith("and ") or not link:
                 current += f", {text}"
-            elif link.split()[0] not in ("and", "then"):  # 'after that', 'once there': no comma alone can join with these
-                if rng.random() < 0.3:
-                    sentences.append(current)
-                    current, length = f"{link}, {text}", 0
-                else:
-                    current += f", and {link} {text}"
+            elif link in ("and", "then", "and then"):
+                current += f"{',' if hedged or rng.random() > 0.6 else ''} {link} {text}"
+            elif " " not in link or rng.random() < 0.4:  # 'next', 'after that', 'once there': no comma alone can join with these
+                sentences.append(current)
+                current, length = f"{link}, {text}", 0
             else:
-                pause = "" if link in ("and", "then", "and then") and rng.random() < 0.6 else ","
-                current += f"{pause} {link} {text}"
-            length += 1
+                current += f", and {link} {text}"
+            length, hedged = length + 1, False
             continue
         if current:
             sentences.append(current)
-        current, length = text, 1
+        current, length, hedged = text, 1, False
         if n == 0 and rng.random() < speaker.openings and (fillers := (*FILLERS[speaker.habit], *FILLERS[""])):
             current = f"{fillers[int(rng.integers(len(fillers)))]}, {text}"
         elif rng.random() < speaker.hedges:
-            current = f"{text}, {HEDGES[int(rng.integers(len(HEDGES)))]}"
+            current, hedged = f"{text}, {HEDGES[int(rng.integers(len(HEDGES)))]}", True
     sentences.append(current)
     return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
+
+
+ARRIVING = frozenset({"exit", "enter", "door", "cross", "forward", "metres", "to", "past", "past_side"})
+"""Clauses that lead somewhere, so that 'once there' may follow."""
+_SUBJECTS = re.compile(r"(you|you'll|your|that|that's|if|I|the|not)\b")
+
+
+def _stands_alone(text: str, kinds: tuple[str, ...], before: tuple[str, ...]) -> bool:
+    """Whether a piece is a sentence of its own: warnings, and what is no command."""
+    return "avoid" in (*kinds, *before) or _SUBJECTS.match(text) is not None
+
+
+def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
+    """What joins a clause to the one before it."""
+    own = speaker.habit == "terse" or rng.random() < 0.6
+    links = LINKS[speaker.habit if own else ""]
+    if arrived and rng.random() < 0.25 and (more := ARRIVED_LINKS[speaker.habit if own else ""]):
+        links = more
+    return links[int(rng.integers(len(links)))]
 
 
 def _slip(text: str, speaker: Speaker, rng: np.random.Generator) -> str:
@@ -176,7 +212,7 @@ def normalised(text: str) -> str:
     return plain.strip()
 
 
-_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in (*FILLERS.values(), *LINKS.values()) for f in fs if " " in f}, key=lambda s: (-len(s), s))
+_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in (*FILLERS.values(), *LINKS.values(), *ARRIVED_LINKS.values()) for f in fs if " " in f}, key=lambda s: (-len(s), s))
 
 
 @dataclass(frozen=True)
@@ -231,7 +267,8 @@ def _patterns() -> tuple[_Pattern, ...]:
     """Every template as patterns."""
     rooms = _any(ROOM_OF_NOUN)
     slots = {"side": "(?P<side>left|right)", "room": f"(?P<room>{rooms})", "other": f"(?P<other>{rooms})",
-             "n": rf"(?P<n>\d+|{'|'.join(NUMBERS)})", "walk": f"(?:{_any(VERBS)})", "soon": f"(?:{_any(SOON)})"}
+             "metres": rf"(?P<n>\d+|{_any(NUMBERS)}) meters?", "steps": rf"(?P<n>\d+|{_any(NUMBERS)}) big steps?",
+             "nth": f"(?P<nth>{_any(ORDINALS)})", "walk": f"(?:{_any(VERBS + PLAYFUL)})", "soon": f"(?:{_any(SOON)})"}
     found = []
     for t in TEMPLATES:
         text = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
@@ -257,7 +294,7 @@ def _clauses(heard: _Heard) -> list[Clause]:
     number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
     make = {
         "turn": lambda: Turn(side), "slight": lambda: Turn(side, 45), "around": lambda: Turn(LEFT, 180),
-        "exit": lambda: Exit(next(rooms)), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
+        "exit": lambda: Exit(next(rooms)), "door": lambda: Enter(next(rooms), side, ORDINALS.index(said["nth"])), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
         "forward": Forward, "metres": lambda: Metres(number), "to": lambda: To(thing), "past": lambda: Past(thing),
         "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "notice": lambda: Notice(thing), "stop_by": lambda: StopBy(thing),
         "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,

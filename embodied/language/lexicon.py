@@ -12,7 +12,7 @@ import numpy as np
 
 from embodied.language.clauses import Thing
 from embodied.language.nouns import MORE_NOUNS
-from embodied.language.templates import PRAISE, SIZES
+from embodied.language.templates import BODY_PRAISE, PRAISE, SEAT_PRAISE, SIZES
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -55,8 +55,12 @@ UNFIT = frozenset({
 """Classes that nobody would steer by."""
 
 
-EMPTY = frozenset({*PRAISE, *SIZES})
+EMPTY = frozenset({*PRAISE, *SEAT_PRAISE, *BODY_PRAISE, *SIZES})
 """Adjectives that a listener passes over."""
+
+
+SEATS = frozenset({"sofa", "armchair", "chair", "bed", "bench", "stool", "ottoman", "pouf", "futon", "loveseat", "recliner", "chaise"})
+"""Words in the names of classes that one sits or lies on."""
 
 
 def sizes_of(asset: Asset) -> list[str]:
@@ -72,6 +76,14 @@ def sizes_of(asset: Asset) -> list[str]:
     if max(w, d) > 1.8:
         found += ["long", "wide"]
     return found + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h)
+
+
+def praise_of(asset: Asset) -> tuple[str, ...]:
+    """Words of praise that somebody might use for an asset."""
+    w, d, h = asset.size
+    seat = bool(SEATS & set(asset.object_class.split()))
+    body = asset.support not in ("surface", "ceiling") and min(w, d) > 0.25 and h > 0.3
+    return (*PRAISE, *(SEAT_PRAISE * 3 if seat else ()), *(BODY_PRAISE if body else ()))
 
 
 @dataclass(frozen=True)
@@ -128,7 +140,8 @@ class Lexicon:
         own = [n for n in nouns if n in {s.lower() for s in self._nouns(asset)}] or list(nouns)
         noun = own[0] if len(own) == 1 or rng.random() < 0.5 else own[int(rng.integers(1, len(own)))]
         spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
-        extra = [*sizes_of(asset), *(PRAISE[int(rng.integers(len(PRAISE)))] for _ in range(3))]
+        praise = praise_of(asset)
+        extra = [*sizes_of(asset), *(praise[int(rng.integers(len(praise)))] for _ in range(3))]
         more = [extra[int(rng.integers(len(extra)))]] if rng.random() < ornament else []
         return Word(noun, (*more, *spare[:adjectives]))
 

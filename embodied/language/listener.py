@@ -7,6 +7,7 @@ comes through `Eyes`; it may turn back and try another way, as people do.
 
 from __future__ import annotations
 
+import dataclasses
 import heapq
 import itertools
 import math
@@ -33,7 +34,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
-from embodied.language.seen import Eyes, Seen
+from embodied.language.seen import Eyes, Seen, doorway
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -117,12 +118,15 @@ def _onward(eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing
         return
     steps = len(path) - 1 - begun
     if steps:
-        yield walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, 0.0
+        yield walk_cost(clause, eyes, path[begun:]) + count_cost(clause, eyes, path), path, facing, k + 1, len(path) - 1, 0.0
     elif isinstance(clause, To | Past):
         yield 0.8 + walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, pending
     if steps < LONGEST:
         for way in eyes.at(path[-1]).ways:
-            cost = 0.12 + turn_cost(wrap(way.yaw - facing), pending if steps == 0 else 0.0, asked=steps == 0 and pending != 0.0)
+            turned = wrap(way.yaw - facing)
+            cost = 0.12
+            if not (way.leaves and isinstance(clause, Enter) and clause.nth and (turned > 0) == (clause.side == LEFT)):
+                cost += turn_cost(turned, pending if steps == 0 else 0.0, asked=steps == 0 and pending != 0.0)
             cost += 1.5 * (way.node in path)
             if way.leaves and not isinstance(clause, Exit | Enter):
                 cost += 0.4 * (not isinstance(clause, Cross))
@@ -155,6 +159,14 @@ def walk_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
     if isinstance(clause, Past):
         return past_cost(clause, eyes, path)
     return 0.0
+
+
+def count_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
+    """How badly the doorway of the last step fits 'the second door on your left'; `path` begins before the clause."""
+    if not isinstance(clause, Enter) or not clause.nth:
+        return 0.0
+    found = doorway(eyes, path)
+    return 2.0 if found is None or found[0] != clause.side else min(1.2 * abs(found[1] - clause.nth), 2.0)
 
 
 def near_cost(seen: Seen, thing) -> float:
@@ -210,6 +222,6 @@ class _Led(Eyes):
     def at(self, node: int) -> Seen:
         seen = super().at(node)
         onward = self._next.get(node)
-        return Seen(seen.kind, seen.things, tuple(w for w in seen.ways if w.node == onward))
+        return dataclasses.replace(seen, ways=tuple(w for w in seen.ways if w.node == onward))
 
 

@@ -33,8 +33,9 @@ from embodied.language.clauses import (
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import Lexicon, Word, lexicon_of, says
 from embodied.language.listener import BESIDE, NEAR
-from embodied.language.seen import Eyes, Seen, SeenThing
+from embodied.language.seen import Eyes, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
+from embodied.language.templates import ORDINALS
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -94,7 +95,13 @@ def plan(world: World, path: Sequence[int], yaw: float, speaker: Speaker, *, rng
         phrases += _turn(leg.turn)
         start, end, last = leg.nodes[0], leg.nodes[-1], n + 1 == len(legs)
         if leg.crosses:
-            phrases += _crossing(eyes, lexicon, leg, kind(start), kind(end), n == 0, speaker, used, rng)
+            crossing = _crossing(eyes, lexicon, leg, kind(start), kind(end), n == 0, speaker, used, rng)
+            walked = [*itertools.chain.from_iterable(earlier.nodes[:-1] for earlier in legs[:n]), *leg.nodes]
+            if rng.random() < speaker.counts and (counted := _counted(eyes, walked, crossing)):
+                while phrases and isinstance(phrases[-1].clause, Turn) and phrases[-1].clause.angle != 180:
+                    phrases.pop()
+                crossing = counted
+            phrases += crossing
         elif (mark := _mark(eyes, lexicon, leg, speaker, used, rng, needed=last)) is not None:
             phrases.append(mark)
         elif rng.random() < speaker.metres or last:
@@ -122,7 +129,8 @@ def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
         for i in range(len(kept) - 2, 0, -1):
             if len(kept) <= clauses:
                 return kept
-            if _DROPPABLE[rank](kept[i].clause, kept[i + 1].clause):
+            between_turns = isinstance(kept[i - 1].clause, Turn) and isinstance(kept[i + 1].clause, Turn)
+            if not between_turns and _DROPPABLE[rank](kept[i].clause, kept[i + 1].clause):
                 del kept[i]
     return kept
 
@@ -131,9 +139,9 @@ _DROPPABLE = (
     lambda c, after: isinstance(c, Turn) and c.angle == 45,
     lambda c, after: isinstance(c, Forward | Metres),
     lambda c, after: isinstance(c, Cross),
-    lambda c, after: isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To),
+    lambda c, after: isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To) and not getattr(after, "nth", 0),
     lambda c, after: isinstance(c, Past),
-    lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not isinstance(after, STOPS),
+    lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not c.nth and not isinstance(after, STOPS),
     lambda c, after: isinstance(c, To) and not isinstance(after, STOPS),
 )
 """What may be left out before what follows it, the most dispensable first."""
@@ -157,6 +165,15 @@ def _crossing(eyes: Eyes, lexicon: Lexicon, leg: Leg, here: str, there: str, fir
     if first and here in PRIVATE and there in PASSAGES and rng.random() < 0.7:
         return [*phrases, Phrase(Exit(here))]
     return [*phrases, Phrase(Enter(there))]
+
+
+def _counted(eyes: Eyes, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
+    """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
+    found = doorway(eyes, walked)
+    if found is None or found[2] < 2 or found[1] >= len(ORDINALS) or not isinstance(crossing[-1].clause, Enter):
+        return []
+    side, nth, _ = found
+    return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
 
 
 def _mark(eyes: Eyes, lexicon: Lexicon, leg: Leg, speaker: Speaker, used: set[str], rng: np.random.Generator, *, needed: bool) -> Phrase | None:
@@ -202,6 +219,7 @@ def _stop(eyes: Eyes, lexicon: Lexicon, path: Sequence[int], room: str, crossed:
     """Where to stop: by something near the end that can be seen before, else in the room, else here."""
     if phrases and isinstance(phrases[-1].clause, To) and rng.random() < 0.7:
         return Phrase(StopHere())
+    crossed = crossed and not (phrases and isinstance(phrases[-1].clause, Enter))  # 'enter the hall and stop in the hall'
     end = eyes.at(path[-1])
     before = {t.placement for n in path[-3:-1] for t in eyes.at(n).things}
     near = [t for t in end.things if t.distance <= NEAR]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.language.clauses import Thing
+from embodied.language.clauses import LEFT, RIGHT, Thing
 from embodied.language.lexicon import UNFIT, says
 
 if TYPE_CHECKING:
@@ -46,6 +48,18 @@ class Way:
     """Kind of the room it leads into, as one sees through the doorway."""
     leaves: bool
     """Whether it leads into another room."""
+    door: str | None = None
+    """The doorway it goes through; tells two apart."""
+
+
+@dataclass(frozen=True)
+class Door:
+    """One doorway of the room one is in."""
+
+    id: str
+    """Tells two doorways apart; a listener must not use it as a name."""
+    offset: tuple[float, float]
+    """Metres in x and y from where one stands."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,7 @@ class Seen:
     kind: str
     things: tuple[SeenThing, ...]
     ways: tuple[Way, ...]
+    doors: tuple[Door, ...] = ()
 
     def nearest(self, thing: Thing) -> SeenThing | None:
         """The nearest thing in view that `thing` may mean."""
@@ -89,9 +104,46 @@ def look(world: World, node: int) -> Seen:
         for s in world.sightings(node) if s.pixels >= SMALLEST and s.object_class not in UNFIT
     )
     here, room = np.asarray(graph.positions[node]), graph.room_of_node[node]
-    ways = []
+    ways, doors = [], _doors(world, room)
     for n in graph.neighbours(node):
         step = np.asarray(graph.positions[n]) - here
         other = graph.room_of_node[n]
-        ways.append(Way(int(n), math.atan2(step[1], step[0]), float(np.hypot(step[0], step[1])), house.room_by_id[other].kind, other != room))
-    return Seen(house.room_by_id[room].kind, things, tuple(ways))
+        between = [(float(np.hypot(*(at - here[:2] - step[:2] / 2))), name) for name, beyond, at in doors if beyond == other]
+        ways.append(Way(int(n), math.atan2(step[1], step[0]), float(np.hypot(step[0], step[1])), house.room_by_id[other].kind,
+                        other != room, min(between)[1] if between else None))
+    seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)
+    return Seen(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
+
+
+def _doors(world: World, room: str) -> list[tuple[str, str, np.ndarray]]:
+    """(id, room beyond, middle in x and y) of the doorways of a room that lead to another."""
+    return [(o.id, o.rooms[0] if o.rooms[1] == room else o.rooms[1], (np.asarray(o.a) + np.asarray(o.b)) / 2)
+            for o in world.house.openings if o.kind == "door" and room in o.rooms and None not in o.rooms]
+
+
+def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
+    """Which doorway the last step of `path` goes through: (side, its number on that side along the way, doors on that side).
+
+    Counted from where the path came into the room that it leaves; None where nobody would count.
+    """
+    steps = [next((w for w in eyes.at(a).ways if w.node == b), None) for a, b in itertools.pairwise(path)]
+    if not steps or None in steps or steps[-1].door is None:
+        return None
+    first = max((i + 1 for i, s in enumerate(steps[:-1]) if s.leaves), default=0)
+    along = steps[first:-1] or steps[first - 1:first]
+    if not along:
+        return None
+    x, y = (sum(s.length * f(s.yaw) for s in along) for f in (math.cos, math.sin))
+    size = math.hypot(x, y)
+    if size < 0.5:
+        return None
+    sides: dict[str, list[tuple[float, str]]] = {LEFT: [], RIGHT: []}
+    for door in eyes.at(path[first]).doors:
+        ahead, across = (door.offset[0] * x + door.offset[1] * y) / size, (door.offset[1] * x - door.offset[0] * y) / size
+        if ahead > 0.3 and abs(across) > 0.3:
+            sides[LEFT if across > 0 else RIGHT].append((ahead, door.id))
+    for side, found in sides.items():
+        names = [name for _, name in sorted(found)]
+        if steps[-1].door in names:
+            return side, names.index(steps[-1].door) + 1, len(names)
+    return None

@@ -1,6 +1,7 @@
 """How clauses sound. A template speaks for one or two clauses at once and is read back by the parser.
 
-Slots: {side} left or right, {room} a room noun, {thing} 'the red sofa', {n} a number, {walk} a verb, {soon} an adverb. A slot is
+Slots: {side} left or right, {room} a room noun, {thing} 'the red sofa', {metres} 'three meters',
+{steps} 'three big steps', {nth} 'second', {walk} a verb, {soon} an adverb. A slot is
 filled by the first clause of the template that has such a field. Weights: how much each habit of
 speech likes a template; a habit that is not named uses 1.
 """
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Template:
     kinds: tuple[str, ...]
-    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'cross', 'forward', 'metres', 'to',
+    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'door', 'cross', 'forward', 'metres', 'to',
     'past', 'past_side', 'avoid', 'notice', 'stop_by', 'stop_in', 'stop_here'."""
     text: str
     habit: str = ""
@@ -49,15 +50,20 @@ TEMPLATES: tuple[Template, ...] = (
           "move into the {room}", "walk straight into the {room}", "pass through the doorway to the {room}",
           "chatty: pop into the {room}", "cross the threshold into the {room}", "come into the {room}",
           "go through the opening to the {room}", "advance into the {room}", "chatty: wander into the {room}"),
+    *_all("door", "take the {nth} door on your {side} into the {room}", "go through the {nth} door on the {side} into the {room}",
+          "enter the {room} through the {nth} door on your {side}", "go into the {room} which is the {nth} door on the {side}",
+          "terse: {nth} door on the {side} into {room}", "walk through the {nth} doorway on your {side} to get to the {room}",
+          "chatty: count the doors on your {side} and take the {nth} one into the {room}",
+          "formal: proceed through the {nth} doorway on the {side} into the {room}"),
     *_all("cross", "{walk} through the {room}", "cross the {room}", "continue along the {room}", "go across the {room}",
           "keep walking through the {room}", "head down the {room}", "follow the {room}", "formal: traverse the {room}",
           "stay in the {room} and keep going", "walk the length of the {room}", "terse: along the {room}", "proceed along the {room}"),
     *_all("forward", "{walk} straight ahead", "go straight", "walk forward", "continue straight", "keep going straight", "move ahead",
           "head straight on", "terse: straight", "chatty: just keep going", "formal: proceed straight ahead", "carry on ahead",
           "continue forward", "go ahead", "walk on", "keep on walking", "chatty: keep heading the same way", "stride ahead"),
-    *_all("metres", "{walk} {n} meters", "go forward about {n} meters", "walk straight for {n} meters", "move ahead {n} meters",
-          "take {n} big steps forward", "terse: {n} meters ahead", "chatty: go on for maybe {n} meters or so",
-          "formal: proceed approximately {n} meters", "continue for {n} meters", "go roughly {n} meters"),
+    *_all("metres", "{walk} {metres}", "go forward about {metres}", "walk straight for {metres}", "move ahead {metres}",
+          "take {steps} forward", "terse: {metres} ahead", "chatty: go on for maybe {metres} or so",
+          "formal: proceed approximately {metres}", "continue for {metres}", "go roughly {metres}"),
     *_all("to", "{walk} to {thing}", "go to {thing}", "{walk} up to {thing}", "head for {thing}", "head towards {thing}", "{walk} toward {thing}",
           "continue until you reach {thing}", "go over to {thing}", "move to {thing}", "terse: to {thing}", "terse: toward {thing}", "go straight to {thing}",
           "chatty: make your way over to {thing}", "formal: proceed to {thing}", "keep going until you get to {thing}",
@@ -112,15 +118,20 @@ FILLERS: dict[str, tuple[str, ...]] = {
     "": ("from where you are", "first", "starting here", "to start", "now"),
 }
 """Openings by habit; they mean nothing."""
-HEDGES = ("I think", "I believe", "if I remember correctly", "more or less", "kind of", "probably", "sort of", "I guess", "as far as I recall")
+HEDGES = ("I think", "I believe", "if I remember correctly", "probably", "I guess", "as far as I recall", "if I'm not mistaken", "I'm pretty sure")
 """Signs of doubt; they mean nothing."""
 LINKS: dict[str, tuple[str, ...]] = {
-    "chatty": ("and then", "and then", "then", "then", "and", "after that", "once you've done that", "next", "and after that just"),
-    "formal": ("then", "then", "and then", "next", "subsequently", "following that", "afterwards", "after which"),
+    "chatty": ("and then", "and then", "then", "then", "and", "after that", "next"),
+    "formal": ("then", "then", "and then", "next", "subsequently", "following that", "afterwards"),
     "terse": ("then", "and", ""),
-    "": ("and", "and", "and", "then", "then", "and then", "and then", "next", "after that", "from there", "once there", "at that point"),
+    "": ("and", "and", "and", "then", "then", "and then", "and then", "next", "after that"),
 }
 """What joins two clauses, by habit."""
+ARRIVED_LINKS: dict[str, tuple[str, ...]] = {
+    "chatty": ("once you've done that", "from there", "when you get there"), "formal": ("from this point", "upon arrival"),
+    "terse": (), "": ("from there", "once there", "at that point"),
+}
+"""What may join them besides, where the first has led somewhere."""
 SLIPS = {
     "straight": "strait", "until": "untill", "through": "thru", "hallway": "hall way", "towards": "torwards", "past": "passed",
     "beside": "besides", "corridor": "coridor", "kitchen": "kichen", "bedroom": "bed room", "bathroom": "bath room",
@@ -129,24 +140,30 @@ SLIPS = {
 }
 """Harmless slips of the keyboard."""
 VERBS = (
-    "walk", "stroll", "stride", "step", "move", "continue", "proceed", "head", "go", "travel", "wander", "amble", "saunter", "march",
-    "carry on", "progress", "venture", "make your way", "journey", "advance", "pace", "trot", "tread", "navigate", "cruise", "mosey", "drift",
-    "press on", "keep on", "scoot", "shuffle", "hike",
+    "walk", "go", "head", "continue", "move", "step", "proceed", "carry on", "stroll", "travel", "make your way", "keep on", "press on", "advance",
 )
 """What {walk} may be, the plainest first."""
+PLAYFUL = ("wander", "amble", "saunter", "march", "stride", "mosey", "cruise", "scoot", "trot", "venture", "shuffle", "hike", "journey", "drift")
+"""What it may be besides with chatty people."""
 SOON = ("immediately", "at once", "straight away", "directly", "sharply", "instantly", "without delay", "without hesitation")
 """What {soon} may be."""
 PRAISE = (
-    "nice", "lovely", "pretty", "fancy", "cozy", "comfy", "stylish", "neat", "old", "modern", "simple", "elegant", "beautiful", "shiny", "sturdy",
-    "charming", "plain", "tidy", "funny", "interesting", "classy", "vintage", "handsome", "gorgeous", "ordinary", "cute", "rustic", "sleek",
-    "graceful", "quaint", "solid", "heavy", "dainty", "delicate", "elaborate", "expensive", "cheap", "fashionable", "trendy", "contemporary",
-    "traditional", "classic", "antique", "retro", "dusty", "spotless", "gleaming", "glossy", "bulky", "chunky", "slender", "slim", "curvy",
-    "angular", "boxy", "rounded", "sizeable", "decorative", "practical", "handy", "useful", "familiar", "typical", "unusual", "odd", "quirky",
-    "weird", "amazing", "awesome", "wonderful", "splendid", "pleasant", "attractive", "inviting", "comfortable", "homely", "humble", "basic",
-    "standard", "regular", "polished", "worn", "weathered", "well-kept", "brand-new", "designer", "handmade", "imposing", "impressive",
-    "eye-catching", "striking", "subtle", "minimalist", "ornate", "posh", "swanky", "snazzy", "adorable", "delightful", "exquisite",
+    "nice", "lovely", "pretty", "fancy", "stylish", "neat", "old", "modern", "simple", "elegant", "beautiful", "charming", "plain", "tidy",
+    "funny", "interesting", "classy", "vintage", "handsome", "gorgeous", "ordinary", "cute", "rustic", "sleek", "quaint", "elaborate",
+    "expensive", "cheap", "fashionable", "trendy", "contemporary", "traditional", "classic", "antique", "retro", "dusty", "spotless",
+    "decorative", "typical", "unusual", "odd", "quirky", "weird", "amazing", "awesome", "wonderful", "splendid", "pleasant", "attractive",
+    "basic", "standard", "regular", "well-kept", "brand-new", "designer", "handmade", "impressive", "eye-catching", "striking", "subtle",
+    "minimalist", "ornate", "posh", "snazzy", "delightful", "exquisite", "familiar", "graceful",
 )
 """Adjectives that say nothing which could be checked; chatty people like them."""
+SEAT_PRAISE = ("cozy", "comfy", "comfortable", "inviting", "homely", "soft", "padded", "plush")
+"""More of them for what one sits or lies on."""
+BODY_PRAISE = (
+    "sturdy", "solid", "heavy", "bulky", "chunky", "boxy", "rounded", "slim", "slender", "imposing", "humble", "practical", "handy", "useful",
+    "polished", "worn", "weathered", "shiny", "gleaming", "glossy", "dainty", "delicate", "angular", "curvy", "sizeable",
+)
+"""More of them for what stands on its own and has some depth."""
 SIZES = ("large", "big", "huge", "small", "little", "tiny", "tall", "high", "long", "wide", "low", "narrow")
 """Adjectives of size; they are true when said, and nobody relies on them."""
+ORDINALS = ("zeroth", "first", "second", "third", "fourth", "fifth")
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")

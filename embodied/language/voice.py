@@ -49,9 +49,9 @@ class People:
           yaw: the walker's first direction, radians.
         """
         speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
-        wanted = max(round(rng.normal(speaker.clauses, 1.0)), 2)
+        wanted = max(round(rng.normal(speaker.clauses - 1, 1.0)), 2)
         for attempt in range(self.tries):
-            phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + attempt)
+            phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + attempt + max(attempt - 2, 0))
             text = say(phrases, speaker, rng=rng)
             if self.tries == 1:
                 return text
