@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from embodied.env import ActionError
 from embodied.interface import (
     TURNS,
     VIEWS,
@@ -142,7 +143,14 @@ def action_mask(o: Observation, layout: Layout) -> np.ndarray:
 
 
 def decode(action: int, layout: Layout) -> Action:
-    """The record behind an action's number."""
+    """The record behind an action's number.
+
+    Raises:
+      ActionError: no such number.
+    """
+    if not 0 <= action <= layout.candidates + len(INTENTIONS):
+        raise ActionError(f"action {action} does not exist; use 0 to {layout.candidates + len(INTENTIONS)}: "
+                          f"{layout.candidates} candidates, stop, and the {len(INTENTIONS)} ways to ask")
     if action < layout.candidates:
         return Move(int(action))
     if action == layout.candidates:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 
 import pytest
 from hand_worlds import grid_world, thing
@@ -128,6 +129,17 @@ def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
     (tmp_path / "half" / "houses" / ".train_0001.killed" / "house.json").write_text("{")  # as SIGKILL leaves it
     again = build(tmp_path / "half", tmp_path / "cache")
     assert again.digest == whole.digest and content(tmp_path / "half") == content(tmp_path / "whole")
+
+
+def test_a_house_that_lost_a_file_is_named_and_built_again(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache")
+    before = content(tmp_path / "data")
+    (tmp_path / "data" / "houses" / "train_0001" / "tasks_train.jsonl").unlink()
+    with pytest.raises(DatasetError, match=r"train_0001 has lost its tasks_train.jsonl; delete .*train_0001"):
+        data.tasks("train")
+    shutil.rmtree(tmp_path / "data" / "houses" / "train_0001")
+    build(tmp_path / "data", tmp_path / "cache")
+    assert content(tmp_path / "data") == before
 
 
 def test_a_house_does_not_depend_on_the_others(tmp_path):

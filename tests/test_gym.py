@@ -104,6 +104,8 @@ def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
     strict.reset(seed=0)
     with pytest.raises(ActionError):
         strict.step(bad)
+    with pytest.raises(ActionError, match="action 9999 does not exist; use 0 to"):
+        strict.unwrapped.step(9999)
 
 
 def test_actions_have_numbers():

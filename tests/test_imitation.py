@@ -52,7 +52,7 @@ torch.set_num_threads(1)
 TINY = dataclasses.replace(
     SCALES["mini"], hidden_size=32, navigation_embedding=32, ask_embedding=8, self_heads=2, text_heads=2, dropout=0.1,
     iterations=4, batch=6, training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
-    instruction_length=40, learning_rate=3e-3,
+    instruction_length=40, learning_rate=3e-3, cooldown=0.25,
 )
 
 
@@ -371,6 +371,17 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
 def test_impossible_settings_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         dataclasses.replace(TINY, **change)
+
+
+def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
+    config = dataclasses.replace(TINY, iterations=100, cooldown=0.4, learning_rate=1e-3)
+    rates = [config.learning_rate_at(u) for u in range(100)]
+    assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
+    assert dataclasses.replace(config, cooldown=0.0).learning_rate_at(99) == 1e-3
+    agent, split = agent_for(setting(), config), setting()
+    optimizer = torch.optim.Adam(agent.network.parameters(), 1.0)
+    learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())
+    assert optimizer.param_groups[0]["lr"] == rates[-1]
 
 
 def test_table_d1_is_the_default():

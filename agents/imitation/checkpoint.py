@@ -68,7 +68,7 @@ def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
     return Progress(**body["progress"])
 
 
-MAY_CHANGE = ("iterations", "checkpoint_minutes", "evaluation_batch", "evaluation_temperature", "ask_threshold")
+MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "evaluation_batch", "evaluation_temperature", "ask_threshold")
 """Settings that may differ on resuming without changing what was learned so far."""
 
 

@@ -40,6 +40,8 @@ class TrainingConfig:
     """Updates of the weights."""
     learning_rate: float = 1e-4
     """Of Adam."""
+    cooldown: float = 0.0
+    """Share of the updates, the last ones, over which the learning rate falls linearly towards zero; not in the dissertation."""
     weight_decay: float = 5e-4
     """The authors' program's; the text does not mention it (X12)."""
     batch: int = 32
@@ -105,10 +107,17 @@ class TrainingConfig:
         for name in ("learning_rate", "checkpoint_minutes"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if not 0 <= self.cooldown <= 1:
+            raise ValueError(f"cooldown must be in [0, 1], got {self.cooldown}")
         if self.training_houses < 0:
             raise ValueError(f"training_houses must not be negative, got {self.training_houses}")
         if self.alpha < 0:
             raise ValueError(f"alpha must not be negative, got {self.alpha}")
+
+    def learning_rate_at(self, update: int) -> float:
+        """Of Adam at an update, counted from 0; never zero."""
+        falling = round(self.cooldown * self.iterations)
+        return self.learning_rate * min(1.0, (self.iterations - update) / (falling + 1))
 
     def network_config(self, words: int, feature_size: int) -> HannaConfig:
         """The sizes of the networks for a vocabulary and an encoder."""
@@ -136,7 +145,7 @@ class TrainingConfig:
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
-        iterations=1500, learning_rate=7e-4, curiosity_floor=0.02, environment_dropout=0.4,
+        iterations=1500, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4,
         evaluation_temperature=0.5, validate_every=100, validation_tasks=60,
     ),
     "paper": TrainingConfig(),

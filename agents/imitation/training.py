@@ -167,6 +167,8 @@ def learn_once(
             clock.move(experience.thinking, "environment", "network")
             with clock.on("backward"):
                 losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor)
+                for group in optimizer.param_groups:
+                    group["lr"] = config.learning_rate_at(update)
                 optimizer.zero_grad(set_to_none=True)
                 (losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]).backward()
                 parallel.add_gradients(agent.network.parameters())

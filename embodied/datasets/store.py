@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.world import World
 
+T = TypeVar("T")
 ANNA_SPLIT = {
     "train": "train_seen", "val_seen": "train_unseen", "test_seen": "train_unseen", "val_unseen": "val",
     "test_unseen": "test",
@@ -107,7 +108,15 @@ class Dataset:
         return World(place.house, catalogue, place.graph, cache, file=file, **options)
 
     def routes(self, name: str) -> tuple[Route, ...]:
-        return tuple(load_lines(self.folder / "houses" / name / "routes.jsonl", Route))
+        return tuple(self._lines(name, "routes.jsonl", Route))
+
+    def _lines(self, name: str, file: str, kind: type[T]) -> list[T]:
+        home = self.folder / "houses" / name
+        try:
+            return list(load_lines(home / file, kind))
+        except FileNotFoundError:
+            raise DatasetError(f"{home} has lost its {file}; delete {home} and run the command that built "
+                               f"{self.folder} once more, it builds that house again") from None
 
     def tasks(self, split: str) -> tuple[Task, ...]:
         """All tasks of a split, house by house.
@@ -116,8 +125,7 @@ class Dataset:
           DatasetError: an unknown split.
         """
         tasks = [
-            t for name in self.names(split)
-            for t in load_lines(self.folder / "houses" / name / f"tasks_{split}.jsonl", Task)
+            t for name in self.names(split) for t in self._lines(name, f"tasks_{split}.jsonl", Task)
         ]
         if self.kind == "vnla" and split != "train":
             limits = self._vnla_limits()
