@@ -28,9 +28,9 @@ QUALITIES = ("unlit", "baked")
 BACKENDS = ("classic", "filament")
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
-SUPERSAMPLING = 2
-"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
-multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
+SUPERSAMPLING = ((384, 2.0), (10_000, 1.5))
+"""Where the CPU draws, colours are drawn this many times larger, up to that many pixels a side, and averaged: cheaper
+there than multi-sampling, which multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
@@ -97,9 +97,9 @@ class Renderer:
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
         gl.make_current()
-        self._super = SUPERSAMPLING if gl.info().software else 1
-        model.vis.quality.offsamples = 0 if self._super > 1 else MULTISAMPLES
-        self._buffer = (size * self._super, size * self._super)
+        self._software = gl.info().software
+        model.vis.quality.offsamples = 0 if self._software else MULTISAMPLES
+        self._buffer = self._drawn_size((size, size))
         model.vis.global_.offheight, model.vis.global_.offwidth = self._buffer
         self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
@@ -180,8 +180,8 @@ class Renderer:
             raise RuntimeError("the renderer is closed; make a new one")
         gl.make_current()
         mujoco.mjr_restoreBuffer(self._mjr)
-        if size[0] * self._super > self._buffer[0] or size[1] * self._super > self._buffer[1]:
-            self._buffer = tuple(max(n * self._super, b) for n, b in zip(size, self._buffer, strict=True))
+        if any(n > b for n, b in zip(self._drawn_size(size), self._buffer, strict=True)):
+            self._buffer = tuple(max(n, b) for n, b in zip(self._drawn_size(size), self._buffer, strict=True))
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
         mask = self._is_visual
         if cull:
@@ -218,14 +218,19 @@ class Renderer:
         apart = self._data.geom_xpos - np.array(camera.position)
         return np.all(apart @ planes.T >= -self.scene.model.geom_rbound[:, None] - 1e-3, axis=1)
 
+    def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
+        """(height, width) at which colours of a picture of `size` are drawn."""
+        factor = next(f for most, f in SUPERSAMPLING if max(size) <= most) if self._software else 1.0
+        return math.ceil(size[0] * factor), math.ceil(size[1] * factor)
+
     def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         if self._painter is not None:
             return self._painter.rgb(camera, size, NEAR, FAR)
-        height, width = size[0] * self._super, size[1] * self._super
+        height, width = self._drawn_size(size)
         rect, rgb = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
-        if self._super > 1:
+        if (height, width) != tuple(size):
             rgb = cv2.resize(rgb, (size[1], size[0]), interpolation=cv2.INTER_AREA)
         return rgb[::-1]
 

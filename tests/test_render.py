@@ -104,6 +104,17 @@ def test_a_resampled_view_equals_a_direct_one(renderer, yaw):
     assert (ids == direct.ids).mean() > 0.97
 
 
+def test_a_large_picture_shrunk_is_the_small_one(renderer):
+    """They are drawn with different supersampling, which must neither shift nor stretch them."""
+    small = renderer.view(EYE, 0.7, -0.3, 1.0, (240, 320)).rgb.astype(float)
+    large = renderer.view(EYE, 0.7, -0.3, 1.0, (480, 640)).rgb
+    shrunk = large.reshape(240, 2, 320, 2, 3).mean((1, 3))
+    error = lambda moved: np.abs(small[2:-2, 2:-2] - moved[2:-2, 2:-2]).mean()
+    assert error(shrunk) < 1.0
+    assert all(error(shrunk) < error(np.roll(shrunk, by, axis)) for by in (-1, 1) for axis in (0, 1))
+    assert renderer.view(EYE, 0.7, -0.3, 1.0, (385, 513)).rgb.shape == (385, 513, 3)
+
+
 def test_leaving_out_what_is_hidden_changes_no_pixel(renderer):
     rng = np.random.default_rng(1)
     for x, y in [(0.4, 0.4), (4.9, 1.0), (5.0, 1.1), (5.1, 0.9), (6.0, 3.0), (8.6, 0.4), *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2))]:
