@@ -14,7 +14,7 @@ from assets.records import Finish
 from embodied.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, StaleBake, bake, baking, check, open_bake, radiosity, settings_of, solve
 from embodied.light.atlas import atlas_of, things_of
-from embodied.light.backend import array, find_llvm
+from embodied.light.backend import array, find_llvm, variant_of
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
@@ -155,6 +155,13 @@ def test_the_film_curve_rises_and_keeps_black_black():
 
 def test_the_newest_llvm_is_found():
     assert find_llvm() is None or "LLVM" in find_llvm()
+
+
+def test_cuda_goes_before_llvm_and_without_both_the_remedy_is_named():
+    assert variant_of(lambda name: True) == "cuda_ad_rgb"
+    assert variant_of(lambda name: name == "LLVM") == "llvm_ad_rgb"
+    with pytest.raises(LightError, match="libllvm19.*quality='unlit'"):
+        variant_of(lambda name: False)
 
 
 @pytest.fixture(scope="module")
