@@ -31,6 +31,8 @@ STEP_COST = 0.01
 LAYOUT = Layout()
 VIEW = (480, 640)
 """Height and width of the rendered view, pixels."""
+VIEW_ANGLE = np.radians(78.0)
+"""Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees, so that a person finds their way."""
 
 
 class HelpGymEnv(gym.Env[dict[str, Any], int]):
@@ -144,7 +146,7 @@ def _view(world: World, pose) -> Image.Image:
         blank = Image.new("RGB", (VIEW[1], VIEW[0]), "lightgray")
         ImageDraw.Draw(blank).text((20, 20), "no pictures of this house", font=font(18), fill="black")
         return blank
-    return Image.fromarray(world.panorama(pose.node).view_rgb(pose.yaw, pose.pitch, size=VIEW))
+    return Image.fromarray(world.panorama(pose.node).view_rgb(pose.yaw, pose.pitch, VIEW_ANGLE, size=VIEW))
 
 
 def _wrapped(text: str, width: int) -> str:

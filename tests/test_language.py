@@ -11,8 +11,10 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
-from embodied.language.listener import cost, follow
+from embodied.language.listener import cost, count_cost, follow
+from embodied.language.plain import with_article
 from embodied.language.routes import legs_of, shortened
+from embodied.language.seen import Eyes, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import SLIPS, TEMPLATES
 from embodied.language.voice import Describer, People
@@ -148,3 +150,26 @@ def test_any_execution_can_be_described_even_standing_still(world):
 def test_speakers_have_shares_that_sum_to_one():
     assert sum(share for share, _ in SPEAKERS) == pytest.approx(1.0)
     assert draw_speaker(np.random.default_rng(0)) == draw_speaker(np.random.default_rng(0))
+
+
+def test_articles_follow_the_head_of_a_noun():
+    nouns = ("mug", "armchair", "row of books", "gloves", "stack of towels", "glass", "cactus")
+    assert [with_article(n).split()[0] for n in nouns] == ["a", "an", "a", "some", "a", "a", "a"]
+
+
+def test_a_counted_door_is_found_and_another_number_is_not(world):
+    """'The second door on the left' means that door to the listener, and only that one."""
+    eyes, checked = Eyes(world), 0
+    for a in range(len(world.graph.ids)):
+        for b in world.graph.neighbours(a):
+            for c in world.graph.neighbours(b):
+                found = doorway(eyes, (a, int(b), int(c))) if c != a else None
+                if found is None or found[2] < 2 or not next(w for w in eyes.at(b).ways if w.node == c).leaves:
+                    continue
+                side, nth, _ = found
+                other = "left" if side == "right" else "right"
+                right, wrong, mirrored = (count_cost(Enter("study", s, n), eyes, (a, int(b), int(c))) for s, n in (
+                    (side, nth), (side, nth + 1), (other, nth)))
+                assert right == 0 < wrong < mirrored
+                checked += 1
+    assert checked >= 2

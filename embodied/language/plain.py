@@ -89,7 +89,8 @@ def turn_words(angle: float) -> str:
 
 
 def with_article(noun: str) -> str:
-    """'a mug', 'an armchair'; nouns that are plural in form keep 'some'."""
-    if noun.endswith("s") and not noun.endswith(("ss", "us", "is")):
+    """'a mug', 'an armchair', 'a row of books'; nouns that are plural in form keep 'some'."""
+    head = noun.split(" of ")[0]
+    if head.endswith("s") and not head.endswith(("ss", "us", "is")):
         return f"some {noun}"
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
