@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TextLogColumn
 
 from embodied.house import House
 from embodied.interface import Ask, Episode
@@ -49,16 +50,22 @@ def episode_blueprint(
     if stack:
         texts = [rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
                  rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first")]
-    plots = [rrb.TimeSeriesView(origin="/plot/distance", name="Metres to go"),
+    plots = [rrb.TimeSeriesView(origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)),
              rrb.StateTimelineView(origin="/mode", name="Mode")]
     if probabilities:
-        plots.append(rrb.TimeSeriesView(origin="/plot/probability", name="Probability of asking"))
+        plots.append(rrb.TimeSeriesView(
+            origin="/plot/probability", name="Probability of asking", axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop)))
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(*looks), panorama, rrb.Horizontal(*texts),
         *([said] if dialogue else []), row_shares=[5, 3, 2, *([3] if dialogue else [])],
     )
-    left = rrb.Vertical(world, rrb.Horizontal(*plots, rrb.TextLogView(origin="/events", name="Events")), row_shares=[3, 1])
+    body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))
+    events = rrb.TextLogView(
+        origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others]))
+    below = rrb.Horizontal(*plots, events, column_shares=[*[2] * len(plots), 3])
+    left = rrb.Vertical(world, below, row_shares=[3, 1])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.TimePanel(state="collapsed", timeline="step", fps=1.5, play_state="playing"),

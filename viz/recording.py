@@ -151,7 +151,7 @@ def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float
         translation=world.graph.positions[node], quaternion=rr.Quaternion(xyzw=camera_turn(yaw, pitch))))
     recording.log("agent/camera/image", rr.Pinhole(
         width=width, height=height, focal_length=float(height / 2 / np.tan(VFOV / 2)),
-        camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.9, color=PALETTE["agent"],
+        camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.6, color=PALETTE["agent"],
     ), encoded(view, pictures.jpeg))
     equirect = panorama.equirect(pictures.panorama)
     shift = round(yaw / (2 * np.pi) * equirect.shape[1])
@@ -185,7 +185,8 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
     if thought.moves is not None:
         recording.log("plot/moves", rr.BarChart(np.asarray(thought.moves)))
     for name, p in (thought.asks or {}).items():
-        recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
+        if name != "nothing":  # what remains to one
+            recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
 
 
 def mode_name(step: Step) -> str:
