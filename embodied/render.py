@@ -28,8 +28,8 @@ QUALITIES = ("unlit", "baked")
 BACKENDS = ("classic", "filament")
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
-SUPERSAMPLING = ((384, 2.0), (10_000, 1.5))
-"""Where the CPU draws, colours are drawn this many times larger, up to that many pixels a side, and averaged: cheaper
+SUPERSAMPLING = 1.5
+"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper
 there than multi-sampling, which multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
 HIDDEN = 5
@@ -220,7 +220,7 @@ class Renderer:
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""
-        factor = next(f for most, f in SUPERSAMPLING if max(size) <= most) if self._software else 1.0
+        factor = SUPERSAMPLING if self._software else 1.0
         return math.ceil(size[0] * factor), math.ceil(size[1] * factor)
 
     def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:

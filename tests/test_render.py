@@ -105,7 +105,7 @@ def test_a_resampled_view_equals_a_direct_one(renderer, yaw):
 
 
 def test_a_large_picture_shrunk_is_the_small_one(renderer):
-    """They are drawn with different supersampling, which must neither shift nor stretch them."""
+    """Both are drawn one and a half times larger and averaged, which must neither shift nor stretch them."""
     small = renderer.view(EYE, 0.7, -0.3, 1.0, (240, 320)).rgb.astype(float)
     large = renderer.view(EYE, 0.7, -0.3, 1.0, (480, 640)).rgb
     shrunk = large.reshape(240, 2, 320, 2, 3).mean((1, 3))
