@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import html
 import io
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,13 +71,13 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
         asked = next((s.instruction for s, before in zip(x.episode.steps[1:], x.episode.steps) if isinstance(before.action, Ask)), "")
         rows.append(
             f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td><td>{html.escape(x.episode.task.request)}"
-            f"<div class=q>{html.escape(asked)}</div></td><td>{'arrived' if x.arrived else x.episode.ended}</td>"
+            f"<div class=q>{html.escape(asked)}</div></td><td>{'at a goal' if x.arrived else x.episode.ended}</td>"
             f"<td class=n>{len(x.episode.steps)}</td><td class=n>{x.episode.requests}</td><td>{link}</td></tr>"
         )
     page = (
         f"<!doctype html><meta charset=utf-8><title>{html.escape(Path(folder).name)}</title><style>{STYLE}</style>"
         f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(found)} episodes of {len(agents)} agents.</p>"
-        f'<img alt="steps and requests by agent" src="data:image/png;base64,{_plots(found, agents)}">'
+        f'<img alt="steps and requests by agent" src="data:image/png;base64,{_plots(found, agents, judged(folder))}">'
         "<table><tr><th>#<th>agent<th>request, and the first instruction heard<th>end<th>steps<th>requests<th></tr>"
         + "".join(rows) + "</table>"
     )
@@ -85,13 +86,29 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
     return path
 
 
-def _plots(found: Sequence[Listed], agents: Sequence[str]) -> str:
-    """Arrivals, steps and requests per agent, as a PNG in base64."""
+def judged(folder: Path) -> dict[str, tuple[float, float]]:
+    """Agent, named as in `Listed`, to success and half its 95 % interval in per cent; empty without a table."""
+    table = Path(folder) / "table.json"
+    if not table.exists():
+        return {}
+    rows = json.loads(table.read_text())
+    return {
+        f"{r['split']} {r['agent']}".replace("_", " "): (100 * r["values"]["success"]["mean"], 100 * r["values"]["success"]["half_width_95"])
+        for r in rows
+    }
+
+
+def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str, tuple[float, float]]) -> str:
+    """Success, steps and requests per agent, as a PNG in base64."""
     figure = Figure(figsize=(11, 0.6 + 0.45 * len(agents)), layout="constrained")
     axes = figure.subplots(1, 3, sharey=True)
     of = {a: [x for x in found if x.agent == a] for a in agents}
-    axes[0].barh(agents, [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f")
-    axes[0].set(title="ended exactly at a goal node, %\n(the tables also count those within the radius)", xlim=(0, 100))
+    if set(agents) <= set(success):
+        axes[0].barh(range(len(agents)), [success[a][0] for a in agents], xerr=[success[a][1] for a in agents], color="#2a9d8f", ecolor="#555")
+        axes[0].set(title="success, % with 95 % interval", xlim=(0, 100))
+    else:
+        axes[0].barh(range(len(agents)), [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f")
+        axes[0].set(title="stopped at a goal node, %", xlim=(0, 100))
     axes[1].boxplot([[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
     axes[1].set(title="steps")
     axes[2].boxplot([[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))

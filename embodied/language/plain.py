@@ -93,4 +93,5 @@ def with_article(noun: str) -> str:
     head = noun.split(" of ")[0]
     if head.endswith("s") and not head.endswith(("ss", "us", "is")):
         return f"some {noun}"
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+    vowel = noun[0] in "aeiou" and not noun.startswith(("uten", "uni", "use"))
+    return f"an {noun}" if vowel else f"a {noun}"
