@@ -146,7 +146,7 @@ def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
 def told(facts: dict) -> str:
     """One line about a recorded episode."""
     outcome = "found" if facts["success"] else f"missed by {facts['navigation_error_m']} m"
-    return (f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} requests for help"
+    return (f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} request{'s' * (facts['requests'] != 1)} for help"
             f"  -> {facts['recording']} ({facts['recording_mib']} MiB)")
 
 
