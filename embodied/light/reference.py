@@ -14,12 +14,14 @@ from embodied.light.backend import array, mitsuba
 from embodied.light.baking import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
-from embodied.light.trace import Hit, look, picture_at, world_of
+from embodied.light.trace import Hit, look, picture_at, through, world_of
 from embodied.panorama import FACES, Panorama
 from embodied.seeds import stream
 
 BRIGHTEST = 12.0
 """Reflected light is cut at this multiple of the exposure's white."""
+SPARK = 12.0
+"""One ray brings at most this multiple of the exposure's white."""
 QUALITIES = ("glossy", "reference", "diffuse")
 """'diffuse' is the reference without gloss but for mirrors and metals, which the classic renderer's pages should equal."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
@@ -63,23 +65,31 @@ class Tracer:
         ok, t, normal = np.asarray(hit.ok), np.asarray(hit.distance), array(hit.normal)
         ids = np.where(ok, self._world.owner[np.where(ok, np.asarray(hit.face), 0)], 0)
         along = array(centre.d) @ np.asarray(forward, np.float32)
-        inside, light, other, albedo = (np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3))
+        if self._world.panes is not None:
+            _, _, first, face = through(self._world.panes, centre, hit.distance)
+            pane = np.isfinite(np.asarray(first))
+            ids = np.where(pane, self._world.panes.owner[np.asarray(face)], ids)
+        inside, light, other, albedo, square = (np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3, 1))
         rounds = range(0, self.rays, 4)
         for start in rounds:
             ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
-            for total, part in zip((inside, light, other, albedo), self._samples(ray, rng)):
+            for total, part in zip((inside, light, other, albedo, square), self._samples(ray, rng)):
                 total += part.reshape(-1, h * w, part.shape[1]).sum(0)
         share = np.maximum(inside, 1e-6)
-        light, albedo = light / share, albedo / share
+        light, albedo, square = light / share, albedo / share, square / share
         if self.quality != "glossy":
+            noise = np.sqrt(np.maximum(square[:, 0] / np.maximum(light.mean(1), 1e-4) ** 2 - 1, 0) / self.rays)
             guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(h, w, 4)
-            light = _smoothed((light / np.maximum(albedo, 0.02)).reshape(h, w, 3), guide).reshape(-1, 3) * np.maximum(albedo, 0.02)
+            white = np.maximum(albedo, 0.02)
+            light = _smoothed((light / white).reshape(h, w, 3), guide, noise.reshape(h, w)).reshape(-1, 3) * white
         rgb = (develop(light, np.ones(3)) * inside + other) / self.rays
         rgb = (np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
+        if self._world.panes is not None:
+            ok, t = ok | pane, np.where(pane, np.asarray(first), t)
         return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
 
     def _samples(self, ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-        """Per ray: whether it ends indoors (n, 1), exposed radiance there, shown colour elsewhere, and albedo (n, 3).
+        """Per ray: how much of it ends indoors (n, 1), exposed radiance there, shown colour elsewhere, albedo (n, 3), brightness squared (n, 1).
 
         Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
         curved noise is too dark.
@@ -96,16 +106,20 @@ class Tracer:
         shown = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
         keep = np.asarray(inside)[:, None]
         there, seen = array(hit.position), np.nan_to_num(array(radiance), posinf=0.0)
-        x = np.where(keep, seen * world.exposure.at(np.where(keep, there, 0.0)), 0.0)
-        return keep.astype(np.float32), np.minimum(x, 60.0), np.where(keep, 0.0, array(shown)), np.where(keep, array(hit.albedo), 0.0)
+        x = np.minimum(np.where(keep, seen * world.exposure.at(np.where(keep, there, 0.0)), 0.0), SPARK)
+        elsewhere, share, square = np.where(keep, 0.0, array(shown)), keep.astype(np.float32), np.square(x.mean(1, keepdims=True))
+        if world.panes is None:
+            return share, x, elsewhere, np.where(keep, array(hit.albedo), 0.0), square
+        colour, left, _, _ = through(world.panes, ray, dr.select(hit.ok, hit.distance, dr.inf))
+        t = np.broadcast_to(np.asarray(left).reshape(-1, 1), share.shape).astype(np.float32)
+        return share * t, x * t, elsewhere * t + array(colour), np.where(keep, array(hit.albedo), 0.0) * t, square * t
 
     def _traced(self, hit: Hit, ray, rng: np.random.Generator):
         """e at first hits by path tracing."""
         mi, world = mitsuba(), self._world
         n = len(np.asarray(hit.distance))
-        thin = mi.Bool(np.zeros(n, bool))
         zero = mi.Float(np.zeros(n, np.float32))
-        points = Points(n, hit.position, hit.normal, hit.normal, thin, zero, zero)
+        points = Points(n, hit.position, hit.normal, hit.normal, hit.thin, zero, zero)
         return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng)
 
     def _with_gloss(self, hit: Hit, ray, diffuse, inside, rng: np.random.Generator):
@@ -147,20 +161,29 @@ class Tracer:
         return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse)
 
 
-def _smoothed(light: np.ndarray, guide: np.ndarray) -> np.ndarray:
-    """(h, w, 3) light, smoothed where normal and distance (h, w, 4) agree: a-trous (Dammertz et al. 2010), three passes."""
+def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """(h, w, 3) light, smoothed where normal and distance (h, w, 4) agree: a-trous (Dammertz et al. 2010), four passes.
+
+    Args:
+      noise: (h, w) standard error of brightness over its mean; differences within it are smoothed away, as in SVGF
+        (Schied et al. 2017, sec. 4.4).
+    """
     kernel = (0.0625, 0.25, 0.375, 0.25, 0.0625)
-    for step, like in ((1, 0.7), (2, 0.4), (4, 0.3)):
+    noise = cv2.blur(noise.astype(np.float32), (5, 5))
+    for step, like in ((1, 0.3), (2, 0.2), (4, 0.15), (8, 0.1)):
         shade = np.log(cv2.blur(light.mean(-1), (3, 3)) + 1e-3)
-        total, weight = np.zeros_like(light), np.zeros(light.shape[:2], np.float32)
+        tight = 1 / (like**2 + np.square(2 * noise))
+        total, weight, squares = np.zeros_like(light), np.zeros(light.shape[:2], np.float32), np.zeros(light.shape[:2], np.float32)
         for j in range(-2, 3):
             for i in range(-2, 3):
                 moved = lambda a: np.roll(a, (j * step, i * step), axis=(0, 1))  # noqa: B023
-                apart = np.square(moved(guide) - guide).sum(-1) / 0.02 + np.square((moved(shade) - shade) / like)
+                apart = np.square(moved(guide) - guide).sum(-1) / 0.02 + np.square(moved(shade) - shade) * tight
                 w = kernel[i + 2] * kernel[j + 2] * np.exp(-0.5 * apart).astype(np.float32)
                 total += moved(light) * w[..., None]
                 weight += w
+                squares += w * w
         light = total / weight[..., None]
+        noise = noise * np.sqrt(squares) / weight
     return light
 
 

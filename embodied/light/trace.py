@@ -17,6 +17,7 @@ from embodied.light.paths import Lights, Surfaces, lights_of
 from embodied.light.radiosity import Space
 from embodied.light.sky import Outdoors, outdoors
 from embodied.light.unwrap import face_normals
+from embodied.lit import LitPages
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,28 @@ class World:
     rows: int
     exposure: object
     outdoors: Outdoors
+    panes: Panes | None
+    """What is seen through: glass and sheer curtains."""
+
+
+@dataclass(frozen=True, eq=False)
+class Panes:
+    """See-through things, drawn over what lies behind them as the classic renderer does; k faces."""
+
+    scene: object
+    normal: object
+    """(k * 3)."""
+    uv: object
+    """(k * 3 * 2)."""
+    opacity: object
+    """(k,)."""
+    owner: np.ndarray
+    """(k,) int32 instance ids."""
+    page: object
+    """(k,), then of all pages: size (pages * 2), first texel, and sRGB pictures as shown."""
+    size: object
+    base: object
+    picture: object
 
 
 def world_of(bake: Bake, house: House) -> World:
@@ -95,6 +118,7 @@ def world_of(bake: Bake, house: House) -> World:
         coarse_albedo.append(cv2.resize(fine, soft.shape[1::-1], interpolation=cv2.INTER_AREA).reshape(-1, 3))
         coarse_glow.append(g.reshape(-1, 3))
     lw, lh = np.array(luxel_sizes).T
+    thin = np.concatenate([_listed_twice(m.faces) for m, _ in solid])
     size = np.array(sizes)
     texels = size.prod(1)
     lamps = _lamps(bake)
@@ -106,7 +130,7 @@ def world_of(bake: Bake, house: House) -> World:
     xy = uv * np.stack([lw, lh], 1)[page][:, None]
     space = Space(
         scene_of(corners), np.arange(len(corners)), u32(page), flat(xy), flat(face_normals(corners.astype(np.float64))),
-        mi.Bool(np.zeros(len(corners), bool)), u32(lw), u32(lh), u32(np.cumsum(lw * lh) - lw * lh),
+        mi.Bool(thin), u32(lw), u32(lh), u32(np.cumsum(lw * lh) - lw * lh),
         u32(np.arange(int((lw * lh).sum()))), flat(small),
     )
     hit_by_lamp = glow_coarse if not sampled else np.zeros_like(glow_coarse)
@@ -118,6 +142,33 @@ def world_of(bake: Bake, house: House) -> World:
         space, surfaces, lights, owner, mi.Bool(outer), flat(np.concatenate([g for _, g in solid]) / 255), flat(uv), u32(page),
         u32(size.ravel()), u32(np.cumsum(texels) - texels), flat(np.concatenate(albedo)), flat(np.concatenate(light)),
         flat(any_glow) if any_glow.any() else None, flat(lit.pages[-1] / 255), flat(sun.picture), sun.picture.shape[0], bake.exposure, sun,
+        _panes_of(lit, number),
+    )
+
+
+def _listed_twice(faces: np.ndarray) -> np.ndarray:
+    """(m,) bool: faces whose other side is a face too, which is how sheets are written."""
+    _, which, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return count[which.ravel()] > 1
+
+
+def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
+    clear = [m for m in lit.meshes if m.alpha < 0.9 and len(m.faces)]
+    if not clear:
+        return None
+    mi = mitsuba()
+    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
+    each = lambda value: np.concatenate([np.full(len(m.faces), value(m)) for m in clear])
+    corners = np.concatenate([m.vertices[m.faces] for m in clear])
+    used = {p: k for k, p in enumerate(sorted({m.page for m in clear}))}
+    pictures = [lit.pages[p] for p in used]
+    size = np.array([p.shape[1::-1] for p in pictures])
+    texels = size.prod(1)
+    return Panes(
+        scene_of(corners), flat(face_normals(corners.astype(np.float64))), flat(np.concatenate([m.uv[m.faces] for m in clear])),
+        flat(each(lambda m: m.alpha)), each(lambda m: number.get(m.owner, 0)).astype(np.int32), u32(each(lambda m: used[m.page])),
+        u32(size.ravel()), u32(np.cumsum(texels) - texels), flat(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
     )
 
 
@@ -147,6 +198,8 @@ class Hit:
     gloss: object
     """Roughness, specular, metallic."""
     front: object
+    thin: object
+    """A sheet, lit from both its sides."""
 
 
 def look(world: World, ray, active=True) -> Hit:
@@ -178,7 +231,42 @@ def look(world: World, ray, active=True) -> Hit:
     front = dr.dot(n, ray.d) < 0
     n = dr.select(front, n, -n)
     return Hit(ok, h.t, f, ray.o + ray.d * h.t, n, albedo, e, glow, dr.gather(mi.Bool, world.is_outdoor, f, ok),
-               dr.gather(mi.Vector3f, world.gloss, f, ok), front)
+               dr.gather(mi.Vector3f, world.gloss, f, ok), front, dr.gather(mi.Bool, world.space.thin, f, ok))
+
+
+def through(panes: Panes, ray, behind, most: int = 6):
+    """What see-through things before `behind` (distances) put over a picture, front to back.
+
+    Returns:
+      Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0 without).
+    """
+    mi = mitsuba()
+    import drjit as dr
+
+    colour, left, start = mi.Color3f(0.0), mi.Float(1.0), mi.Float(0.0)
+    first, face = mi.Float(dr.inf), mi.UInt32(0)
+    for _ in range(most):
+        ahead = mi.Ray3f(ray.o + ray.d * start, ray.d)
+        h = panes.scene.ray_intersect_preliminary(ahead, False)
+        ok = h.is_valid() & (start + h.t < behind)
+        if not dr.any(ok):
+            break
+        f = h.prim_index
+        front = ok & (dr.dot(dr.gather(mi.Vector3f, panes.normal, f, ok), ray.d) < 0)
+        at = lambda c: dr.gather(mi.Point2f, panes.uv, f * 3 + c, front)  # noqa: B023
+        q = at(0) * (1 - h.prim_uv.x - h.prim_uv.y) + at(1) * h.prim_uv.x + at(2) * h.prim_uv.y
+        page = dr.gather(mi.UInt32, panes.page, f, front)
+        w, height = (dr.gather(mi.UInt32, panes.size, page * 2 + c, front) for c in (0, 1))
+        x = dr.minimum(mi.UInt32(dr.maximum(q.x, 0) * w), w - 1)
+        y = dr.minimum(mi.UInt32(dr.maximum(q.y, 0) * height), height - 1)
+        opacity = dr.gather(mi.Float, panes.opacity, f, front)
+        colour += dr.gather(mi.Color3f, panes.picture, dr.gather(mi.UInt32, panes.base, page, front) + y * w + x, front) * (left * opacity)
+        left *= dr.select(front, 1 - opacity, 1.0)
+        face = dr.select(front & dr.isinf(first), f, face)
+        first = dr.select(front & dr.isinf(first), start + h.t, first)
+        start += dr.select(ok, h.t + 2e-4, 0.0)
+        dr.eval(colour, left, start, first, face)
+    return colour, left, first, face
 
 
 def picture_at(table, rows: int, d, active=True):
