@@ -39,7 +39,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluate import agent as agent_without_learning
 from embodied.evaluate import evaluate, spread
 from embodied.interface import VIEWS, Episode
-from embodied.records import save_lines
+from embodied.records import episodes_file, save_lines
 from embodied.tables import as_json, markdown, save
 from embodied.teachers.hanna import HannaTeacher
 
@@ -236,7 +236,7 @@ def run_eval(args: argparse.Namespace, note: Note = print, watch: Callable[[Iter
 
         def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds=worlds) -> None:
             if args.out:
-                save_lines(args.out / f"episodes_{split}_{name.replace(' ', '_').replace(',', '')}.jsonl", episodes)
+                save_lines(args.out / episodes_file(split, name), episodes)
             if name == "learned":
                 extra[split] = about(episodes, worlds)
 

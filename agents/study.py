@@ -26,7 +26,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluate import agent as agent_without_learning
 from embodied.evaluate import evaluate
 from embodied.interface import Episode, Policy
-from embodied.records import save_lines
+from embodied.records import episodes_file, save_lines
 from embodied.tables import Row, save, shown
 
 Note = Callable[[str], None]
@@ -192,8 +192,7 @@ class _Judge:
     def row(self, line: Line, split: str) -> Row:
         if (line.key, split) not in self._rows:
             def keep(name: str, episodes: Sequence[Episode]) -> None:
-                file = f"{split}_{line.key.replace(',', '').replace(' ', '_')}.jsonl"
-                save_lines(self.setting.out / "episodes" / file, episodes)
+                save_lines(self.setting.out / "episodes" / episodes_file(split, line.key), episodes)
                 if line.variant and line.played == "learned":
                     self.behaviour[line.key, split] = about(episodes, self.data.places(split))
 

@@ -67,6 +67,11 @@ def load_lines(path: Path, kind: type[T]) -> Iterator[T]:
                 raise RecordError(f"{path}:{number}: {e}") from e
 
 
+def episodes_file(split: str, agent: str) -> str:
+    """Name of the file with one agent's episodes on one split: 'episodes_val_seen_learned_no_ask.jsonl'."""
+    return f"episodes_{split}_{agent.replace(',', '').replace(' ', '_')}.jsonl"
+
+
 def fingerprint(**facts: object) -> dict[str, object]:
     """What a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
     versions = {name: importlib.metadata.version(name) for name in ("embodied", "numpy", "scipy", "shapely", "mujoco")}

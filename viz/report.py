@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from assets.cache import write_bytes
 from embodied.interface import Ask, Episode
-from embodied.records import load_lines
+from embodied.records import episodes_file, load_lines
 
 matplotlib.use("Agg")
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;color:#222}
@@ -49,9 +49,13 @@ def load_run(folder: Path) -> list[Listed]:
         raise FileNotFoundError(f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd file")
     found = []
     for path in files:
-        name = path.stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
-        found += [Listed(name, e) for e in load_lines(path, Episode)]
+        found += [Listed(_name(path.name), e) for e in load_lines(path, Episode)]
     return found
+
+
+def _name(file: str) -> str:
+    """Whose episodes a file holds: 'val seen learned no ask' of 'episodes_val_seen_learned_no_ask.jsonl'."""
+    return Path(file).stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
 
 
 def summary_line(number: int, listed: Listed) -> str:
@@ -93,7 +97,7 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
         return {}
     rows = json.loads(table.read_text())
     return {
-        f"{r['split']} {r['agent']}".replace("_", " "): (100 * r["values"]["success"]["mean"], 100 * r["values"]["success"]["half_width_95"])
+        _name(episodes_file(r["split"], r["agent"])): (100 * r["values"]["success"]["mean"], 100 * r["values"]["success"]["half_width_95"])
         for r in rows
     }
 

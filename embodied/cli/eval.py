@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     from embodied import tables
     from embodied.datasets.store import Dataset
     from embodied.evaluate import AGENTS, LOOKING, agent, evaluate
-    from embodied.records import fingerprint, save_lines
+    from embodied.records import episodes_file, fingerprint, save_lines
 
     data = Dataset(args.data)
     if data.kind != args.kind:
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     for split in args.split:
         def keep(name, episodes, split=split):
             if args.out:
-                save_lines(args.out / f"episodes_{split}_{name.replace(' ', '_').replace(',', '')}.jsonl", episodes)
+                save_lines(args.out / episodes_file(split, name), episodes)
 
         agents, worlds = {name: agent(args.kind, name) for name in names}, None
         if set(names) & set(LOOKING):

@@ -40,8 +40,9 @@ class Enter:
 
     kind: str
     side: str | None = None
+    """LEFT or RIGHT of the way walked, where doors are counted."""
     nth: int = 0
-    """Through which of the doors on that side, counted along the way; 0 where nobody counts."""
+    """Through which of the doors on that side, counted along the way from 1; 0 where nobody counts."""
 
 
 @dataclass(frozen=True)

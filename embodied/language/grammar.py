@@ -212,7 +212,8 @@ def normalised(text: str) -> str:
     return plain.strip()
 
 
-_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in (*FILLERS.values(), *LINKS.values(), *ARRIVED_LINKS.values()) for f in fs if " " in f}, key=lambda s: (-len(s), s))
+_JOINING = (*FILLERS.values(), *LINKS.values(), *ARRIVED_LINKS.values())
+_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s))
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,8 @@ def _clauses(heard: _Heard) -> list[Clause]:
     number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
     make = {
         "turn": lambda: Turn(side), "slight": lambda: Turn(side, 45), "around": lambda: Turn(LEFT, 180),
-        "exit": lambda: Exit(next(rooms)), "door": lambda: Enter(next(rooms), side, ORDINALS.index(said["nth"])), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
+        "exit": lambda: Exit(next(rooms)), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
+        "door": lambda: Enter(next(rooms), side, ORDINALS.index(said["nth"])),
         "forward": Forward, "metres": lambda: Metres(number), "to": lambda: To(thing), "past": lambda: Past(thing),
         "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "notice": lambda: Notice(thing), "stop_by": lambda: StopBy(thing),
         "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,

@@ -79,7 +79,7 @@ def sizes_of(asset: Asset) -> list[str]:
 
 
 def praise_of(asset: Asset) -> tuple[str, ...]:
-    """Words of praise that somebody might use for an asset."""
+    """Words of praise that somebody might use for an asset; comfort comes to mind three times as readily for a seat."""
     w, d, h = asset.size
     seat = bool(SEATS & set(asset.object_class.split()))
     body = asset.support not in ("surface", "ceiling") and min(w, d) > 0.25 and h > 0.3
