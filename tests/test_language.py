@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -173,3 +175,18 @@ def test_a_counted_door_is_found_and_another_number_is_not(world):
                 assert right == 0 < wrong < mirrored
                 checked += 1
     assert checked >= 2
+
+
+def test_a_room_entered_from_its_own_kind_is_the_next_or_the_other_one(lexicon):
+    speaker = SPEAKERS[0][1]
+    walk = [Phrase(Enter("corridor")), Phrase(Turn("left")), Phrase(Enter("corridor")), Phrase(Exit("corridor")), Phrase(Enter("bedroom")), Phrase(StopHere())]
+    for seed in range(20):
+        text = say(walk, speaker, rng=np.random.default_rng(seed)).lower()
+        assert len(re.findall(r"next (corridor|hallway|passage|passageway)\b", text)) == 1 and " other " not in text, text
+        assert [kind_of(c) for c in parse(text, lexicon).clauses] == [kind_of(p.clause) for p in walk], text
+
+
+def test_nobody_says_next_twice(spoken):
+    for text, _, _ in spoken:
+        for link in ("after that", "next,", "once there", "at that point", "afterwards"):
+            assert text.lower().count(f"{link} ") <= 1, text

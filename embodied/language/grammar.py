@@ -29,7 +29,7 @@ from embodied.language.clauses import (
     To,
     Turn,
 )
-from embodied.language.lexicon import ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
+from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.templates import (
     ARRIVED_LINKS,
     FILLERS,
@@ -83,16 +83,26 @@ PLAIN = 3.0
 def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
     """Sentences in the speaker's habits, e.g. 'Leave the bedroom and turn left at once. Stop by the sofa.'"""
     pieces = []
-    i = 0
+    i, again = 0, _again(phrases)
     while i < len(phrases):
         pair = tuple(kind_of(p.clause) for p in phrases[i:i + 2])
         if len(pair) == 2 and pair in _BY_KINDS and rng.random() < speaker.joining:
-            pieces.append((_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i:i + 2], speaker, rng), pair))
+            pieces.append((_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i:i + 2], again[i:i + 2], speaker, rng), pair))
             i += 2
         else:
-            pieces.append((_fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i:i + 1], speaker, rng), pair[:1]))
+            pieces.append((_fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i:i + 1], again[i:i + 1], speaker, rng), pair[:1]))
             i += 1
     return _slip(_sentences(pieces, speaker, rng), speaker, rng)
+
+
+def _again(phrases: Sequence[Phrase]) -> list[str]:
+    """What goes before the room noun of each clause: a room entered from one of its own kind is the next or the other one."""
+    found, here = [], None
+    for p in phrases:
+        kind = getattr(p.clause, "kind", None)
+        found.append(("next " if kind in PASSAGES else "other ") if kind == here and isinstance(p.clause, Enter) else "")
+        here = kind if isinstance(p.clause, Enter | Exit | Cross) else here
+    return found
 
 
 def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Generator) -> Template:
@@ -101,16 +111,16 @@ def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Genera
     return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
 
 
-def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: np.random.Generator) -> str:
+def _fill(template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator) -> str:
     verbs = VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS
     slots = {
         "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": SOON[int(rng.integers(len(SOON)))],
     }
-    rooms = [p.clause.kind for p in phrases if hasattr(p.clause, "kind")]
-    for name, kind in zip(("room", "other"), rooms):
+    rooms = [(p.clause.kind, before) for p, before in zip(phrases, again) if hasattr(p.clause, "kind")]
+    for name, (kind, before) in zip(("room", "other"), rooms):
         nouns = ROOM_NOUNS[kind]
-        slots[name] = nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))]
+        slots[name] = before + (nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))])
     for p in phrases:
         if isinstance(p.clause, Metres):
             n, many = p.clause.count, "s" * (p.clause.count != 1)
@@ -128,11 +138,13 @@ def _fill(template: Template, phrases: Sequence[Phrase], speaker: Speaker, rng: 
 def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, rng: np.random.Generator) -> str:
     """Pieces joined by links and full stops; a stop and a warning begin sentences of their own more often."""
     sentences: list[str] = []
-    current, length, hedged = "", 0, False
+    current, length, hedged, links = "", 0, False, set()
     for n, (text, kinds) in enumerate(pieces):
-        before = pieces[n - 1][1] if n else ()
-        if n and length < speaker.clauses_per_sentence and rng.random() < 0.85 and not _stands_alone(text, kinds, before):
+        last, before = pieces[n - 1] if n else ("", ())
+        if n and length < speaker.clauses_per_sentence and rng.random() < 0.85 and not _stands_alone(text, kinds, last, before):
             link = _link(speaker, bool(set(before) & ARRIVING), rng)
+            link = "then" if link in links else link  # nobody says 'next' twice
+            links |= {link} - {"and", "then", ""}
             if text.startswith("and ") or not link:
                 current += f", {text}"
             elif link in ("and", "then", "and then"):
@@ -157,12 +169,12 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
 
 ARRIVING = frozenset({"exit", "enter", "door", "cross", "forward", "metres", "to", "past", "past_side"})
 """Clauses that lead somewhere, so that 'once there' may follow."""
-_SUBJECTS = re.compile(r"(you|you'll|your|that|that's|if|I|the|not)\b")
+_SUBJECTS = re.compile(r"(you|you'll|your|that|that's|this|if|I|the|not|bingo|done|end)\b")
 
 
-def _stands_alone(text: str, kinds: tuple[str, ...], before: tuple[str, ...]) -> bool:
-    """Whether a piece is a sentence of its own: warnings, and what is no command."""
-    return "avoid" in (*kinds, *before) or _SUBJECTS.match(text) is not None
+def _stands_alone(text: str, kinds: tuple[str, ...], last: str, before: tuple[str, ...]) -> bool:
+    """Whether a piece is a sentence of its own: warnings, and what is no command or follows none."""
+    return "avoid" in (*kinds, *before) or any(_SUBJECTS.match(t) for t in (text, last))
 
 
 def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
@@ -266,8 +278,8 @@ def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _Heard | None:
 @functools.cache
 def _patterns() -> tuple[_Pattern, ...]:
     """Every template as patterns."""
-    rooms = _any(ROOM_OF_NOUN)
-    slots = {"side": "(?P<side>left|right)", "room": f"(?P<room>{rooms})", "other": f"(?P<other>{rooms})",
+    rooms, again = _any(ROOM_OF_NOUN), "(?:next |other )?"
+    slots = {"side": "(?P<side>left|right)", "room": f"{again}(?P<room>{rooms})", "other": f"{again}(?P<other>{rooms})",
              "metres": rf"(?P<n>\d+|{_any(NUMBERS)}) meters?", "steps": rf"(?P<n>\d+|{_any(NUMBERS)}) big steps?",
              "nth": f"(?P<nth>{_any(ORDINALS)})", "walk": f"(?:{_any(VERBS + PLAYFUL)})", "soon": f"(?:{_any(SOON)})"}
     found = []

@@ -19,32 +19,34 @@ if TYPE_CHECKING:
     from assets.records import Asset
 
 ROOM_NOUNS: dict[str, tuple[str, ...]] = {
-    "living_room": ("living room", "lounge", "sitting room"),
-    "family_room": ("family room", "TV room", "den"),
-    "kitchen": ("kitchen",),
+    "living_room": ("living room", "lounge", "sitting room", "front room", "parlor"),
+    "family_room": ("family room", "TV room", "den", "snug"),
+    "kitchen": ("kitchen", "cooking area"),
     "dining_room": ("dining room", "dining area"),
-    "main_bedroom": ("main bedroom", "master bedroom", "big bedroom"),
-    "bedroom": ("bedroom",),
-    "kids_room": ("kids room", "children's room", "nursery"),
-    "guest_room": ("guest room", "spare room"),
+    "main_bedroom": ("main bedroom", "master bedroom", "big bedroom", "primary bedroom", "parents' bedroom"),
+    "bedroom": ("bedroom", "sleeping room"),
+    "kids_room": ("kids room", "children's room", "nursery", "child's bedroom"),
+    "guest_room": ("guest room", "spare room", "visitors' room", "guest bedroom"),
     "bathroom": ("bathroom", "washroom"),
-    "toilet": ("toilet room", "restroom", "powder room"),
-    "hall": ("hall", "entrance hall", "entryway", "foyer"),
-    "corridor": ("corridor", "hallway", "passageway"),
-    "study": ("study", "home office"),
+    "toilet": ("toilet room", "restroom", "powder room", "half bath"),
+    "hall": ("hall", "entrance hall", "entryway", "foyer", "vestibule", "lobby"),
+    "corridor": ("corridor", "hallway", "passageway", "passage"),
+    "study": ("study", "home office", "office", "workroom"),
     "laundry_room": ("laundry room", "utility room"),
-    "pantry": ("pantry", "larder"),
+    "pantry": ("pantry", "larder", "storeroom", "food store"),
     "closet": ("closet", "walk-in closet", "dressing room"),
-    "library": ("library", "reading room"),
-    "playroom": ("playroom", "games room"),
-    "gym": ("gym", "exercise room", "fitness room"),
-    "garage": ("garage",),
-    "sun_room": ("sun room", "conservatory", "sunroom"),
-    "workshop": ("workshop", "hobby room"),
+    "library": ("library", "reading room", "book room"),
+    "playroom": ("playroom", "games room", "rec room"),
+    "gym": ("gym", "exercise room", "fitness room", "workout room", "weight room"),
+    "garage": ("garage", "car garage"),
+    "sun_room": ("sun room", "conservatory", "sunroom", "solarium", "sun porch"),
+    "workshop": ("workshop", "hobby room", "craft room", "tool room"),
     "stairwell": ("stairwell", "staircase"),
 }
 """Room kind to the nouns for it, the plainest first."""
 ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
+PASSAGES = frozenset({"corridor", "hall", "stairwell"})
+"""Kinds of room that one is in only to go elsewhere."""
 MOST_WORDS = 8
 """Longest wording of a thing: three adjectives of up to two words, then a noun."""
 UNFIT = frozenset({
@@ -68,14 +70,14 @@ def sizes_of(asset: Asset) -> list[str]:
     w, d, h = asset.size
     found = []
     if w * d > 1.4:
-        found += ["large", "big"] + ["huge"] * (w * d > 3)
+        found += ["large", "big"] + ["huge", "massive"] * (w * d > 3)
     if max(w, d, h) < 0.45:
-        found += ["small", "little"] + ["tiny"] * (max(w, d, h) < 0.2)
+        found += ["small", "little", "compact"] + ["tiny"] * (max(w, d, h) < 0.2)
     if h > 1.6:
         found += ["tall", "high"]
     if max(w, d) > 1.8:
         found += ["long", "wide"]
-    return found + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h)
+    return found + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h) + ["thin"] * (min(w, d) < 0.06)
 
 
 def praise_of(asset: Asset) -> tuple[str, ...]:

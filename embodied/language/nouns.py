@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 MORE_NOUNS: dict[str, tuple[str, ...]] = {
+    "abdominal bench": ("workout bench", "training bench"), "bean bag": ("beanbag", "squashy seat"), "dartboard": ("darts",),
+    "exercise bike": ("stationary bike", "spinning bike"), "punching bag": ("boxing bag",), "step ladder": ("stepladder", "folding ladder"),
+    "treadmill": ("jogging machine",), "air conditioner": ("cooling unit",), "grand piano": ("concert piano", "baby grand"),
     "alarm clock": ("bedside clock",), "amplifier": ("amp",),
     "ankle boots": ("leather boots",), "aquarium": ("fish bowl", "glass tank"), "armchair": ("club chair", "upholstered chair"),
     "backpack": ("knapsack", "schoolbag"), "base cabinet": ("floor unit", "worktop"),
@@ -34,7 +37,7 @@ MORE_NOUNS: dict[str, tuple[str, ...]] = {
     "flashlight": ("pocket lamp",), "floor lamp": ("tall lamp", "torchiere", "corner lamp"), "floor vase": ("big urn",),
     "folded clothes": ("folded laundry",), "football": ("leather ball",), "fridge": ("icebox", "fridge-freezer"),
     "fruit bowl": ("fruit dish", "bowl with fruit"), "game console": ("video game box",), "glass": ("beaker", "water glass"),
-    "glass-door cabinet": ("vitrine", "china cabinet", "showcase"), "gloves": ("mittens",), "grand piano": ("concert piano",),
+    "glass-door cabinet": ("vitrine", "china cabinet", "showcase"), "gloves": ("mittens",),
     "hairbrush": ("bristle brush",), "hammer": ("claw hammer", "mallet"), "handbag": ("shoulder bag", "clutch"),
     "hanging towel": ("bath towel", "hand towel"), "hat": ("fedora", "brimmed hat"), "headphones": ("earphones",),
     "helmet": ("crash helmet",), "high heels": ("stilettos", "dress shoes"),

@@ -31,7 +31,7 @@ from embodied.language.clauses import (
     Turn,
 )
 from embodied.language.grammar import Phrase
-from embodied.language.lexicon import Lexicon, Word, lexicon_of, says
+from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import BESIDE, NEAR
 from embodied.language.seen import Eyes, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
@@ -45,7 +45,6 @@ SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 PRIVATE = frozenset({"bedroom", "main_bedroom", "kids_room", "guest_room", "bathroom", "toilet", "closet", "study", "laundry_room",
                      "pantry", "garage", "gym", "library", "playroom", "workshop", "kitchen", "dining_room", "sun_room", "living_room",
                      "family_room"})
-PASSAGES = frozenset({"corridor", "hall", "stairwell"})
 
 
 @dataclass(frozen=True)

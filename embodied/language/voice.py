@@ -19,10 +19,10 @@ from embodied.language.speakers import draw_speaker
 if TYPE_CHECKING:
     from embodied.world import World
 
-TRIES = 6
-"""How often a speaker tries again when an imagined listener gets lost."""
+GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
+"""Clauses beyond the speaker's own wish in each try, while an imagined listener gets lost: other words first, then more."""
 ARRIVED = 3.0
-"""Metres within which the imagined listener has understood."""
+"""Metres within which the imagined listener has understood, as in R2R's success."""
 
 
 class People:
@@ -32,8 +32,8 @@ class People:
     would arrive (the rational speaker of ILIAD, dissertation 3.2.4), and says it otherwise if not.
     """
 
-    def __init__(self, tries: int = TRIES) -> None:
-        """`tries`: 1 says the first thing that comes to mind."""
+    def __init__(self, tries: int = len(GROWTH)) -> None:
+        """`tries`: at most len(GROWTH); 1 says the first thing that comes to mind."""
         self.tries = tries
         self._plain = PlainLanguage()
 
@@ -50,14 +50,14 @@ class People:
         """
         speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
         wanted = max(round(rng.normal(speaker.clauses - 1, 1.0)), 2)
-        for attempt in range(self.tries):
-            phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + attempt + max(attempt - 2, 0))
+        for more in GROWTH[:self.tries]:
+            phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + more)
             text = say(phrases, speaker, rng=rng)
             if self.tries == 1:
                 return text
             heard = carry_out(Eyes(world), parse(text, lexicon), path[0], yaw)
             missed = float(world.graph.distance[heard.path[-1], path[-1]])
-            if missed <= 0.5 * ARRIVED:
+            if missed <= ARRIVED:
                 return text
             if missed < least:
                 best, least = text, missed
