@@ -175,7 +175,7 @@ def _train(setting: Setting, variant: str, note: Note | None) -> str:
         log = open(folder / "log.txt", "a", buffering=1)  # noqa: SIM115 - lives as long as this training
         note = lambda line: print(line, file=log)
     progress = train_agent(data, encoder, config, folder, device=setting.device, note=note)
-    return f"{variant}: {progress.update} updates, best validation {100 * progress.best:.1f} % after {progress.best_update}"
+    return f"{variant}: {progress.update} updates, best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
 
 
 class _Judge:

@@ -33,7 +33,16 @@ from agents.imitation.losses import (
     reason_loss,
     relative_entropy,
 )
-from agents.imitation.training import Clock, Split, TrainingError, for_training, learn_once, tasks_of_update, train
+from agents.imitation.training import (
+    Clock,
+    Split,
+    TrainingError,
+    as_good,
+    for_training,
+    learn_once,
+    tasks_of_update,
+    train,
+)
 from agents.vision.bank import FeatureBank
 from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied import metrics
@@ -315,8 +324,16 @@ def test_training_writes_what_a_researcher_looks_at(tmp_path):
     lines = [json.loads(line) for line in (tmp_path / "validation.jsonl").read_text().splitlines()]
     assert [line["update"] for line in lines] == [2, 4]
     assert progress.best == max(line["success"] for line in lines)
+    kept = [line["update"] for line in lines if as_good(line["success"], progress.best, 6)]
+    assert progress.best_update in kept
     assert list(tmp_path.glob("events.out.tfevents.*"))
     assert json.loads((tmp_path / "settings.json").read_text())["batch"] == 6
+
+
+def test_of_agents_as_good_as_each_other_the_later_is_kept():
+    assert as_good(0.68, 0.71, 100) and not as_good(0.66, 0.71, 100)  # one standard error is 4.5 points
+    assert not as_good(0.68, 0.71, 1000)
+    assert as_good(0.0, 0.0, 60) and not as_good(0.9, 1.0, 60)
 
 
 def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):

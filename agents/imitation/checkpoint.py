@@ -30,6 +30,7 @@ class Progress:
     best: float = -1.0
     """Best validation success so far."""
     best_update: int = 0
+    """After which best.safetensors was kept."""
 
 
 def save_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimizer, progress: Progress) -> None:

@@ -88,7 +88,7 @@ def train(
 ) -> Progress:
     """Train `agent` in place, from `folder`'s checkpoint if there is one.
 
-    Writes checkpoint.pt (last state), best.safetensors (best validation success), settings.json,
+    Writes checkpoint.pt (last state), best.safetensors (see `validate`), settings.json,
     validation.jsonl and TensorBoard scalars into `folder`.
 
     Args:
@@ -233,7 +233,11 @@ def validate(
     agent: HannaAgent, split: Split, progress: Progress, folder: Path, report: Report, seconds: float,
     on_validation: Callable[[int, Sequence[Episode]], None] | None,
 ) -> Progress:
-    """Play validation tasks with the likeliest actions; keep the agent if it is the best so far."""
+    """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far.
+
+    Of agents that a few hundred tasks cannot tell apart, the one that learned longest is kept, and
+    not the luckiest.
+    """
     config = agent.config
     tasks = [dataclasses.replace(t, horizon=config.evaluation_steps) for t in split.tasks[: config.validation_tasks]]
     agent.network.eval()
@@ -248,13 +252,20 @@ def validate(
     values["request share"] = sum(isinstance(s.action, Ask) for e in episodes for s in e.steps) / max(
         1, sum(len(e.steps) for e in episodes)
     )
-    report.validated(progress.update, values, len(episodes), seconds)
+    best = max(progress.best, values["success"])
+    kept = as_good(values["success"], best, len(episodes))
+    report.validated(progress.update, values, len(episodes), seconds, kept)
     if on_validation is not None:
         on_validation(progress.update, episodes)
-    if values["success"] > progress.best:
-        progress = dataclasses.replace(progress, best=values["success"], best_update=progress.update)
+    if kept:
+        progress = dataclasses.replace(progress, best=best, best_update=progress.update)
         save_agent(agent, folder / "best.safetensors")
     return progress
+
+
+def as_good(success: float, best: float, episodes: int) -> bool:
+    """Whether a success rate on `episodes` tasks is within one standard error of the best one (Breiman's rule)."""
+    return success >= best - math.sqrt(best * (1 - best) / episodes)
 
 
 class Report:
@@ -268,7 +279,6 @@ class Report:
 
         self.folder, self.iterations, self.note = folder, iterations, note
         self.clock = Clock()
-        self.best = (progress.best, progress.best_update)
         where = folder if parallel.rank() == 0 else folder / f"process_{parallel.rank()}"
         self._writer = SummaryWriter(str(where), purge_step=progress.update + 1)
         self._sums: dict[str, float] = {}
@@ -302,19 +312,17 @@ class Report:
         self._sums, self._counts, self.clock.spent = {}, {}, {}
         self._since = time.monotonic()
 
-    def validated(self, update: int, values: Mapping[str, float], episodes: int, seconds: float) -> None:
+    def validated(self, update: int, values: Mapping[str, float], episodes: int, seconds: float, kept: bool) -> None:
         """Write a validation down."""
         for name, value in values.items():
             self._writer.add_scalar(f"validation/{name}", value, update)
         line = {"update": update, "minutes": round(seconds / 60, 2), "episodes": episodes, **values}
         with open(self.folder / "validation.jsonl", "a") as f:
             f.write(json.dumps(line) + "\n")
-        better = values["success"] > self.best[0]
-        self.best = (values["success"], update) if better else self.best
         self.note(
             f"validation on {episodes} unseen tasks after {update} updates: success {100 * values['success']:.1f} %, SPL "
             f"{100 * values['spl']:.1f} %, {values['requests']:.1f} requests, {values['steps']:.1f} steps, ends "
-            f"{values['navigation error']:.1f} m away" + ("; the best so far" if better else "")
+            f"{values['navigation error']:.1f} m away" + ("; kept" if kept else "")
         )
 
     def close(self) -> None:
