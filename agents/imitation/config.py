@@ -145,7 +145,7 @@ class TrainingConfig:
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
-        iterations=2000, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4,
+        iterations=1600, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4,
         evaluation_temperature=0.5, validate_every=200, validation_tasks=200,
     ),
     "paper": TrainingConfig(),
