@@ -61,8 +61,8 @@ def _name(file: str) -> str:
 def summary_line(number: int, listed: Listed) -> str:
     """One line of the list."""
     e = listed.episode
-    mark = "ok  " if listed.arrived else "miss"
-    return f"{number:4}  {mark} {len(e.steps):3} steps {e.requests:2} requests  {listed.agent:<28} {e.task.id:<28} {e.task.request}"
+    end = "at a goal" if listed.arrived else e.ended
+    return f"{number:4}  {end:<10} {len(e.steps):3} steps {e.requests:2} requests  {listed.agent:<28} {e.task.id:<28} {e.task.request}"
 
 
 def write_page(folder: Path, found: Sequence[Listed]) -> Path:
