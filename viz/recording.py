@@ -19,7 +19,7 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
-from embodied.interface import Ask, Episode, Mode, Move, Sight, Step, Stop, Task
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
 from embodied.world import World
 from viz.house3d import light_meshes, lit_meshes, log_house
 from viz.story import Story
@@ -29,6 +29,8 @@ PALETTE = {
     "goal": (20, 190, 90), "start": (90, 90, 90), "agent": (31, 119, 255), "person": (255, 120, 0),
 }
 VFOV = np.deg2rad(75.0)
+SHORT = 60
+"""Letters of a request that is shown as a heading."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,10 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
             colors=PALETTE["goal"], labels=[p.object_class for p in sought], radii=0.012,
         ), static=True)
     recording.log("task/start", rr.Points3D(at[task.start.node] - [0, 0, 1.44], radii=0.13, colors=PALETTE["start"]), static=True)
-    recording.log("text/request", rr.TextDocument(f"## “{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True)
+    heading = "## " if len(task.request) <= SHORT else ""
+    recording.log("text/request", rr.TextDocument(f"{heading}“{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True)
+    for name in ("goal", "target"):
+        recording.log(f"plot/distance/{name}", rr.SeriesLines(colors=PALETTE["route" if name == "target" else name], widths=2), static=True)
     people = [p for p in world.house.placements if p.object_class == "person"]
     if people:
         recording.log("people", rr.Points3D(
@@ -114,7 +119,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("plot/distance/goal", rr.Scalars(goal_distance))
     if step.targets and tuple(step.targets) != tuple(task.goal_nodes):
         target = min(float(world.graph.distance[step.pose.node, g]) for g in step.targets)
-        recording.log("plot/distance/current_target", rr.Scalars(target))
+        recording.log("plot/distance/target", rr.Scalars(target))
     state.before(step)
     recording.log("mode", rr.StateChange(state=mode_name(step)))
     recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
@@ -205,6 +210,12 @@ def instruction_text(step: Step) -> str:
     return f"**{mode}**\n\n> {step.instruction}{helpers}"
 
 
+WANTED = {
+    Intention.HELP: "for help", Intention.CUR: "where it is", Intention.GOAL: "where to go", Intention.SUB: "for a nearer goal",
+}
+"""What a request is for, in the event log."""
+
+
 def event_text(world: World, step: Step) -> str:
     """One line of the event log."""
     room = world.graph.room_of_node[step.pose.node].replace("_", " ")
@@ -213,7 +224,7 @@ def event_text(world: World, step: Step) -> str:
         return f"goes on in the {room}" if to == room else f"goes from the {room} to the {to}"
     if isinstance(step.action, Stop):
         return f"stops in the {room}"
-    return f"asks for help in the {room} ({step.action.intention.value})"
+    return f"asks {WANTED[step.action.intention]} in the {room}"
 
 
 def event_level(step: Step) -> str:
