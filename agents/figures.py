@@ -1,4 +1,4 @@
-"""The figures of a study: D.1, D.2, and success against the number of training houses."""
+"""The figures of a study: D.1, D.2, learning curves, and success against the number of training houses."""
 
 from __future__ import annotations
 
@@ -50,6 +50,29 @@ def houses_figure(curves: Mapping[str, Sequence[tuple[int, Estimate]]], path: Pa
     axes.set_ylim(0, 100)
     axes.legend()
     axes.grid(alpha=0.3)
+    _save(figure, path)
+
+
+def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path: Path) -> None:
+    """Validation success and requests against updates, one curve per agent.
+
+    Args:
+      validations: agent to the lines of its validation.jsonl.
+    """
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for agent, lines in validations.items():
+        updates = [line["update"] for line in lines]
+        left.plot(updates, [100 * line["success"] for line in lines], marker="o", markersize=3, label=agent)
+        right.plot(updates, [line["requests"] for line in lines], marker="o", markersize=3, label=agent)
+    left.set_ylabel("validation success (%)")
+    left.set_ylim(0, 100)
+    left.legend(fontsize=8)
+    right.set_ylabel("requests per task")
+    right.set_ylim(bottom=0)
+    for axes in (left, right):
+        axes.set_xlabel("updates")
+        axes.grid(alpha=0.3)
     _save(figure, path)
 
 

@@ -8,6 +8,7 @@ comparable in shape, not in level.
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ import torch
 
 from agents.commands import about, split_of, train_agent
 from agents.evaluate import hanna_policies
-from agents.figures import conditions_figure, houses_figure, requests_figure
+from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.imitation.config import TrainingConfig
 from agents.vision.encoder import Encoder, load_encoder
@@ -144,7 +145,8 @@ class Setting:
 
 
 def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
-    """Train what is missing, judge, and write each table as Markdown, CSV and JSON; returns the Markdown files.
+    """Train what is missing, judge, and write the tables as Markdown, CSV and JSON, and the learning curves;
+    returns the Markdown files.
 
     Agents are trained in `workers` processes; each goes on from its run folder, so the same
     command continues after an interruption. Results do not depend on `workers`.
@@ -162,6 +164,7 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
     jobs = (joblib.delayed(_train)(setting, v, note if workers == 1 else None) for v in wanted)
     for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
         note(line)
+    curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
     judged = _Judge(setting, data, note)
     return {name: _write(setting, name, judged) for name in names}
 
@@ -176,6 +179,12 @@ def _train(setting: Setting, variant: str, note: Note | None) -> str:
         note = lambda line: print(line, file=log)
     progress = train_agent(data, encoder, config, folder, device=setting.device, note=note)
     return f"{variant}: {progress.update} updates, best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
+
+
+def _validations(folder: Path) -> list[dict[str, float]]:
+    """How a training went, validation by validation."""
+    lines = (json.loads(line) for line in (folder / "validation.jsonl").read_text(encoding="utf-8").splitlines())
+    return list({line["update"]: line for line in lines}.values())  # a resumed run may have validated twice
 
 
 class _Judge:

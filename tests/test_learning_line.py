@@ -104,6 +104,7 @@ def study(data, tmp_path):
 def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study):
     lines = []
     written = run_study(study, ["4.5", "4.6"], note=lines.append)
+    assert (study.out / "figure_curves.png").read_bytes().startswith(b"\x89PNG")
     assert sorted(p.name for p in (study.out / "agents").iterdir()) == [
         "ask_every_5", "final", "lstm", "no_ask", "no_curiosity", "random_ask"]
     settings = json.loads((study.folder_of("ask every 5") / "settings.json").read_text())
