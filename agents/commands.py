@@ -19,7 +19,7 @@ import numpy as np
 import torch
 
 from agents.evaluate import failures, hanna_policies, predictions, request_share
-from agents.hanna.agent import load_agent, new_agent
+from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.imitation.checkpoint import Progress
 from agents.imitation.config import SCALES, TrainingConfig
 from agents.imitation.parallel import check_device, join_launcher
@@ -196,21 +196,32 @@ def run_train_hanna(
     torch.set_num_threads(args.threads)
     train_agent(
         Dataset(args.data), encoder_of(args), chosen(args, SCALES[args.scale]), args.out,
-        device=join_launcher(args.device), minutes=args.minutes, note=note, on_validation=on_validation,
+        device=join_launcher(args.device), minutes=args.minutes, begin=args.begin, note=note, on_validation=on_validation,
     )
     return 0
 
 
 def train_agent(
     data: Dataset, encoder: Encoder, config: TrainingConfig, folder: Path, *, device: str = "cpu",
-    minutes: float | None = None, note: Note = print,
+    minutes: float | None = None, begin: Path | None = None, note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; arguments as in agents.imitation.training.train."""
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.imitation.training.train.
+
+    Args:
+      begin: a trained agent whose weights and words a new run begins with.
+
+    Raises:
+      ValueError: `begin` has networks of other sizes, or learned from another encoder.
+    """
     houses = config.training_houses or None
     training = split_of(data, "train", encoder, device, houses=houses)
     validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
-    agent = new_agent(config, vocabulary_of(data, houses), encoder.digest, encoder.size)
+    vocabulary = vocabulary_of(data, houses) if begin is None else load_agent(begin).vocabulary
+    agent = new_agent(config, vocabulary, encoder.digest, encoder.size)
+    if begin is not None:
+        take_weights(agent, load_agent(begin), begin)
+        note(f"a new run begins with the weights of {begin}")
     agent.network.to(device)
     parameters = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})

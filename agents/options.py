@@ -87,6 +87,7 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
     parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    parser.add_argument("--begin", type=Path, metavar="FILE", help="begin with the weights of this agent instead of random ones")
     add_fields(parser, TrainingConfig)
 
 

@@ -95,3 +95,18 @@ def load_agent(path: Path = SHIPPED) -> HannaAgent:
     agent.network.load_state_dict({k: v.float() for k, v in tensors.items()})
     agent.network.eval()
     return agent
+
+
+def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
+    """Copy the weights of `other`, read from `source`, into `agent`.
+
+    Raises:
+      ValueError: their networks differ, or the features that they know.
+    """
+    sizes = [a.config.network_config(len(a.vocabulary), a.feature_size) for a in (agent, other)]
+    if (agent.encoder_digest, agent.config.model, sizes[0]) != (other.encoder_digest, other.config.model, sizes[1]):
+        raise ValueError(
+            f"{source} cannot be begun with: it is a {other.config.model!r} of {sizes[1]} on encoder {other.encoder_digest[:12]}, "
+            f"this run a {agent.config.model!r} of {sizes[0]} on encoder {agent.encoder_digest[:12]}; give this run its settings"
+        )
+    agent.network.load_state_dict(other.network.state_dict())
