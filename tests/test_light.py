@@ -10,9 +10,9 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
-from assets.records import Finish
+from assets.records import Finish, MeshPart
 from embodied.house import House, Light, Room, Sky, Storey
-from embodied.light import LightError, StaleBake, bake, baking, check, open_bake, radiosity, settings_of, solve
+from embodied.light import LightError, StaleBake, atlas, bake, baking, check, open_bake, radiosity, settings_of, solve
 from embodied.light.atlas import atlas_of, things_of
 from embodied.light.backend import array, find_llvm, variant_of
 from embodied.light.emitters import lamps_of, portals_of
@@ -121,6 +121,35 @@ def test_packed_rectangles_do_not_overlap():
     for (x, y), (w, h) in zip(places, sizes):
         taken[y : y + h, x : x + w] += 1
     assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
+
+
+def ring(side: float, width: float) -> MeshPart:
+    """The upper edges of skirting around a square room: four strips in one plane, mitred at the corners."""
+    outer = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
+    inner = side / 2 + (outer - side / 2) * (1 - 2 * width / side)
+    vertices = np.concatenate([np.pad(np.concatenate([outer, inner]), ((0, 0), (0, 1)))]).astype(np.float32)
+    faces = np.array([f for k in range(4) for f in ((k, (k + 1) % 4, 4 + k), ((k + 1) % 4, 4 + (k + 1) % 4, 4 + k))], np.int32)
+    return MeshPart(vertices, faces, np.tile(np.float32([0, 0, 1]), (8, 1)), np.zeros((8, 2), np.float32), Finish())
+
+
+def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor():
+    flat = unwrap_planes([ring(4.0, 0.05)], 40.0)
+    assert np.prod(flat.size) < 0.15 * (4.0 * 40.0) ** 2
+    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
+    assert on_page == pytest.approx(areas_of(flat.corners) * 40.0**2, rel=1e-3)
+
+
+def test_charts_of_a_model_fill_half_of_their_sheet_and_do_not_overlap(monkeypatch):
+    """Twelve laths side by side, of which xatlas alone leaves 59 % of the sheet empty. Overlapping charts would cover less than their area."""
+    laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
+    flat = unwrap_model(laths, 6000.0)
+    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()
+    assert on_page > 0.5 * np.prod(flat.size)
+    assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
+    monkeypatch.setattr(atlas, "OFFSETS", atlas.OFFSETS[:1])
+    width, height = (int(x) for x in flat.size)
+    page = atlas.Page(width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part)
+    assert len(atlas.rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
 
 
 def test_the_sun_rises_in_the_east_stands_south_at_noon_and_is_below_at_midnight():
