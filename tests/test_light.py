@@ -12,9 +12,23 @@ from handmade import HandCatalogue, box_mesh, furnished
 
 from assets.records import Finish, MeshPart
 from embodied.house import House, Light, Room, Sky, Storey
-from embodied.light import LightError, StaleBake, atlas, bake, baking, check, open_bake, radiosity, settings_of, solve
+from embodied.light import (
+    LightError,
+    StaleBake,
+    atlas,
+    bake,
+    baking,
+    check,
+    compose,
+    denoise,
+    open_bake,
+    radiosity,
+    settings_of,
+    solve,
+)
 from embodied.light.atlas import atlas_of, things_of
 from embodied.light.backend import array, find_llvm, variant_of
+from embodied.light.bench import psnr, ssim
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
@@ -121,6 +135,41 @@ def test_packed_rectangles_do_not_overlap():
     for (x, y), (w, h) in zip(places, sizes):
         taken[y : y + h, x : x + w] += 1
     assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
+
+
+def test_specks_are_judged_by_neighbours_that_face_the_same_way():
+    """A dark jamb beside a bright wall stays dark; a black luxel among bright ones that face its way is lifted."""
+    normal = np.array([(1, 0, 0)] * 5 + [(0, 1, 0)] * 8, np.float32)
+    e = np.array([0.1] * 5 + [1.0] * 8, np.float32)[:, None].repeat(3, 1)
+    near = np.array([[1, 2, 3, 4, *range(5, 13)], [0, 1, 2, 3, *range(5, 13)]], np.int32)
+    chosen = np.arange(13) < 1
+    assert denoise.lift_specks(e, normal, near[:1], chosen)[0] == pytest.approx(0.1)
+    assert denoise.lift_specks(e, np.tile(normal[:1], (13, 1)), near[:1], chosen)[0] == pytest.approx(0.5)
+
+
+def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_farther_in():
+    """A row of which the left six luxels are seen and bright, and the rest lie below a bed that lets a tenth in."""
+    good = np.arange(24) < 6
+    own = np.where(good, 1.0, 0.1)[:, None].astype(np.float32)
+    row = compose.filled(np.arange(24), own, good, (1, 24))[0, :, 0]
+    assert (row[:7] == 1.0).all() and (np.diff(row) <= 0).all() and row[14:] == pytest.approx(0.1)
+    assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
+
+
+def test_bright_spots_are_tamed_without_loss_of_light():
+    lux, _ = closed_box(2.0, Finish((SRGB_HALF,) * 3 + (1.0,)))
+    seen = np.ones((len(lux.area), 3), np.float32)
+    seen[:40] = np.geomspace(1.1, 60.0, 40)[:, None]
+    tamed = solve._tamed(lux, seen)
+    assert tamed.max() < 55.0
+    assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
+
+
+def test_pixels_left_out_do_not_count_in_the_bench():
+    a, b = np.full((40, 60, 3), 100, np.uint8), np.full((40, 60, 3), 110, np.uint8)
+    b[:, 40:] = 250
+    assert psnr(a, b, np.arange(60)[None].repeat(40, 0) < 30) == pytest.approx(20 * np.log10(255 / 10), abs=1e-6)
+    assert psnr(a, b) < 10 and ssim(a, b, np.arange(60)[None].repeat(40, 0) < 30) > 0.98 > ssim(a, b)
 
 
 def ring(side: float, width: float) -> MeshPart:
