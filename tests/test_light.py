@@ -20,7 +20,6 @@ from embodied.light import (
     baking,
     check,
     compose,
-    denoise,
     open_bake,
     radiosity,
     settings_of,
@@ -137,16 +136,6 @@ def test_packed_rectangles_do_not_overlap():
     assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
 
 
-def test_specks_are_judged_by_neighbours_that_face_the_same_way():
-    """A dark jamb beside a bright wall stays dark; a black luxel among bright ones that face its way is lifted."""
-    normal = np.array([(1, 0, 0)] * 5 + [(0, 1, 0)] * 8, np.float32)
-    e = np.array([0.1] * 5 + [1.0] * 8, np.float32)[:, None].repeat(3, 1)
-    near = np.array([[1, 2, 3, 4, *range(5, 13)], [0, 1, 2, 3, *range(5, 13)]], np.int32)
-    chosen = np.arange(13) < 1
-    assert denoise.lift_specks(e, normal, near[:1], chosen)[0] == pytest.approx(0.1)
-    assert denoise.lift_specks(e, np.tile(normal[:1], (13, 1)), near[:1], chosen)[0] == pytest.approx(0.5)
-
-
 def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_farther_in():
     """A row of which the left six luxels are seen and bright, and the rest lie below a bed that lets a tenth in."""
     good = np.arange(24) < 6
@@ -188,12 +177,12 @@ def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor(
     assert on_page == pytest.approx(areas_of(flat.corners) * 40.0**2, rel=1e-3)
 
 
-def test_charts_of_a_model_fill_half_of_their_sheet_and_do_not_overlap(monkeypatch):
-    """Twelve laths side by side, of which xatlas alone leaves 59 % of the sheet empty. Overlapping charts would cover less than their area."""
+def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
+    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between charts. Overlapping charts would cover less than their area."""
     laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
     flat = unwrap_model(laths, 6000.0)
     on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()
-    assert on_page > 0.5 * np.prod(flat.size)
+    assert on_page > 0.43 * np.prod(flat.size)
     assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
     monkeypatch.setattr(atlas, "OFFSETS", atlas.OFFSETS[:1])
     width, height = (int(x) for x in flat.size)

@@ -290,7 +290,7 @@ def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
     patches = mend(light.patches)
     total = direct + indirect + patches
     if soft.any():
-        indirect = indirect + denoise.lift_specks(total, lux.normal, near, soft) - total
+        indirect = indirect + denoise.lift_specks(total, near, soft) - total
     return replace(light, direct=direct, patches=patches, indirect=np.maximum(indirect, 0.0), good=light.good | soft)
 
 

@@ -20,7 +20,7 @@ from assets.cache import atomic_path, digest
 from assets.records import MeshPart
 from embodied.light.backend import constant, mitsuba, r2, scene_of, vector
 
-VERSION = 5
+VERSION = 6
 """Counts up whenever an unwrapping would come out differently."""
 
 
@@ -139,7 +139,9 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
 
 
 def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Charts as upright rectangles packed anew, a luxel apart: xatlas leaves half of a sheet of strips empty.
+    """Charts as upright rectangles packed anew: xatlas leaves half of a sheet of strips empty.
+
+    Two luxels lie between charts, one for each, so that reading between luxels brings no light from another chart.
 
     Args:
       luxels: (m, 3, 2). faces: (m, 3) int, vertices that belong to one chart each.
@@ -154,10 +156,10 @@ def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
     np.minimum.at(low, np.repeat(chart, 3), luxels.reshape(-1, 2))
     np.maximum.at(high, np.repeat(chart, 3), luxels.reshape(-1, 2))
     low = np.floor(low)
-    sizes = np.ceil(high - low).astype(int) + 1
+    sizes = np.ceil(high - low).astype(int) + 2
     flat = luxels - low[chart][:, None]
     lying = sizes[:, 0] > sizes[:, 1]
-    turned = np.stack([flat[..., 1], sizes[chart, 0][:, None] - 1 - flat[..., 0]], axis=-1)
+    turned = np.stack([flat[..., 1], sizes[chart, 0][:, None] - 2 - flat[..., 0]], axis=-1)
     flat = np.where(lying[chart][:, None, None], turned, flat)
     sizes[lying] = sizes[lying][:, ::-1]
     side = np.sqrt(sizes.prod(1).sum())
