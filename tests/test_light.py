@@ -10,11 +10,24 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
-from assets.records import Finish
+from assets.records import Finish, MeshPart
 from embodied.house import House, Light, Room, Sky, Storey
-from embodied.light import LightError, StaleBake, bake, baking, check, open_bake, radiosity, settings_of, solve
+from embodied.light import (
+    LightError,
+    StaleBake,
+    atlas,
+    bake,
+    baking,
+    check,
+    compose,
+    open_bake,
+    radiosity,
+    settings_of,
+    solve,
+)
 from embodied.light.atlas import atlas_of, things_of
 from embodied.light.backend import array, find_llvm, variant_of
+from embodied.light.bench import psnr, ssim
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
@@ -121,6 +134,60 @@ def test_packed_rectangles_do_not_overlap():
     for (x, y), (w, h) in zip(places, sizes):
         taken[y : y + h, x : x + w] += 1
     assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
+
+
+def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_farther_in():
+    """A row of which the left six luxels are seen and bright, and the rest lie below a bed that lets a tenth in."""
+    good = np.arange(24) < 6
+    own = np.where(good, 1.0, 0.1)[:, None].astype(np.float32)
+    row = compose.filled(np.arange(24), own, good, (1, 24))[0, :, 0]
+    assert (row[:7] == 1.0).all() and (np.diff(row) <= 0).all() and row[14:] == pytest.approx(0.1)
+    assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
+
+
+def test_bright_spots_are_tamed_without_loss_of_light():
+    lux, _ = closed_box(2.0, Finish((SRGB_HALF,) * 3 + (1.0,)))
+    seen = np.ones((len(lux.area), 3), np.float32)
+    seen[:40] = np.geomspace(1.1, 60.0, 40)[:, None]
+    tamed = solve._tamed(lux, seen)
+    assert tamed.max() < 55.0
+    assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
+
+
+def test_pixels_left_out_do_not_count_in_the_bench():
+    a, b = np.full((40, 60, 3), 100, np.uint8), np.full((40, 60, 3), 110, np.uint8)
+    b[:, 40:] = 250
+    assert psnr(a, b, np.arange(60)[None].repeat(40, 0) < 30) == pytest.approx(20 * np.log10(255 / 10), abs=1e-6)
+    assert psnr(a, b) < 10 and ssim(a, b, np.arange(60)[None].repeat(40, 0) < 30) > 0.98 > ssim(a, b)
+
+
+def ring(side: float, width: float) -> MeshPart:
+    """The upper edges of skirting around a square room: four strips in one plane, mitred at the corners."""
+    outer = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
+    inner = side / 2 + (outer - side / 2) * (1 - 2 * width / side)
+    vertices = np.concatenate([np.pad(np.concatenate([outer, inner]), ((0, 0), (0, 1)))]).astype(np.float32)
+    faces = np.array([f for k in range(4) for f in ((k, (k + 1) % 4, 4 + k), ((k + 1) % 4, 4 + (k + 1) % 4, 4 + k))], np.int32)
+    return MeshPart(vertices, faces, np.tile(np.float32([0, 0, 1]), (8, 1)), np.zeros((8, 2), np.float32), Finish())
+
+
+def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor():
+    flat = unwrap_planes([ring(4.0, 0.05)], 40.0)
+    assert np.prod(flat.size) < 0.15 * (4.0 * 40.0) ** 2
+    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
+    assert on_page == pytest.approx(areas_of(flat.corners) * 40.0**2, rel=1e-3)
+
+
+def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
+    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between charts. Overlapping charts would cover less than their area."""
+    laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
+    flat = unwrap_model(laths, 6000.0)
+    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()
+    assert on_page > 0.43 * np.prod(flat.size)
+    assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
+    monkeypatch.setattr(atlas, "OFFSETS", atlas.OFFSETS[:1])
+    width, height = (int(x) for x in flat.size)
+    page = atlas.Page(width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part)
+    assert len(atlas.rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
 
 
 def test_the_sun_rises_in_the_east_stands_south_at_noon_and_is_below_at_midnight():

@@ -45,10 +45,9 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     start = sum(len(t.index) for t in lux.texels[:number])
     mine = slice(start, start + len(lux.texels[number].index))
     coarse = lux.texels[number]
-    good = light.good[mine]
-    good = good if good.any() else np.ones(len(good), bool)
-    soft = spread(coarse.index[good], (light.soft[mine] + AMBIENT.astype(np.float32))[good], coarse.shape)
-    share = spread(coarse.index[good], light.sun[mine][good, None], coarse.shape)[..., 0]
+    own = np.concatenate([light.soft[mine] + AMBIENT.astype(np.float32), light.sun[mine, None]], axis=1)
+    known = filled(coarse.index, own, light.good[mine], coarse.shape)
+    soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
     t = rasterise(page, page.fineness)
     colour = albedo(page, t, read)
     size = (page.width * page.fineness, page.height * page.fineness)
@@ -120,6 +119,31 @@ def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     number = np.zeros(len(mask), np.int64)
     number[index] = np.arange(len(index))
     return number[nearest(mask.reshape(shape)).ravel()]
+
+
+HIDDEN = (2.0, 8.0)
+"""Luxels behind things take their visible neighbours' light up to the first distance (in luxels), and none of it from the second on."""
+
+
+def filled(index: np.ndarray, own: np.ndarray, good: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(h, w, c) of a page: the good luxels' values, and theirs that fade into each hidden luxel's own beyond them.
+
+    A luxel below a cupboard that stands on the floor must not darken the floor beside it; one below a
+    bed is seen, and dark.
+
+    Args:
+      index: (n,) flat positions. own: (n, c). good: (n,) bool.
+    """
+    if good.all() or not good.any():
+        return spread(index, own, shape)
+    out, seen = spread(index[good], own[good], shape), np.zeros(shape, np.uint8)
+    seen.ravel()[index[good]] = 1
+    hidden = index[~good]
+    apart = cv2.distanceTransform(1 - seen, cv2.DIST_L2, 5).ravel()[hidden]
+    weight = np.clip((apart - HIDDEN[0]) / (HIDDEN[1] - HIDDEN[0]), 0.0, 1.0)[:, None].astype(out.dtype)
+    flat = out.reshape(-1, out.shape[-1])
+    flat[hidden] = flat[hidden] * (1 - weight) + np.minimum(own[~good], flat[hidden]) * weight
+    return out
 
 
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

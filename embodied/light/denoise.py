@@ -43,18 +43,19 @@ def smooth_pages(
         return e
     trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
     out = np.array(e, np.float32)
-    noise = np.zeros(len(e), np.float32)
+    noise, floor = np.zeros(len(e), np.float32), np.zeros(len(grid.mine), np.float32)
     if variance is not None:
-        noise[grid.mine] = _relative_noise(grid, out, variance)
+        noise[grid.mine], floor = _relative_noise(grid, out, variance)
     for step, like in zip(steps, likeness):
         values, noises = mi.Float(out.ravel()), mi.Float(noise)
         own, own_noise = dr.gather(mi.Color3f, values, grid.own), dr.gather(mi.Float, noises, grid.own)
-        shade = dr.log(_brightness(own) + 1e-4)
+        least = mi.Float(floor) + 1e-4
+        shade = dr.log(_brightness(own) + least)
         total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
         tight = 1 / (constant(like**2) + dr.square(NOISES * own_noise))
         for i, j, q, inside in grid.around(step):
             other = dr.gather(mi.Color3f, values, q, inside)
-            far = dr.log(_brightness(other) + 1e-4) - shade
+            far = dr.log(_brightness(other) + least) - shade
             w = dr.select(inside, dr.exp(-0.5 * dr.square(far) * tight), 0.0)
             w *= KERNEL[i + 2] * KERNEL[j + 2] * dr.gather(mi.Float, trust, q, inside)
             total += other * w
@@ -92,8 +93,12 @@ def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chos
     return out
 
 
-def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """(m,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are."""
+def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are.
+
+    And (m,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
+    all missed is no shadow.
+    """
     mi = mitsuba()
     import drjit as dr
 
@@ -104,7 +109,8 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> np.ndar
         spread += dr.gather(mi.Float, squares, q, inside)
         count += dr.select(inside, 1.0, 0.0)
     n = dr.maximum(count, 1.0)
-    return np.minimum(np.asarray(dr.sqrt(spread / n) / dr.maximum(mean / n, 1e-5)), 1.5)
+    relative = np.minimum(np.asarray(dr.sqrt(spread / n) / dr.maximum(mean / n, 1e-5)), 1.5)
+    return relative, np.asarray(mean / n) * np.minimum(relative, 1.0)
 
 
 def cap_sparks(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,

@@ -21,9 +21,12 @@ from embodied.seeds import stream
 BRIGHTEST = 12.0
 """Reflected light is cut at this multiple of the exposure's white."""
 SPARK = 12.0
-"""One ray brings at most this multiple of the exposure's white."""
+"""One ray brings at most this multiple of the exposure's white, or what a white sheet in the sun sends: a lower limit
+would take sunlit floors' and beds' colour off the walls."""
+SHINY = 0.3
+"""Metallic share from which on a surface shows its surroundings rather than its own colour."""
 QUALITIES = ("glossy", "reference", "diffuse")
-"""'diffuse' is the reference without gloss but for mirrors and metals, which the classic renderer's pages should equal."""
+"""'diffuse' is the reference without gloss but for mirrors and metals; the classic renderer's pages should equal it on all else."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
 
@@ -88,6 +91,12 @@ class Tracer:
             ok, t = ok | pane, np.where(pane, np.asarray(first), t)
         return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
 
+    def plain(self, position, forward, up, vfov: float, size: tuple[int, int]) -> np.ndarray:
+        """(h, w) bool: pixels with no mirror or metal within two pixels."""
+        hit = look(self._world, _camera_rays(position, forward, up, vfov, size, 1, 0, None))
+        shiny = np.asarray(hit.ok & ~hit.outdoor & (hit.gloss.z > SHINY)).reshape(size)
+        return ~cv2.dilate(shiny.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
+
     def _samples(self, ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
         """Per ray: how much of it ends indoors (n, 1), exposed radiance there, shown colour elsewhere, albedo (n, 3), brightness squared (n, 1).
 
@@ -106,7 +115,9 @@ class Tracer:
         shown = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
         keep = np.asarray(inside)[:, None]
         there, seen = array(hit.position), np.nan_to_num(array(radiance), posinf=0.0)
-        x = np.minimum(np.where(keep, seen * world.exposure.at(np.where(keep, there, 0.0)), 0.0), SPARK)
+        gain = world.exposure.at(np.where(keep, there, 0.0))
+        most = np.maximum(SPARK, gain * (world.outdoors.sun * radiosity.GLASS).astype(np.float32))
+        x = np.where(keep, np.minimum(seen * gain, most), 0.0)
         elsewhere, share, square = np.where(keep, 0.0, array(shown)), keep.astype(np.float32), np.square(x.mean(1, keepdims=True))
         if world.panes is None:
             return share, x, elsewhere, np.where(keep, array(hit.albedo), 0.0), square

@@ -238,7 +238,8 @@ def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell
 
 def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
-    than a hand beside a bulb would show as sparks on far walls, one ray in hundreds."""
+    than a hand beside a bulb would show as sparks on far walls, one ray in hundreds. What was cut is shared out
+    over the room, or every bounce would lose it anew."""
     y = seen.mean(1)
     out = np.array(seen, np.float32)
     for unit in np.unique(lux.unit):
@@ -249,6 +250,8 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
         allowed = SPARKS * float((y[order] * lux.area[order]).sum())
         most = max(rising[min(np.searchsorted(-lost, -allowed), len(rising) - 1)], 1e-9)
         out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
+        before, after = ((a[mine] * lux.area[mine, None]).sum(0) for a in (seen, out))
+        out[mine] *= before / np.maximum(after, 1e-12)
     return out
 
 

@@ -6,18 +6,21 @@ unfolded plane by plane, so that one wall is one chart however many holes it has
 
 from __future__ import annotations
 
+import itertools
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from assets.cache import atomic_path, digest
 from assets.records import MeshPart
 from embodied.light.backend import constant, mitsuba, r2, scene_of, vector
 
-VERSION = 4
+VERSION = 6
 """Counts up whenever an unwrapping would come out differently."""
 
 
@@ -64,7 +67,8 @@ def face_normals(corners: np.ndarray) -> np.ndarray:
 
 
 def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
-    """Unfold flat things: one rectangle per plane, packed on shelves.
+    """Unfold flat things: one rectangle per plane, packed; what lies far apart in a plane (the top edges of a
+    room's skirting) gets rectangles of its own.
 
     Args:
       parts: what walls, floors and ceilings are made of; every face is seen from its front.
@@ -75,7 +79,7 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
     offset = np.einsum("mk,mk->m", n, corners[:, 0])
     keys = np.concatenate([np.round(n * 200), np.round(offset[:, None] * 500), part[:, None]], axis=1).astype(np.int64)
     _, chart = np.unique(keys, axis=0, return_inverse=True)
-    chart = chart.reshape(-1)
+    chart = _strips(corners, chart.reshape(-1))
     flat = np.zeros((len(corners), 3, 2))
     sizes = []
     for c in range(chart.max() + 1):
@@ -84,8 +88,9 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
         across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.05 else np.array([1.0, 0.0, 0.0])
         up = np.cross(n[mine][0], across)
         q = np.stack([corners[mine] @ across, -(corners[mine] @ up)], axis=-1)
-        low = q.reshape(-1, 2).min(0)
-        flat[mine] = (q - low) * density
+        if np.diff(np.ptp(q.reshape(-1, 2), axis=0)) > 0:  # what lies packs well
+            q = np.stack([q[..., 1], -q[..., 0]], axis=-1)
+        flat[mine] = (q - q.reshape(-1, 2).min(0)) * density
         sizes.append(np.ceil(flat[mine].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
     places, size = pack(np.array(sizes))
     flat += places[chart][:, None] + 1.0
@@ -129,9 +134,37 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     packing.texels_per_unit, packing.padding, packing.bilinear, packing.create_image = density, 1, False, False
     atlas.generate(charts, packing)
     _, faces, place = atlas[0]  # faces keep their order, so part and uv carry over per corner
-    luxels = place[faces] * [atlas.width, atlas.height]
-    size = np.array([atlas.width + 1, atlas.height + 1], np.int32)
+    luxels, size = _repacked(place[faces] * [atlas.width, atlas.height], faces)
     return Unwrapped(*_single(corners, normals, luxels, uv), part, thin, size)
+
+
+def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Charts as upright rectangles packed anew: xatlas leaves half of a sheet of strips empty.
+
+    Two luxels lie between charts, one for each, so that reading between luxels brings no light from another chart.
+
+    Args:
+      luxels: (m, 3, 2). faces: (m, 3) int, vertices that belong to one chart each.
+
+    Returns:
+      (m, 3, 2) luxels, and (2,) int32 width and height.
+    """
+    links = np.repeat(np.arange(len(faces)), 3), faces.ravel().astype(int)
+    touch = coo_matrix((np.ones(len(links[0])), links)).tocsr()
+    count, chart = connected_components(touch @ touch.T, directed=False)
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, np.repeat(chart, 3), luxels.reshape(-1, 2))
+    np.maximum.at(high, np.repeat(chart, 3), luxels.reshape(-1, 2))
+    low = np.floor(low)
+    sizes = np.ceil(high - low).astype(int) + 2
+    flat = luxels - low[chart][:, None]
+    lying = sizes[:, 0] > sizes[:, 1]
+    turned = np.stack([flat[..., 1], sizes[chart, 0][:, None] - 2 - flat[..., 0]], axis=-1)
+    flat = np.where(lying[chart][:, None, None], turned, flat)
+    sizes[lying] = sizes[lying][:, ::-1]
+    side = np.sqrt(sizes.prod(1).sum())
+    places, size = min((pack(sizes, int(x * side) + 1) for x in (0.9, 1.0, 1.1, 1.25)), key=lambda p: int(p[1].prod()))
+    return flat + places[chart][:, None], size
 
 
 def cached_model(parts: Sequence[MeshPart], budget: float, cache: Path, *, trusted: bool = False) -> Unwrapped:
@@ -161,7 +194,7 @@ def load_record(kind, path: Path):
 
 
 def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Place rectangles on shelves, tallest first.
+    """Place rectangles, tallest first, each where its top comes to lie lowest.
 
     Args:
       sizes: (n, 2) int, widths and heights.
@@ -169,21 +202,55 @@ def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.nd
 
     Returns:
       (n, 2) int32 corners and (2,) int32 width and height of the sheet.
+
+    Source: the skyline heuristic, bottom left (Jylaenki 2010, A Thousand Ways to Pack the Bin, sec. 2.4).
     """
     sizes = np.asarray(sizes, int)
     widest = int(sizes[:, 0].max())
     if width is None:
         width = int(np.sqrt(sizes.prod(1).sum() * 1.1)) + 1
-    width = max(width, widest)
+    skyline = np.zeros(max(width, widest), int)
     places = np.zeros((len(sizes), 2), np.int32)
-    x = y = shelf = 0
     for i in np.lexsort((-sizes[:, 0], -sizes[:, 1])):
         w, h = sizes[i]
-        if x + w > width:
-            x, y, shelf = 0, y + shelf, 0
-        places[i] = x, y
-        x, shelf = x + w, max(shelf, h)
-    return places, np.array([int((places[:, 0] + sizes[:, 0]).max()), y + shelf], np.int32)
+        rests = np.lib.stride_tricks.sliding_window_view(skyline, w).max(1)
+        x = int(np.argmin(rests))
+        places[i] = x, rests[x]
+        skyline[x : x + w] = rests[x] + h
+    return places, (places + sizes).max(0).astype(np.int32)
+
+
+def _strips(corners: np.ndarray, chart: np.ndarray, full: float = 0.25, most: int = 100) -> np.ndarray:
+    """Chart numbers, sparse charts cut up: into pieces that fill half of their rectangle at least.
+
+    Args:
+      corners: (m, 3, 3). chart: (m,) int.
+      full: charts that fill this share of their rectangle stay whole; so do those of over `most` faces.
+    """
+    out, area = np.zeros(len(chart), int), areas_of(corners)
+    for c in range(chart.max() + 1):
+        mine = np.nonzero(chart == c)[0]
+        pieces = [mine]
+        if len(mine) <= most and area[mine].sum() < full * _spread(corners[mine]):
+            pieces = [np.array([k]) for k in mine]
+            joined = True
+            while joined:
+                joined = False
+                for a, b in itertools.combinations(range(len(pieces)), 2):
+                    both = np.concatenate([pieces[a], pieces[b]])
+                    if area[both].sum() > 0.6 * _spread(corners[both]):
+                        pieces = [both, *(p for i, p in enumerate(pieces) if i not in (a, b))]
+                        joined = True
+                        break
+        for piece in pieces:
+            out[piece] = out.max() + 1
+    return out - 1
+
+
+def _spread(corners: np.ndarray) -> float:
+    """Area of the rectangle around faces (m, 3, 3) of one plane, square metres."""
+    size = np.sort(np.ptp(corners.reshape(-1, 3), axis=0))
+    return float(size[1] * size[2])
 
 
 def _single(*arrays: np.ndarray) -> tuple[np.ndarray, ...]:
