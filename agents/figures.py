@@ -67,7 +67,7 @@ def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path
         right.plot(updates, [line["requests"] for line in lines], marker="o", markersize=3, label=agent)
     left.set_ylabel("validation success (%)")
     left.set_ylim(0, 100)
-    left.legend(fontsize=8)
+    left.legend(fontsize=8, loc="lower right")
     right.set_ylabel("requests per task")
     right.set_ylim(bottom=0)
     for axes in (left, right):

@@ -18,7 +18,7 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
-from agents.hanna.agent import load_agent, new_agent, save_agent
+from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import ask_above
 from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
 from agents.imitation.checkpoint import CheckpointError
@@ -328,6 +328,19 @@ def test_training_writes_what_a_researcher_looks_at(tmp_path):
     assert progress.best_update in kept
     assert list(tmp_path.glob("events.out.tfevents.*"))
     assert json.loads((tmp_path / "settings.json").read_text())["batch"] == 6
+
+
+def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
+    split = setting()
+    first, second = agent_for(split), agent_for(split, dataclasses.replace(TINY, ask_rule="every5", seed=5))
+    name = next(n for n, p in first.network.named_parameters() if p.dim() > 1)
+    assert not torch.equal(first.network.state_dict()[name], second.network.state_dict()[name])
+    take_weights(second, first, tmp_path / "first.safetensors")
+    for n, value in first.network.state_dict().items():
+        assert torch.equal(value, second.network.state_dict()[n]), n
+    other = agent_for(split, dataclasses.replace(TINY, hidden_size=16))
+    with pytest.raises(ValueError, match="cannot be begun with"):
+        take_weights(other, first, tmp_path / "first.safetensors")
 
 
 def test_of_agents_as_good_as_each_other_the_later_is_kept():
