@@ -72,10 +72,22 @@ class Story:
             if reply.intention is Intention.SUB:
                 self.goals.append(reply.subtask.target)
 
-    def told(self, most: int = 9) -> str:
-        """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself."""
-        lines = self.dialogue if len(self.dialogue) <= most else [self.dialogue[0], "…", *self.dialogue[2 - most:]]
-        return "\n\n".join(lines)
+    def told(self, rows: int = 11, width: int = 95) -> str:
+        """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself.
+
+        Args:
+          rows: lines of text, of `width` letters each, that there is room for; a gap between two speakers is one.
+        """
+        height = lambda line: 2 + len(line) // width
+        kept, left = [], rows + 1 - height(self.dialogue[0])
+        for line in reversed(self.dialogue[1:]):
+            more = 0 if len(kept) + 2 == len(self.dialogue) else height("…")
+            if kept and left < height(line) + more:
+                kept.append("…")
+                break
+            left -= height(line)
+            kept.append(line)
+        return "\n\n".join([self.dialogue[0], *reversed(kept)])
 
     def stack(self, world: World, step: Step) -> str:
         """HARI's goals as Markdown, the one that counts now first."""
