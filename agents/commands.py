@@ -217,11 +217,11 @@ def train_agent(
     houses = config.training_houses or None
     training = split_of(data, "train", encoder, device, houses=houses)
     validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
-    vocabulary = vocabulary_of(data, houses) if begin is None else load_agent(begin).vocabulary
-    agent = new_agent(config, vocabulary, encoder.digest, encoder.size)
-    if begin is not None:
-        take_weights(agent, load_agent(begin), begin)
-        note(f"a new run begins with the weights of {begin}")
+    other = None if begin is None else load_agent(begin)
+    agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.digest, encoder.size)
+    if other is not None:
+        take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
+        note(f"new runs begin with the weights of {begin}")
     agent.network.to(device)
     parameters = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})

@@ -24,7 +24,7 @@ CLASS = "person"
 NEAREST, FARTHEST = 0.5, 2.0
 """How far from their node people may stand, metres: within its zone of attention."""
 APART = 0.9
-"""Distance between two people, metres."""
+"""Width of the circle around a person that nobody else's body enters, metres."""
 STANDING = 1.35
 """Least height of a standing figure, metres."""
 ROOM = 0.01

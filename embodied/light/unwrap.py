@@ -221,7 +221,7 @@ def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.nd
 
 
 def _strips(corners: np.ndarray, chart: np.ndarray, full: float = 0.25, most: int = 100) -> np.ndarray:
-    """Chart numbers, sparse charts cut up: into pieces that fill half of their rectangle at least.
+    """Chart numbers, sparse charts cut up: joined piece by piece while what is joined fills 0.6 of its rectangle.
 
     Args:
       corners: (m, 3, 3). chart: (m,) int.
