@@ -1,17 +1,17 @@
-"""Human assistants as visible figures: people beside the starts of the routes they know."""
+"""Human assistants as visible figures: people who stand or sit where the routes they know begin."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from embodied.geometry import rectangle, yaw_facing
-from embodied.house import House, Placement, rounded
+from embodied.geometry import rectangle, rotation, yaw_facing
+from embodied.house import House, Placement, Room, rounded
 from embodied.navgraph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
@@ -22,65 +22,173 @@ if TYPE_CHECKING:
 
 CLASS = "person"
 NEAREST, FARTHEST = 0.5, 2.0
-"""How far from their node people may stand, metres: within its zone of attention."""
+"""How far from their node people may be, metres: within its zone of attention."""
 APART = 0.9
 """Width of the circle around a person that nobody else's body enters, metres."""
 STANDING = 1.35
 """Least height of a standing figure, metres."""
 ROOM = 0.01
 """Least area of the free spots that a figure may choose from, square metres."""
+SIT = 0.5
+"""Chance that somebody who could sit there does, instead of standing."""
+LAP = 0.45
+"""Height of what sitting figures were modelled on, metres; measured on the furniture pack's."""
+SOFT, HARD = 0.07, 0.07
+"""How far below and above LAP a seat may be, metres."""
+ELBOWS = 0.3
+"""Half of what somebody on a sofa takes of its width, metres."""
+BACK, LEAN = 0.06, 0.10
+"""How far behind the level part of a seat a sitting figure's back is, metres, and how much farther when it leans."""
+DEEP, GROWN = 0.68, 0.8
+"""Depth from which a seat has cushions to lean on, and a sitting figure legs that reach its front, metres."""
 
 
-def add_people(house: House, graph: NavGraph, starts: Sequence[int], catalogue: Catalogue, *, seed: int) -> House:
-    """The house with one person beside each start node that has room for one, looking at it.
+def meet(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> dict[int, Placement]:
+    """Whom one could meet at which node: somebody in its room, 0.5 to 2 m away, who stands on free floor or sits.
 
-    The navigation graph stays valid: everybody keeps the walker's radius from its edges. Figures are
-    tried in a drawn order until one fits; a start without free floor within 2 m goes without (the
-    assistant is then heard but not seen).
-
-    Args:
-      starts: node indices; repeats count once.
+    One person may be met at several nodes. The navigation graph stays valid: everybody keeps the
+    walker's radius from its edges, and nobody shuts a room. Figures are tried in a drawn order until
+    one fits; nodes without room for anybody are left out.
     """
-    figures = [a for a in catalogue.of_class(CLASS) if stands(a)]
-    if not figures:
-        return house
+    figures = catalogue.of_class(CLASS)
+    standing, sitting = [a for a in figures if stands(a)], [a for a in figures if sits(a)]
+    seats = _seats(house, catalogue) if sitting else []
     ways = shapely.MultiLineString([graph.positions[list(e), :2].tolist() for e in graph.edges])
-    taken = _obstacles(house)
     people: list[Placement] = []
-    for node in sorted({int(s) for s in starts}):
+    for node in range(len(graph.positions)):
         room = house.room_by_id[graph.room_of_node[node]]
-        rng = stream(seed, "person", house.name, node)
         eye = graph.positions[node, :2]
-        around = _disc(eye, 2 * FARTHEST)
-        others = [_disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST]
-        free = house.floor(room).intersection(around).difference(shapely.union_all([taken.intersection(around), *others]))
-        edges, ring = ways.intersection(around), _disc(eye, FARTHEST).difference(_disc(eye, NEAREST))
-        spots = ((a, _spots(free, edges, ring, max(a.size[:2]) / 2)) for a in (figures[int(i)] for i in rng.permutation(len(figures))))
-        asset, where = next((pair for pair in spots if pair[1].area >= ROOM), (None, None))
-        if asset is None:
+        if _nearest(people, room, eye) is not None:
             continue
-        spot = _drawn(where, rng)
-        direction = math.atan2(eye[1] - spot[1], eye[0] - spot[0])
-        people.append(Placement(
-            f"{CLASS}_{len(people) + 1}", asset.key, CLASS, room.id,
-            rounded((spot[0], spot[1], house.storey_of(room).elevation)), rounded(yaw_facing(direction)), asset.size,
-        ))
-    return _passable(house, people)
+        rng = stream(seed, "person", house.name, node)
+        site = _Site(house, room, eye, ways, people)
+        sit = rng.random() < SIT
+        found = site.sit(sitting, seats, rng) if sit else site.stand(standing, rng)
+        found = found or (site.stand(standing, rng) if sit else site.sit(sitting, seats, rng))
+        if found is not None:
+            people.append(dataclasses.replace(found, id=f"{CLASS}_{len(people) + 1}"))
+    people = _passable(house, people)
+    met = {n: _nearest(people, house.room_by_id[graph.room_of_node[n]], graph.positions[n, :2]) for n in range(len(graph.positions))}
+    return {n: p for n, p in met.items() if p is not None}
 
 
-def _passable(house: House, people: list[Placement]) -> House:
-    """The house with those people who shut nobody off from a room; the last to come step aside first."""
-    full = dataclasses.replace(house, placements=(*house.placements, *people))
-    while people and (shut := set(unreachable_rooms(full)) - set(unreachable_rooms(house))):
-        near = [p for p in people if p.room in shut] or people
-        people = [p for p in people if p is not near[-1]]
-        full = dataclasses.replace(house, placements=(*house.placements, *people))
-    return full
+def add_people(house: House, met: Mapping[int, Placement], starts: Iterable[int]) -> House:
+    """The house with those of `met` who are met at one of the nodes `starts`."""
+    known = {met[n].id for n in starts if n in met}
+    people = {p.id: p for p in met.values() if p.id in known}
+    placed = (dataclasses.replace(people[i], id=f"{CLASS}_{k + 1}") for k, i in enumerate(sorted(people, key=_number)))
+    return dataclasses.replace(house, placements=(*house.placements, *placed))
 
 
 def stands(asset: Asset) -> bool:
     """Whether a figure stands on its own feet; those that sit or lie need something to do it on."""
-    return asset.support == "floor" and asset.size[2] >= STANDING and max(asset.size[:2]) <= 2 * STANDING / 3
+    return (asset.support == "floor" and "sitting" not in asset.tags
+            and asset.size[2] >= STANDING and max(asset.size[:2]) <= 2 * STANDING / 3)
+
+
+def sits(asset: Asset) -> bool:
+    """Whether a figure sits as one sits on a chair."""
+    return "sitting" in asset.tags
+
+
+@dataclasses.dataclass(frozen=True)
+class _Seat:
+    """Where somebody may sit down."""
+
+    placement: Placement
+    room: str
+    spot: np.ndarray
+    """(2,) where the back of somebody who sits upright on it is, metres."""
+    deep: bool
+    """Whether grown people lean back on it."""
+    lift: float
+    """How much higher than LAP it is, metres; not below 0, feet do not go through floors."""
+
+
+class _Site:
+    """The surroundings of one node, and who finds room in them."""
+
+    def __init__(
+        self, house: House, room: Room, eye: np.ndarray, ways: shapely.MultiLineString, people: Sequence[Placement]
+    ) -> None:
+        around = _disc(eye, 2 * FARTHEST)
+        self.eye, self.room, self.floor = eye, room, house.storey_of(room).elevation
+        self.edges, self.ring = ways.intersection(around), _disc(eye, FARTHEST).difference(_disc(eye, NEAREST))
+        self.others = [_disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST]
+        self.open = house.floor(room).intersection(around)
+        self.things = [p for p in house.placements if p.room == room.id and _in_the_way(p)]
+
+    def stand(self, figures: Sequence[Asset], rng: np.random.Generator) -> Placement | None:
+        """The first figure that finds free floor beside the ways; it looks at the node."""
+        free = self.open.difference(shapely.union_all([*map(_ground, self.things), *self.others]))
+        drawn = (figures[int(i)] for i in rng.permutation(len(figures)))
+        spots = ((a, _spots(free, self.edges, self.ring, max(a.size[:2]) / 2)) for a in drawn)
+        asset, where = next((pair for pair in spots if pair[1].area >= ROOM), (None, None))
+        if asset is None:
+            return None
+        spot = _drawn(where, rng)
+        direction = math.atan2(self.eye[1] - spot[1], self.eye[0] - spot[0])
+        return self._placed(asset, spot, self.floor, yaw_facing(direction))
+
+    def sit(self, figures: Sequence[Asset], seats: Sequence[_Seat], rng: np.random.Generator) -> Placement | None:
+        """The first figure that finds a seat with nothing on it and nothing where its legs go."""
+        choices = [(seat, figures[int(i)]) for seat in seats if seat.room == self.room.id for i in rng.permutation(len(figures))]
+        for seat, asset in choices:
+            yaw = seat.placement.yaw
+            lean = LEAN if seat.deep and asset.size[1] > GROWN else 0.0
+            spot = seat.spot + rotation(yaw) @ np.array([0.0, lean - asset.size[1] / 2])
+            body = shapely.Polygon(rectangle(*spot, *asset.size[:2], yaw))
+            below = self.floor + asset.size[2]
+            taken = [*self.others, *(_ground(p) for p in self.things if p is not seat.placement and p.position[2] < below)]
+            if (self.ring.contains(shapely.Point(spot)) and self.open.buffer(0.02).contains(body)
+                    and self.edges.distance(body) >= RADIUS and not any(body.intersects(x) for x in taken)):
+                return self._placed(asset, spot, self.floor + seat.lift, yaw)
+        return None
+
+    def _placed(self, asset: Asset, spot: Sequence[float], z: float, yaw: float) -> Placement:
+        return Placement(CLASS, asset.key, CLASS, self.room.id, rounded((spot[0], spot[1], z)), rounded(yaw), asset.size)
+
+
+def _seats(house: House, catalogue: Catalogue) -> list[_Seat]:
+    """All places of the height people sit at: one to a chair, three to a sofa."""
+    seats = []
+    for p in house.placements:
+        asset = catalogue.assets.get(p.asset)
+        seat = next((s for s in asset.surfaces if s.name == "seat"), None) if asset else None
+        if seat is None:
+            continue
+        scale = np.divide(p.size, asset.size)
+        lift = seat.z * scale[2] - LAP
+        if -SOFT <= lift <= HARD:
+            left, right = seat.x0 * scale[0], seat.x1 * scale[0]
+            middle, wide = (left + right) / 2, right - left > 2.5 * ELBOWS
+            for x in (middle, left + ELBOWS, right - ELBOWS) if wide else (middle,):
+                back = np.asarray(p.position[:2]) + rotation(p.yaw) @ np.array([x, seat.y1 * scale[1] + BACK])
+                seats.append(_Seat(p, p.room, back, p.size[1] > DEEP, max(lift, 0.0)))
+    return seats
+
+
+def _nearest(people: Sequence[Placement], room: Room, eye: np.ndarray) -> Placement | None:
+    """Who of a room is nearest to a spot of it, within FARTHEST."""
+    near = [p for p in people if p.room == room.id and NEAREST <= math.dist(p.position[:2], eye) <= FARTHEST]
+    return min(near, key=lambda p: math.dist(p.position[:2], eye), default=None)
+
+
+def _passable(house: House, people: list[Placement]) -> list[Placement]:
+    """Those people who, one after the other, shut nobody off from a room."""
+    shut_before = set(unreachable_rooms(house))
+
+    def open_with(some: list[Placement]) -> bool:
+        full = dataclasses.replace(house, placements=(*house.placements, *some))
+        return set(unreachable_rooms(full)) <= shut_before
+
+    if open_with(people):
+        return people
+    kept: list[Placement] = []
+    for p in people:
+        if open_with([*kept, p]):
+            kept.append(p)
+    return kept
 
 
 def _spots(
@@ -98,13 +206,18 @@ def _drawn(spots: shapely.Geometry, rng: np.random.Generator) -> tuple[float, fl
     return float(x), float(y)
 
 
-def _obstacles(house: House) -> shapely.Geometry:
-    """What a standing body would run into: everything below head height that is higher than a rug."""
-    return shapely.union_all([
-        shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
-        for p in house.placements if p.position[2] < 1.8 and p.size[2] > 0.05
-    ])
+def _in_the_way(p: Placement) -> bool:
+    """Whether a body would run into it: below head height, and higher than a rug."""
+    return p.position[2] < 1.8 and p.size[2] > 0.05
+
+
+def _ground(p: Placement) -> shapely.Polygon:
+    return shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
 
 
 def _disc(middle: Sequence[float], radius: float) -> shapely.Polygon:
     return shapely.Point(middle).buffer(radius, quad_segs=8)
+
+
+def _number(name: str) -> int:
+    return int(name.rpartition("_")[2])

@@ -14,7 +14,7 @@ import numpy as np
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
-from embodied.assistants.routes import build_routes
+from embodied.assistants.routes import build_routes, route_paths
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
@@ -23,6 +23,7 @@ from embodied.environments import environment_maker
 from embodied.features import semantic_features
 from embodied.interface import Language, Task
 from embodied.language import People, PlainLanguage
+from embodied.people import add_people, meet
 from embodied.world import World, open_world
 
 if TYPE_CHECKING:
@@ -93,12 +94,17 @@ def _flat(
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
+    met = None
     if worlds is None:
         name = f"flat_{seed}"
         house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
+        if kind == "hanna":
+            met = meet(house, graph, catalogue, seed=seed)
+            house = add_people(house, met, (p[0] for p in route_paths(graph, name, seed=seed, house_split="test", starts=met)))
         worlds = {name: open_world(house, catalogue, cache, graph=graph)}
     name, world = next(iter(worlds.items()))
-    routes = build_routes(world, seed=seed, language=language, house_split="test") if kind in ("hanna", "vln") else ()
+    helped = kind in ("hanna", "vln")
+    routes = build_routes(world, seed=seed, language=language, house_split="test", starts=met) if helped else ()
     part = "main_unseen" if kind == "hari" else "main"
     tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language)[part]
     return worlds, tuple(tasks), environment_maker(kind, worlds, routes={name: routes})

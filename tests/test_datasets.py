@@ -149,6 +149,15 @@ def test_a_house_does_not_depend_on_the_others(tmp_path):
     assert content(tmp_path / "alone" / "houses" / "test_0000") == content(data.folder / "houses" / "test_0000")
 
 
+def test_what_another_program_began_is_not_finished_by_this_one(tmp_path, monkeypatch):
+    data = build(tmp_path / "data", tmp_path / "cache")
+    monkeypatch.setattr("embodied.datasets.build.program", lambda: "another")
+    assert build(data.folder, tmp_path / "cache").digest == data.digest, "a whole one is read by anybody"
+    shutil.rmtree(data.folder / "houses" / "train_0001")
+    with pytest.raises(ValueError, match="begun by another version of the program"):
+        build(data.folder, tmp_path / "cache")
+
+
 def test_wrong_folders_and_splits_are_refused(tmp_path):
     with pytest.raises(DatasetError, match="no data set"):
         Dataset(tmp_path)

@@ -1,4 +1,4 @@
-"""People stand beside the starts of their routes, look at them, and are in nobody's way."""
+"""People stand or sit beside the starts of their routes, and are in nobody's way."""
 
 from __future__ import annotations
 
@@ -6,45 +6,111 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
-import numpy as np
+import pytest
 import shapely
 from hand_worlds import grid_world, thing
 
-from assets.records import Asset
+from assets.records import Asset, SupportSurface
+from embodied.assistants.routes import route_paths
 from embodied.geometry import facing_of, wrap
-from embodied.house import House, check
+from embodied.house import House, Placement, check
 from embodied.navgraph import RADIUS
-from embodied.people import APART, CLASS, FARTHEST, NEAREST, add_people, stands
+from embodied.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
 SLIM = Asset("hand/slim", CLASS, "a slim person", (0.3, 0.3, 1.7), "floor")
-CATALOGUE = SimpleNamespace(of_class=lambda name: (FIGURE,) if name == CLASS else ())
+SITTER = Asset("hand/sitter", CLASS, "somebody at rest", (0.5, 0.7, 1.3), "floor", tags=("sitting",))
+CHAIR = Asset("hand/chair", "dining chair", "a chair", (0.4, 0.4, 0.9), "floor",
+              surfaces=(SupportSurface("seat", LAP + 0.02, -0.15, -0.15, 0.15, 0.1, 9.0),))
 
 
-def populated(starts=(0, 14, 14, 30), world=None) -> tuple[House, object]:
+def catalogue(*figures: Asset) -> SimpleNamespace:
+    return SimpleNamespace(of_class=lambda name: figures if name == CLASS else (), assets={a.key: a for a in (*figures, CHAIR)})
+
+
+def populated(starts=(0, 14, 14, 30), world=None, figures=(FIGURE,), seed=1) -> tuple[House, object]:
     world = world or grid_world(6, spacing=2.2)
-    return add_people(world.house, world.graph, starts, CATALOGUE, seed=1), world
+    return add_people(world.house, meet(world.house, world.graph, catalogue(*figures), seed=seed), starts), world
 
 
-def test_one_person_per_start_looking_at_it():
+def people_of(house: House) -> list[Placement]:
+    return [p for p in house.placements if p.object_class == CLASS]
+
+
+def seated(world, node: int, dx: float, dy: float, yaw: float = 0.0):
+    """The world with a chair beside a node, and whoever is met there."""
+    x, y, _ = world.graph.positions[node]
+    room = world.graph.room_of_node[node]
+    chair = Placement("dining_chair_1", CHAIR.key, CHAIR.object_class, room, (x + dx, y + dy, 0.0), yaw, CHAIR.size)
+    house = dataclasses.replace(world.house, placements=(chair,))
+    return chair, meet(house, world.graph, catalogue(SITTER), seed=1)
+
+
+def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
     house, world = populated()
-    people = [p for p in house.placements if p.object_class == CLASS]
-    assert len(people) == 3
-    for p, node in zip(people, (0, 14, 30), strict=True):
-        offset = world.graph.positions[node, :2] - p.position[:2]
-        assert NEAREST - 1e-3 <= np.hypot(*offset) <= FARTHEST + 1e-3 and p.room == world.graph.room_of_node[node]
-        assert abs(wrap(facing_of(p.yaw) - math.atan2(offset[1], offset[0]))) < 1e-3
+    people = people_of(house)
+    assert 1 <= len(people) <= 3 and [p.id for p in people] == [f"person_{i + 1}" for i in range(len(people))]
+    for node in (0, 14, 30):
+        here = [p for p in people if p.room == world.graph.room_of_node[node]]
+        assert any(NEAREST - 1e-3 <= math.dist(p.position[:2], world.graph.positions[node, :2]) <= FARTHEST + 1e-3 for p in here)
+    for p in people:
+        offsets = world.graph.positions[:, :2] - p.position[:2]
+        assert any(abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3 for x, y in offsets if math.hypot(x, y) <= FARTHEST + 1e-3)
 
 
 def test_nobody_blocks_an_edge_or_stands_in_furniture():
     house, world = populated(range(36))
     ways = shapely.MultiLineString([world.graph.positions[list(e), :2].tolist() for e in world.graph.edges])
-    people = [shapely.Point(p.position[:2]) for p in house.placements if p.object_class == CLASS]
-    assert len(people) > 20
+    people = [shapely.Point(p.position[:2]) for p in people_of(house)]
+    assert len(people) > 12
     assert all(ways.distance(p) >= RADIUS + max(FIGURE.size[:2]) / 2 - 0.02 for p in people)
     assert all(a.distance(b) >= APART / 2 + max(FIGURE.size[:2]) / 2 - 0.02 for i, a in enumerate(people) for b in people[:i])
     check(house)
+
+
+def test_somebody_sits_on_a_chair_with_the_back_at_its_back():
+    world = grid_world(6, spacing=2.2)
+    chair, met = seated(world, 7, 1.1, 1.1)
+    assert met[7].asset == SITTER.key and met[7].yaw == chair.yaw
+    assert met[7].position[2] == pytest.approx(0.02)  # the seat's height above what the figure was modelled on
+    assert met[7].position[0] == pytest.approx(chair.position[0], abs=1e-3)
+    assert met[7].position[1] + SITTER.size[1] / 2 == pytest.approx(chair.position[1] + CHAIR.surfaces[0].y1 + BACK, abs=1e-3)
+
+
+@pytest.mark.parametrize("what", ["legs in the way of walkers", "something on the seat", "a bar stool"])
+def test_nobody_sits_where_one_cannot(what, monkeypatch):
+    world = grid_world(6, spacing=2.2)
+    if what == "legs in the way of walkers":
+        chair, met = seated(world, 7, 0.0, 0.5)
+    elif what == "something on the seat":
+        chair, _ = seated(world, 7, 1.1, 1.1)
+        box = dataclasses.replace(thing("box", 1, chair.room, *chair.position[:2]), position=(*chair.position[:2], 0.47), size=(0.3, 0.3, 0.3))
+        house = dataclasses.replace(world.house, placements=(chair, box))
+        met = meet(house, world.graph, catalogue(SITTER), seed=1)
+    else:
+        monkeypatch.setattr("test_people.CHAIR", dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(CHAIR.surfaces[0], z=0.75),)))
+        chair, met = seated(world, 7, 1.1, 1.1)
+    assert not met
+
+
+def test_routes_begin_where_somebody_is_met():
+    world = grid_world(6, spacing=2.2)
+    met = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
+    some = dict(list(met.items())[:5])
+    paths = route_paths(world.graph, "grid", seed=0, house_split="test", starts=some)
+    assert paths and {p[0] for p in paths} <= set(some)
+    assert route_paths(world.graph, "grid", seed=0, house_split="test", starts={}) == route_paths(world.graph, "grid", seed=0, house_split="test")
+
+
+def test_whoever_shuts_a_room_steps_aside_alone(monkeypatch):
+    world = grid_world(6, spacing=2.2)
+    everybody = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
+    first = next(iter(everybody.values()))
+    monkeypatch.setattr("embodied.people.unreachable_rooms", lambda house: ["kitchen_1"] if any(
+        p.position == first.position for p in house.placements) else [])
+    left = {p.position for p in meet(world.house, world.graph, catalogue(FIGURE), seed=1).values()}
+    assert first.position not in left and left >= {p.position for p in everybody.values()} - {first.position}
 
 
 def test_where_the_first_figure_does_not_fit_a_slimmer_one_stands():
@@ -54,8 +120,7 @@ def test_where_the_first_figure_does_not_fit_a_slimmer_one_stands():
     beds = [dataclasses.replace(thing("bed", i + 1, "kitchen_1", x + dx, y + dy), size=(1.0, 1.0, 0.7))
             for i, (dx, dy) in enumerate((a, b) for a in (-1.2, 1.2) for b in (-1.2, 1.2))]
     full = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=tuple(beds)))
-    who = [p.asset for seed in range(8) for p in add_people(
-        full.house, world.graph, (7,), SimpleNamespace(of_class=lambda name: (wide, SLIM)), seed=seed).placements if p.object_class == CLASS]
+    who = [p.asset for seed in range(8) for p in people_of(populated((7,), full, (wide, SLIM), seed)[0])]
     assert who and set(who) == {SLIM.key}
 
 
@@ -64,13 +129,14 @@ def test_a_crowded_start_goes_without():
     x, y, _ = world.graph.positions[0]
     table = dataclasses.replace(thing("table", 1, "kitchen_1", x, y), size=(4.6, 4.6, 0.7))
     full = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=(table,)))
-    assert not [p for p in populated((0,), full)[0].placements if p.object_class == CLASS]
+    assert not people_of(populated((0,), full)[0])
 
 
 def test_only_those_who_stand_are_taken():
     assert stands(FIGURE)
     for size in ((0.6, 0.8, 0.76), (0.7, 1.9, 0.57), (1.2, 0.5, 1.7)):
         assert not stands(dataclasses.replace(FIGURE, size=size))
+    assert sits(SITTER) and not stands(SITTER) and not sits(FIGURE)
 
 
 def test_people_are_not_objects_to_look_for():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -42,15 +42,23 @@ class RouteConfig:
     """Metres."""
 
 
-def sampled_paths(graph: NavGraph, count: int, *, rng: np.random.Generator, config: RouteConfig) -> list[tuple[int, ...]]:
+def sampled_paths(
+    graph: NavGraph, count: int, *, rng: np.random.Generator, config: RouteConfig, starts: Collection[int] | None = None
+) -> list[tuple[int, ...]]:
     """`count` different shortest paths of 4 to 6 edges between random nodes, as in Room-to-Room.
 
     Fewer when the house has fewer; in a house too small for any, the longest paths it has.
+
+    Args:
+      starts: where routes may begin: nodes at which somebody can be met. Where no path can, all may.
     """
     hops = count_hops(graph.next_hop)
     fits = (hops >= config.fewest_edges) & (hops <= config.most_edges) & (np.asarray(graph.distance) >= config.shortest)
     if not fits.any():
         fits = hops == hops.max()
+    if starts is not None:
+        met = np.isin(np.arange(len(hops)), list(starts))[:, None]
+        fits = fits & met if (fits & met).any() else fits
     pairs = np.argwhere(fits)
     chosen = rng.permutation(len(pairs))[:count]
     return [tuple(int(v) for v in graph.path(int(pairs[i, 0]), int(pairs[i, 1]))) for i in chosen]
@@ -148,14 +156,22 @@ def benchmark_lemma2(graph: NavGraph, *, rng: np.random.Generator, pairs: int | 
     return Lemma2(n, len(known), 2 * n * math.log2(n), max(counts), float(np.mean(counts)), float(np.mean(detours)))
 
 
+def route_paths(
+    graph: NavGraph, name: str, *, seed: int, house_split: str, config: RouteConfig = RouteConfig(),
+    starts: Collection[int] | None = None,
+) -> list[tuple[int, ...]]:
+    """The sampled paths of the house `name`: so many that each can be worded once per wording of its split."""
+    count = max(1, round(config.routes_per_node * len(graph.positions) / len(WORDINGS[house_split])))
+    return sampled_paths(graph, count, rng=stream(seed, "routes", name), config=config, starts=starts)
+
+
 def build_routes(
-    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig()
+    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig(),
+    starts: Collection[int] | None = None,
 ) -> tuple[Route, ...]:
     """The sampled route system of one house, each path worded three times."""
-    rng = stream(seed, "routes", world.house.name)
-    wordings = WORDINGS[house_split]
-    count = max(1, round(config.routes_per_node * len(world.graph.positions) / len(wordings)))
-    return worded(world, sampled_paths(world.graph, count, rng=rng, config=config), wordings, seed=seed, language=language)
+    paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config, starts=starts)
+    return worded(world, paths, WORDINGS[house_split], seed=seed, language=language)
 
 
 def build_spanning_routes(world: World, *, seed: int, language: Language, house_split: str) -> tuple[Route, ...]:

@@ -69,18 +69,18 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
 
 def inhabited(house, catalogue, args: argparse.Namespace):
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
-    from embodied.assistants.routes import build_routes
-    from embodied.language import People, PlainLanguage
+    from embodied.assistants.routes import WORDINGS, route_paths, worded
+    from embodied.language import People
     from embodied.navgraph import build_graph
-    from embodied.people import add_people
+    from embodied.people import add_people, meet
     from embodied.world import open_world
 
     graph = build_graph(house, catalogue)
-    with open_world(house, catalogue, args.cache, graph=graph) as empty:
-        starts = [r.path[0] for r in build_routes(empty, seed=args.seed, language=PlainLanguage(), house_split="test")]
-    house = add_people(house, graph, starts, catalogue, seed=args.seed)
+    met = meet(house, graph, catalogue, seed=args.seed)
+    paths = route_paths(graph, house.name, seed=args.seed, house_split="test", starts=met)
+    house = add_people(house, met, (p[0] for p in paths))
     with open_world(house, catalogue, args.cache, graph=graph) as world:
-        return house, graph, build_routes(world, seed=args.seed, language=People(), house_split="test")
+        return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 
 
 def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) -> dict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import os
 import shutil
@@ -15,7 +16,7 @@ import joblib
 
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
-from embodied.assistants.routes import WORDINGS, RouteConfig, sampled_paths, spanning_paths, worded
+from embodied.assistants.routes import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
@@ -23,13 +24,15 @@ from embodied.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.navgraph import NavGraph, build_graph, from_matterport, to_matterport
-from embodied.people import add_people
+from embodied.people import add_people, meet
 from embodied.records import save_lines
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
+MAKERS = ("assets", "embodied/assistants", "embodied/datasets", "embodied/generate", "embodied/language", "embodied/tasks", "embodied")
+"""Folders of the code and the catalogue that decide what is in a data set; of the last, its own modules only."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
@@ -194,16 +197,16 @@ def _write_unit(
 ) -> None:
     catalogue, language = load_catalogue(cache, packs), VOICES[config.language]()
     house, graph = make_house(config.seed, unit.name, config, catalogue)
-    wording = WORDINGS["train" if unit.group in ("train", "extra") else unit.group]
+    house_split = "train" if unit.group in ("train", "extra") else unit.group
+    wording = WORDINGS[house_split]
     paths: list[tuple[int, ...]] = []
     if config.kind in ("hanna", "vln"):
-        rng = stream(config.seed, "routes", unit.name)
-        count = max(1, round(RouteConfig().routes_per_node * len(graph.ids) / len(wording)))
-        spanning = config.routes == "spanning"
-        paths = spanning_paths(graph) if spanning else sampled_paths(graph, count, rng=rng, config=RouteConfig())
-        wording = tuple(dict.fromkeys(wording)) if spanning else wording
-    if config.kind == "hanna" and config.people:
-        house = add_people(house, graph, [p[0] for p in paths], catalogue, seed=config.seed)
+        met = meet(house, graph, catalogue, seed=config.seed) if config.kind == "hanna" and config.people else None
+        if config.routes == "spanning":
+            paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
+        else:
+            paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
+        house = house if met is None else add_people(house, met, (p[0] for p in paths))
     with open_world(house, catalogue, cache, graph=graph) as world:
         routes = worded(world, paths, wording, seed=config.seed, language=language)
         tasks = part_tasks(
@@ -240,17 +243,32 @@ def _part(split: Split, unit: Unit, kind: str) -> str:
 
 
 def _claim(folder: Path, config: DatasetConfig) -> None:
-    """Write down whose folder it is, or refuse another data set's."""
+    """Write down whose folder it is, or refuse another data set's, or one that another program began."""
     mine = {"version": VERSION, "config": json.loads(json.dumps(dataclasses.asdict(config)))}
     path = folder / "config.json"
     if path.exists():
         theirs = json.loads(path.read_text())
+        begun_by = theirs.pop("program", None)
         if theirs != mine:
             raise ValueError(f"{folder} holds another data set ({theirs}); this one is {mine}; choose another folder")
+        if begun_by != program() and any(missing_units(config, folder)):
+            raise ValueError(
+                f"{folder} was begun by another version of the program ({begun_by}, this is {program()}), whose houses and words "
+                "would not match; finish it with that version, or build it anew in another folder"
+            )
     else:
         if folder.exists() and any(folder.iterdir()):
             raise ValueError(f"{folder} is not empty and holds no data set; choose an empty folder")
-        write_bytes(path, (json.dumps(mine, sort_keys=True, indent=1) + "\n").encode())
+        write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
+
+
+@functools.cache
+def program() -> str:
+    """A digest of the code and the catalogue that make data sets: what one of them began, only the same one may finish."""
+    root = Path(__file__).parents[2]
+    files = [f for name in MAKERS for f in ((root / name).glob("*") if name == "embodied" else (root / name).rglob("*"))]
+    texts = {f.relative_to(root).as_posix(): digest(f.read_bytes()) for f in files if f.suffix in (".py", ".json")}
+    return digest(texts)[:16]
 
 
 def write_index(config: DatasetConfig, folder: Path) -> Path:

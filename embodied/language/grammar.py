@@ -86,13 +86,18 @@ def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator
     i, again = 0, _again(phrases)
     while i < len(phrases):
         pair = tuple(kind_of(p.clause) for p in phrases[i:i + 2])
-        if len(pair) == 2 and pair in _BY_KINDS and rng.random() < speaker.joining:
+        if len(pair) == 2 and pair in _BY_KINDS and rng.random() < speaker.joining and not _misleads(pair, phrases[i + 2:]):
             pieces.append((_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i:i + 2], again[i:i + 2], speaker, rng), pair))
             i += 2
         else:
             pieces.append((_fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i:i + 1], again[i:i + 1], speaker, rng), pair[:1]))
             i += 1
     return _slip(_sentences(pieces, speaker, rng), speaker, rng)
+
+
+def _misleads(pair: tuple[str, ...], after: Sequence[Phrase]) -> bool:
+    """Whether the pair in one breath sounds as if nobody walked: 'turn right toward the sofa, then face the other way'."""
+    return pair[-1] == "to" and bool(after) and kind_of(after[0].clause) == "around"
 
 
 def _again(phrases: Sequence[Phrase]) -> list[str]:
