@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 import os
@@ -19,7 +20,7 @@ import torch.distributed as dist
 from hand_worlds import grid_world
 
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
-from agents.hanna.asking import ask_above
+from agents.hanna.asking import RULES, ask_above
 from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
 from agents.imitation.checkpoint import CheckpointError
 from agents.imitation.collect import collect, imitation_loss
@@ -258,6 +259,17 @@ def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
     assert not torch.equal(hidden[0], hidden[1])
     assert torch.equal(hidden[1:], learner.percept([first], memory.keep((1,))).current.abs().sum(1) == 0)
     assert agent_for(split).policy(split.bank).start((0,)).channels is None
+
+
+def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
+    split = setting()
+    tasks = [dataclasses.replace(t, horizon=20) for t in (*split.tasks, *split.tasks, *split.tasks)]
+    half = round(len(tasks) / 2)
+    learner = for_training(agent_for(split).policy(split.bank), RULES["never"][0], guided_asking=0.5)
+    episodes = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0).episodes
+    asked = [[t for t, s in enumerate(e.steps) if isinstance(s.action, Ask)] for e in episodes]
+    assert sum(map(len, asked[:half])) > 0 and not any(asked[half:])
+    assert all(first >= 4 for first, *_ in filter(None, asked)) and all(b - a >= 5 for times in asked for a, b in itertools.pairwise(times))
 
 
 def test_labels_line_up_with_what_the_networks_said():

@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.hanna.asking import AskRule, ask_greedily, ask_sampled
+from agents.hanna.asking import RULES, AskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
@@ -104,6 +104,9 @@ class HannaPolicy:
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
     plays in a house that looks a little different, so houses cannot be learned by heart. For training."""
+    guided_asking: float = 0.0
+    """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
+    of policies as in DAgger (Ross et al. 2011). For training."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
     _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
@@ -131,6 +134,7 @@ class HannaPolicy:
         reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
 
         actions: list[Action | None] = [None] * len(observations)
+        guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
             n = len(o.candidates)
@@ -143,8 +147,8 @@ class HannaPolicy:
             index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
             if imposed is not None and imposed[position] is not None:
                 index = imposed[position]
-            can_ask = Intention.HELP in o.can_ask
-            if can_ask and self.ask_rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
+            rule = RULES["every5"][0] if position < guided else self.ask_rule
+            if Intention.HELP in o.can_ask and rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
                 actions[position] = Ask(Intention.HELP, thought)
                 chosen.append(0)  # its own move is discarded; the last action reads as stop
                 last_ask.append(o.time)
@@ -220,11 +224,12 @@ class HannaPolicy:
 
 
 def for_training(
-    policy: HannaPolicy, ask_rule: AskRule = ask_sampled, environment_dropout: float = 0.0
+    policy: HannaPolicy, ask_rule: AskRule = ask_sampled, environment_dropout: float = 0.0, guided_asking: float = 0.0
 ) -> HannaPolicy:
     """The same networks, sampling their actions and keeping what they said."""
     return dataclasses.replace(
-        policy, choose=choose_sampled, ask_rule=ask_rule, environment_dropout=environment_dropout, keep_moments=True
+        policy, choose=choose_sampled, ask_rule=ask_rule, environment_dropout=environment_dropout,
+        guided_asking=guided_asking, keep_moments=True,
     )
 
 

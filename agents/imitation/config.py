@@ -62,6 +62,9 @@ class TrainingConfig:
     """Has no influence on results here, only on speed."""
     ask_rule: str = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
+    guided_asking: float = 0.0
+    """Share of training episodes of the learned rule in which 'every5' asks in its place; not in the dissertation.
+    A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
     reset_inter_task: bool = True
@@ -109,6 +112,8 @@ class TrainingConfig:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
         if not 0 <= self.cooldown <= 1:
             raise ValueError(f"cooldown must be in [0, 1], got {self.cooldown}")
+        if not 0 <= self.guided_asking <= 1:
+            raise ValueError(f"guided_asking must be in [0, 1], got {self.guided_asking}")
         if self.training_houses < 0:
             raise ValueError(f"training_houses must not be negative, got {self.training_houses}")
         if self.alpha < 0:
@@ -145,7 +150,7 @@ class TrainingConfig:
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
-        iterations=1600, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4,
+        iterations=1600, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4, guided_asking=0.5,
         evaluation_temperature=0.5, validate_every=200, validation_tasks=200,
     ),
     "paper": TrainingConfig(),

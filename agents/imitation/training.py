@@ -109,7 +109,8 @@ def train(
         note(f"continuing after update {progress.update}")
     if parallel.rank() == 0:
         (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
-    learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout)
+    guided = config.guided_asking if config.ask_rule == "learned" else 0.0
+    learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided)
     report = Report(folder, config.iterations, progress, note if parallel.rank() == 0 else lambda line: None)
     began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
 
