@@ -129,7 +129,9 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     """The view along the agent's eyes, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
-    plan = draw_plan(env.world.house, pixels_per_metre=28, graph=env.world.graph, path=tuple(nodes), titles=False)
+    plan = draw_plan(
+        env.world.house, pixels_per_metre=28, graph=env.world.graph, path=tuple(nodes), facing=env.pose.yaw, titles=False,
+    )
     scale = VIEW[0] / plan.height
     plan = plan.convert("RGB").resize((max(1, round(plan.width * scale)), VIEW[0]), Image.Resampling.LANCZOS)
     sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + 64), "white")

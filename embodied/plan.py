@@ -16,7 +16,7 @@ import shapely
 from PIL import Image, ImageDraw, ImageFont
 
 from assets.cache import write_bytes
-from embodied.geometry import rectangle
+from embodied.geometry import rectangle, rotation
 from embodied.house import House, Opening, Placement, Room
 
 PAPER, INK, SOFT = (250, 248, 243), (52, 50, 56), (128, 124, 122)
@@ -34,7 +34,7 @@ SMALL = 3
 
 
 def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, furniture: bool = True, graph=None,
-              path: tuple[int, ...] = (), titles: bool = True) -> Image.Image:
+              path: tuple[int, ...] = (), facing: float | None = None, titles: bool = True) -> Image.Image:
     """A plan of one storey.
 
     Args:
@@ -42,6 +42,7 @@ def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, 
       furniture: draw the placements.
       graph: a NavGraph to lay over the plan.
       path: node indices of `graph` to draw as a walk.
+      facing: where somebody at the end of `path` looks, radians counter-clockwise from +x; drawn as an arrowhead.
     """
     rooms = [r for r in house.rooms if r.storey == storey]
     if not rooms:
@@ -62,6 +63,8 @@ def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, 
         _draw_stair(sheet, s)
     if graph is not None:
         _draw_graph(sheet, graph, path)
+        if path and facing is not None:
+            _draw_walker(sheet, graph.positions[path[-1]][:2], facing)
     image = sheet.image.resize((sheet.image.width // SMALL, sheet.image.height // SMALL), Image.LANCZOS)
     out = _Sheet(rooms, pixels_per_metre, house.outer_wall, image)
     for room in rooms:
@@ -200,11 +203,30 @@ def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
     mine = [p for p in house.placements if p.room in ids and p.position[2] < 1.7]
     for p in sorted(mine, key=lambda p: (p.position[2] + p.size[2], p.id)):
         corners = rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)
+        if p.object_class == "person":
+            _draw_person(sheet, p)
+            continue
         flat = p.size[2] < 0.04
         fill = _tint(p.object_class, 0.5 if flat else 0.0)
         sheet.polygon(corners, fill=fill)
         sheet.line([*corners, corners[0]], 0.016, tuple(max(0, c - (28 if flat else 95)) for c in fill))
         _glyph(sheet, p, corners, fill)
+
+
+def _draw_person(sheet: _Sheet, p: Placement) -> None:
+    """Shoulders and a head with the face to the front, as architects draw people from above."""
+    t = np.linspace(0, 2 * math.pi, 28)
+    oval = lambda rx, ry, dy: np.asarray(p.position[:2]) + np.stack([rx * np.cos(t), ry * np.sin(t) + dy], 1) @ rotation(p.yaw).T
+    for shape, fill in ((oval(0.23, 0.12, 0.0), (233, 138, 60)), (oval(0.1, 0.11, -0.05), (92, 62, 44))):
+        sheet.polygon(shape, fill=fill)
+        sheet.line(shape, 0.014, (96, 52, 20))
+
+
+def _draw_walker(sheet: _Sheet, at: np.ndarray, facing: float) -> None:
+    """An arrowhead where the agent is."""
+    shape = at + np.array([[0.3, 0.0], [-0.2, 0.2], [-0.1, 0.0], [-0.2, -0.2]]) @ rotation(facing).T
+    sheet.polygon(shape, fill=(31, 119, 255))
+    sheet.line([*shape, shape[0]], 0.02, (255, 255, 255))
 
 
 TINTS = (

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 from conftest import two_rooms
 
+from embodied.house import Placement
 from embodied.navgraph import build_graph
 from embodied.plan import INK, ROOM_COLOURS, draw_plan, save_plan
 
@@ -38,6 +42,18 @@ def test_furniture_and_graph_change_the_picture_where_they_are():
     assert (colour_at(bare, house, 1.7, 1.5) != colour_at(full, house, 1.7, 1.5)).any()
     assert (np.asarray(full) != np.asarray(walked)).any()
     assert bare.size == full.size == walked.size
+
+
+def test_people_and_the_walker_are_seen_from_above():
+    house = two_rooms()
+    person = Placement("person_1", "hand/person", "person", house.rooms[0].id, (2.5, 3.0, 0.0), 0.0, (0.5, 0.4, 1.7))
+    inhabited = dataclasses.replace(house, placements=(*house.placements, person))
+    assert np.abs(colour_at(draw_plan(inhabited, pixels_per_metre=SCALE), house, 2.68, 3.0) - (233, 138, 60)).max() < 30  # a shoulder
+    graph = build_graph(house)
+    walked = [draw_plan(house, pixels_per_metre=SCALE, graph=graph, path=(0,), facing=f) for f in (None, 0.0, math.pi)]
+    x, y = graph.positions[0][:2]
+    blue = [colour_at(image, house, x + 0.2, y)[2] > colour_at(image, house, x + 0.2, y)[0] + 100 for image in walked]
+    assert blue == [False, True, False]
 
 
 def test_a_plan_is_the_same_every_time_and_saves_as_png(tmp_path):
