@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from embodied.light import (
     settings_of,
     solve,
 )
-from embodied.light.atlas import atlas_of, things_of
+from embodied.light.atlas import Thing, atlas_of, coarsened, things_of
 from embodied.light.backend import array, find_llvm, variant_of
 from embodied.light.bench import psnr, ssim
 from embodied.light.emitters import lamps_of, portals_of
@@ -143,6 +144,21 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     row = compose.filled(np.arange(24), own, good, (1, 24))[0, :, 0]
     assert (row[:7] == 1.0).all() and (np.diff(row) <= 0).all() and row[14:] == pytest.approx(0.1)
     assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
+
+
+def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
+    def some(name, fineness, side):
+        flat = SimpleNamespace(size=np.array([side, side]))
+        return Thing(name, "room", "object", flat, (), fineness, False)
+
+    things = [some("floor", 5, 10), some("small floor", 5, 5), some("rug", 4, 10), some("mirror", 8, 4), some("wall", 2, 20)]
+    total = lambda ts: sum(int(t.flat.size.prod()) * t.fineness**2 for t in ts)
+    fineness = lambda most: [t.fineness for t in coarsened(things, most)]
+    assert fineness(total(things)) == [5, 5, 4, 8, 2]
+    assert fineness(total(things) - 1) == [4, 5, 4, 8, 2]
+    assert fineness(total(things) - 901) == [4, 4, 4, 8, 2]
+    assert fineness(0) == [3, 3, 3, 8, 2]
+    assert total(coarsened(things, total(things) - 500)) <= total(things) - 500
 
 
 def test_bright_spots_are_tamed_without_loss_of_light():

@@ -26,7 +26,7 @@ from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.records import Finish
 from embodied.house import House
 from embodied.light import tone
-from embodied.light.atlas import Atlas, albedo, atlas_of, linear, rasterise, read_colours, things_of  # noqa: F401
+from embodied.light.atlas import Atlas, albedo, atlas_of, coarsened, linear, rasterise, read_colours, things_of  # noqa: F401
 from embodied.light.backend import LightError, device, rest, scene_of, warn
 from embodied.light.compose import Ingredients, page_of
 from embodied.light.emitters import in_the_open, lamps_of, portals_of
@@ -220,7 +220,7 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
     things = things_of(parts, density=settings.density, budget=settings.budget, cache=Path(cache) / "light",
                        progress=lambda i, n: progress("unwrapping", i / n))
     clock("unwrap")
-    atlas = atlas_of(things)
+    atlas = atlas_of(coarsened(things, settings.texels))
     if folder is not None:
         _same_atlas(folder, atlas)
     outdoors = outdoors_of(house)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-VERSION = 12
+VERSION = 13
 """Counts up whenever a bake would come out differently; older bakes are then made anew."""
 
 
@@ -27,12 +27,14 @@ class Settings:
     """Rays per luxel in each round of gathering; the last is what is seen."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
+    texels: float = 29e6
+    """Of all pages together, before packing; patterns of large houses are drawn coarser to keep to it (`atlas.coarsened`)."""
 
 
 QUALITIES = {
     "draft": Settings(24.0, 1800.0, 16, 20, 6, 32, (4, 4, 4, 4, 6, 40), 90),
     "normal": Settings(),
-    "high": Settings(56.0, 14000.0, 48, 24, 16, 96, (8, 8, 12, 16, 128), 94),
+    "high": Settings(56.0, 14000.0, 48, 24, 16, 96, (8, 8, 12, 16, 128), 94, 120e6),
 }
 """Named settings."""
 
