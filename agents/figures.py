@@ -59,15 +59,16 @@ def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path
     Args:
       validations: agent to the lines of its validation.jsonl.
     """
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for agent, lines in validations.items():
+    for k, (agent, lines) in enumerate(validations.items()):
         updates = [line["update"] for line in lines]
-        left.plot(updates, [100 * line["success"] for line in lines], marker="o", markersize=3, label=agent)
-        right.plot(updates, [line["requests"] for line in lines], marker="o", markersize=3, label=agent)
+        style = {"color": f"C{k % 10}", "linestyle": ("-", "--")[k // 10 % 2], "marker": "o", "markersize": 3}
+        left.plot(updates, [100 * line["success"] for line in lines], label=agent, **style)
+        right.plot(updates, [line["requests"] for line in lines], **style)
     left.set_ylabel("validation success (%)")
     left.set_ylim(0, 100)
-    left.legend(fontsize=8, loc="lower right")
+    figure.legend(fontsize=8, loc="outside right center")
     right.set_ylabel("requests per task")
     right.set_ylim(bottom=0)
     for axes in (left, right):
