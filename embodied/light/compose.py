@@ -37,6 +37,10 @@ class Ingredients:
     """(h luxels, w luxels, 3) float16 radiance of what shines itself; (0, 0, 3) where nothing does."""
 
 
+DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
+"""Roughness from which a metal's picture is blurred so much that few rays leave grain, and the rays of either kind."""
+
+
 def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosity, space: Space, portals: Sequence[Portal],
             lamps: Sequence[Lamp], outdoors: Outdoors, exposure: Exposure, settings: Settings,
             read: Callable[[str], np.ndarray]) -> Ingredients:
@@ -69,7 +73,7 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
 
 
 def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels, colour: np.ndarray, lux: Luxels,
-               light: Radiosity, space: Space, outdoors: Outdoors, rays: int = 8) -> None:
+               light: Radiosity, space: Space, outdoors: Outdoors) -> None:
     """Mirrors and metals in place of their diffuse light: what somebody in the middle of the room sees in them.
 
     A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
@@ -78,6 +82,16 @@ def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels
     i = np.nonzero(metal > 0.3)[0]
     if not len(i):
         return
+    rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
+    dull = rough > DULL
+    for some, rays in ((i[~dull], SHARP_RAYS), (i[dull], DULL_RAYS)):
+        if len(some):
+            _reflect(some, rays, metal, radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
+
+
+def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels,
+             colour: np.ndarray, lux: Luxels, light: Radiosity, space: Space, outdoors: Outdoors) -> None:
+    """`_add_metal` for the texels `i`, with so many rays for each."""
     mi = mitsuba()
     import drjit as dr
 
