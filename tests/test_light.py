@@ -29,6 +29,7 @@ from embodied.light import (
 from embodied.light.atlas import Thing, atlas_of, coarsened, things_of
 from embodied.light.backend import array, find_llvm, variant_of
 from embodied.light.bench import psnr, ssim
+from embodied.light.denoise import lift_specks, neighbours
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
@@ -159,6 +160,19 @@ def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
     assert fineness(total(things) - 901) == [4, 4, 4, 8, 2]
     assert fineness(0) == [3, 3, 3, 8, 2]
     assert total(coarsened(things, total(things) - 500)) <= total(things) - 500
+
+
+def test_neighbours_are_looked_for_on_the_same_layer():
+    """A blanket 25 mm above its mattress, luxels 60 mm apart: the mattress is nearer, faces the same way, and is dark."""
+    x, y = np.meshgrid(np.arange(9) * 0.06, np.arange(9) * 0.06)
+    layer = lambda z, step: np.stack([x.ravel() * step, y.ravel() * step, np.full(x.size, z)], 1).astype(np.float32)
+    position = np.concatenate([layer(0.025, 1.0), layer(0.0, 0.5) + np.float32([0.12, 0.12, 0])])
+    normal = np.tile(np.float32([0, 0, 1]), (len(position), 1))
+    blanket = np.arange(len(position)) < x.size
+    near = neighbours(position, normal, np.ones(len(position), bool), blanket)
+    assert near.shape == (x.size, 12) and blanket[near].mean(1).min() > 0.5
+    light = np.where(blanket, 1.0, 0.01)[:, None].repeat(3, 1).astype(np.float32)
+    assert lift_specks(light, near, blanket)[blanket].min() > 0.9
 
 
 def test_bright_spots_are_tamed_without_loss_of_light():
