@@ -14,7 +14,7 @@ import numpy as np
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
-from embodied.assistants.routes import build_routes, route_paths
+from embodied.assistants.routes import WORDINGS, route_paths, worded
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
@@ -94,17 +94,20 @@ def _flat(
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
-    met = None
+    paths = None
     if worlds is None:
         name = f"flat_{seed}"
         house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
         if kind == "hanna":
             met = meet(house, graph, catalogue, seed=seed)
-            house = add_people(house, met, (p[0] for p in route_paths(graph, name, seed=seed, house_split="test", starts=met)))
+            paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
+            house = add_people(house, met, (p[0] for p in paths))
         worlds = {name: open_world(house, catalogue, cache, graph=graph)}
     name, world = next(iter(worlds.items()))
-    helped = kind in ("hanna", "vln")
-    routes = build_routes(world, seed=seed, language=language, house_split="test", starts=met) if helped else ()
+    routes = ()
+    if kind in ("hanna", "vln"):
+        paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
+        routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
     tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language)[part]
     return worlds, tuple(tasks), environment_maker(kind, worlds, routes={name: routes})

@@ -166,11 +166,10 @@ def route_paths(
 
 
 def build_routes(
-    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig(),
-    starts: Collection[int] | None = None,
+    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig()
 ) -> tuple[Route, ...]:
     """The sampled route system of one house, each path worded three times."""
-    paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config, starts=starts)
+    paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config)
     return worded(world, paths, WORDINGS[house_split], seed=seed, language=language)
 
 
