@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -121,10 +122,16 @@ class _Site:
     def stand(self, figures: Sequence[Asset], rng: np.random.Generator) -> Placement | None:
         """The first figure that finds free floor beside the ways; it looks at the node."""
         free = self.open.difference(shapely.union_all([*map(_ground, self.things), *self.others]))
-        drawn = (figures[int(i)] for i in rng.permutation(len(figures)))
-        spots = ((a, _spots(free, self.edges, self.ring, max(a.size[:2]) / 2)) for a in drawn)
-        asset, where = next((pair for pair in spots if pair[1].area >= ROOM), (None, None))
-        if asset is None:
+        too_wide = math.inf
+        for i in rng.permutation(len(figures)):
+            asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
+            if body >= too_wide:
+                continue
+            where = _spots(free, self.edges, self.ring, body)
+            if where.area >= ROOM:
+                break
+            too_wide = body
+        else:
             return None
         spot = _drawn(where, rng)
         direction = math.atan2(self.eye[1] - spot[1], self.eye[0] - spot[0])
@@ -185,9 +192,9 @@ def _passable(house: House, people: list[Placement]) -> list[Placement]:
     if open_with(people):
         return people
     kept: list[Placement] = []
-    for p in people:
-        if open_with([*kept, p]):
-            kept.append(p)
+    while people:  # the longest run of them that shuts nobody off; whoever follows it would
+        run = bisect.bisect_left(range(1, len(people) + 1), True, key=lambda n: not open_with([*kept, *people[:n]]))
+        kept, people = [*kept, *people[:run]], people[run + 1 :]
     return kept
 
 

@@ -89,7 +89,7 @@ def _small(kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int
     return {"train": train, "val": val, "test": test}, _seen_and_unseen(tasks, held, held, held, judged)
 
 
-SCALES = ("paper", "midi", "mini", "tiny")
+SCALES = ("paper", "maxi", "midi", "mini", "tiny")
 
 
 def scale(name: str, kind: str) -> Scale:
@@ -97,7 +97,8 @@ def scale(name: str, kind: str) -> Scale:
 
     'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
     20 unseen houses to judge by; 'midi' has the same unseen houses and five times the houses to
-    learn from, with as many tasks each; 'tiny' is for tests.
+    learn from, with as many tasks each, and 'maxi' three times those; the first houses of a larger one
+    are those of the smaller; 'tiny' is for tests.
 
     Raises:
       ValueError: an unknown scale or kind.
@@ -106,6 +107,8 @@ def scale(name: str, kind: str) -> Scale:
         raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
     if name == "paper":
         houses, splits = PAPER[kind]
+    elif name == "maxi":
+        houses, splits = _small(kind, (384, 24, 4, 20), 38_400, 500)
     elif name == "midi":
         houses, splits = _small(kind, (128, 8, 4, 20), 12_800, 500)
     elif name == "mini":
