@@ -97,7 +97,7 @@ def scale(name: str, kind: str) -> Scale:
 
     'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
     20 unseen houses to judge by; 'midi' has the same unseen houses and five times the houses to
-    learn from, with as many tasks each, and 'maxi' three times those; the first houses of a larger one
+    learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
     are those of the smaller; 'tiny' is for tests.
 
     Raises:
@@ -108,7 +108,7 @@ def scale(name: str, kind: str) -> Scale:
     if name == "paper":
         houses, splits = PAPER[kind]
     elif name == "maxi":
-        houses, splits = _small(kind, (384, 24, 4, 20), 38_400, 500)
+        houses, splits = _small(kind, (256, 16, 4, 20), 25_600, 500)
     elif name == "midi":
         houses, splits = _small(kind, (128, 8, 4, 20), 12_800, 500)
     elif name == "mini":
