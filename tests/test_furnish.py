@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 import subprocess
@@ -14,10 +15,11 @@ from conftest import FINISHES, two_rooms
 
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
-from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.furnish import furnish
 from embodied.generate.furnish.lights import LUMENS
 from embodied.generate.furnish.space import box, overlap, room_space
+from embodied.generate.lacking import BEDS, lacking
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house import DOORS, House, Opening, Room, Storey, check
 
@@ -72,7 +74,6 @@ def of_class(house: House, *names: str):
     return [p for p in house.placements if p.object_class in names]
 
 
-BEDS = ("bed", "child bed", "bunk bed", "loft bed", "day bed")
 BASINS = ("washbasin", "wall washbasin", "bathroom vanity", "double vanity")
 
 
@@ -199,6 +200,33 @@ def test_a_kitchen_has_sink_cooker_and_fridge_and_a_bathroom_toilet_and_basin():
         bathroom = one_room("bathroom", seed)
         assert of_class(bathroom, "toilet") and of_class(bathroom, *BASINS)
         assert of_class(bathroom, "bathtub", "shower", "corner bathtub")
+
+
+LACKED = ((1434163573, "sink and cooker"), (1583581038, "fridge and bed"), (1652752703, "bath"))
+"""Houses of 90 to 200 m2 whose first plan left no room for something, and what that was."""
+
+
+@pytest.mark.parametrize("seed", [s for s, _ in LACKED])
+def test_rooms_are_drawn_anew_until_nothing_is_lacking(seed):
+    house = generate_house(seed, HouseConfig(area=(90.0, 200.0)), catalogue())
+    assert lacking(house) == ()
+    assert house.seed == seed
+    beds = tuple(p for p in house.placements if p.object_class in BEDS)
+    robbed = dataclasses.replace(house, placements=tuple(p for p in house.placements if p.room != beds[0].room))
+    assert f"{beds[0].room}: bed" in lacking(robbed)
+
+
+def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
+    short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
+    monkeypatch.setattr(stages, "lacking", lambda house: next(short))
+    first = []
+    room = {**STAGES, "rooms": lambda draft: (first.append(draft.first), STAGES["rooms"](draft))[1]}
+    house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=room)
+    assert first == [0, 1, 2, 3, 4]
+    monkeypatch.setattr(stages, "lacking", lambda house: ())
+    assert house.digest == generate_house(
+        7, HouseConfig(area=(38.0, 46.0)), catalogue(),
+        stages={**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, first=1))}).digest
 
 
 def test_worktops_of_all_kitchens_are_in_use():

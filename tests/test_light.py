@@ -36,6 +36,7 @@ from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
 from embodied.part import Part
+from embodied.walkable import inward
 
 TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)
 DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))
@@ -275,6 +276,29 @@ def lit(tmp_path_factory):
 def solved(lit):
     house, catalogue, cache, _ = lit
     return baking.solve_house(house, catalogue, cache, TINY)
+
+
+def test_windows_take_light_from_the_open_sky_on_their_outer_side_only(solved):
+    house, atlas, lux = solved.house, solved.atlas, solved.lux
+    space = radiosity.space_of(atlas, lux.texels, solved.outdoors.picture)
+    e = solve.outer_light(house, lux, atlas, space).mean(1)
+    frames = [f"{o.id}/frame" for o in house.openings if o.kind == "window" and None in o.rooms]
+    assert frames
+    for name in frames:
+        mine = lux.owner == atlas.owners.index(name)
+        into = inward(house, next(o for o in house.openings if name.startswith(f"{o.id}/")))
+        towards = lux.face_normal[:, :2] @ into
+        assert (e[mine & (towards < -0.9)] > 0.1).any()
+        assert not e[mine & (towards > 0.9)].any()
+
+
+def test_grain_is_evened_without_loss_and_not_across_charts():
+    index = np.array([y * 20 + x for y in range(8) for x in (*range(8), *range(12, 20))])
+    left = index % 20 < 8
+    values = np.where(left, 1.0, 5.0).astype(np.float32)[:, None] + np.random.default_rng(0).normal(0, 0.2, (len(index), 3)).astype(np.float32)
+    out = compose.evened(values, index, (8, 20))
+    assert out[left].std() < 0.45 * values[left].std() and out[left].mean() == pytest.approx(values[left].mean(), abs=0.05)
+    assert out[left].max() < 1.5 and out[~left].min() > 4.5
 
 
 def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):

@@ -15,6 +15,7 @@ from embodied.generate.config import HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
+from embodied.generate.lacking import lacking
 from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
 from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
@@ -27,6 +28,8 @@ from embodied.walkable import inward
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
 ATTEMPTS = 12
+REDRAWN = 5
+"""Houses drawn at most for a seed, until one has all that its rooms must not lack."""
 DEFAULT = HouseConfig()
 
 
@@ -37,6 +40,8 @@ class Draft:
     seed: int
     config: HouseConfig
     catalogue: Catalogue | None
+    first: int = 0
+    """Attempts at the rooms that are skipped: what came of them was not good enough."""
     area: float = 0.0
     shape: str = "rectangle"
     footprints: tuple[Footprint, ...] = ()
@@ -63,8 +68,8 @@ def program(draft: Draft) -> Draft:
 
 
 def rooms(draft: Draft, first: int = 0) -> Draft:
-    """The best of many plans; `first` skips attempts that turned out badly."""
-    for attempt in range(first, ATTEMPTS):
+    """The best of many plans; `first` skips more attempts that turned out badly."""
+    for attempt in range(draft.first + first, draft.first + ATTEMPTS):
         rng = stream(draft.seed, "house", "rooms", attempt)
         footprints, spaces = draft.footprints, draft.spaces
         if attempt:
@@ -162,6 +167,9 @@ def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogu
                    stages: Mapping[str, Callable[[Draft], Draft]] = STAGES) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
+    Rooms are drawn anew where furniture that makes a room what it is (lacking.py) found no place; of
+    `REDRAWN` houses, the one that lacks least.
+
     Args:
       seed: any integer.
       config: what to fix; the rest is drawn.
@@ -171,10 +179,22 @@ def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogu
     Raises:
       HouseError: the configuration cannot be built.
     """
-    draft = Draft(seed, config, catalogue)
-    for stage in stages.values():
-        draft = stage(draft)
-    return draft.house
+    best: tuple[int, House] | None = None
+    for first in range(REDRAWN):
+        draft = Draft(seed, config, catalogue, first)
+        try:
+            for stage in stages.values():
+                draft = stage(draft)
+        except HouseError:
+            if best is None:
+                raise
+            break
+        short = len(lacking(draft.house))
+        if best is None or short < best[0]:
+            best = short, draft.house
+        if not short or not draft.house.placements:
+            break
+    return best[1]
 
 
 def _title(draft: Draft) -> str:

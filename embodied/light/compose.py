@@ -39,6 +39,8 @@ class Ingredients:
 
 DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
 """Roughness from which a metal's picture is blurred so much that few rays leave grain, and the rays of either kind."""
+AROUND = 0.15
+"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
 
 
 def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosity, space: Space, portals: Sequence[Portal],
@@ -106,7 +108,8 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
     p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
     seen = lux.albedo * (light.soft + light.sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32)) + lux.glow
-    table, spread_of = mi.Float(seen.astype(np.float32).ravel()), mi.Float(np.square(rough).astype(np.float32))
+    width = np.square(rough) + np.where(rough > DULL, AROUND, 0.0)
+    table, spread_of = mi.Float(seen.astype(np.float32).ravel()), mi.Float(width.astype(np.float32))
     straight, total = vector(bounced), dr.zeros(mi.Color3f, p.n)
     for k in range(rays):
         a, b = (constant(x) for x in r2(k))
@@ -121,7 +124,19 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
     share = metal[i, None]
     tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])
     limit = 8.0 * np.percentile(seen.mean(1), 95)
-    radiance[i] = radiance[i] * (1 - share) + np.minimum(array(total) / rays, limit) * tint * share
+    mirrored = np.minimum(array(total) / rays, limit)
+    if rays == DULL_RAYS:
+        mirrored = evened(mirrored, t.index[i], t.shape)
+    radiance[i] = radiance[i] * (1 - share) + mirrored * tint * share
+
+
+def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Values (n, c) at flat positions of a page, each mixed with those two texels around it: the grain of too few rays goes."""
+    there, sum_ = np.zeros(shape, np.float32), np.zeros((*shape, values.shape[1]), np.float32)
+    there.ravel()[index] = 1.0
+    sum_.reshape(-1, values.shape[1])[index] = values
+    blurred = lambda a: cv2.GaussianBlur(a, (5, 5), 1.2, borderType=cv2.BORDER_CONSTANT)
+    return (blurred(sum_) / np.maximum(blurred(there), 1e-6)[..., None]).reshape(-1, values.shape[1])[index]
 
 
 def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

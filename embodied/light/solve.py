@@ -17,6 +17,7 @@ from embodied.light.radiosity import Points, Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
 from embodied.light.unwrap import areas_of
+from embodied.walkable import inward
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
@@ -164,14 +165,18 @@ def _add_light(e: np.ndarray, lux: Luxels, shine: Callable[[np.ndarray, int], np
 
 
 def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: int = 24) -> np.ndarray:
-    """(n, 3) e that the outer side of windows and outer doors takes from the open sky."""
+    """(n, 3) e that the outer side of windows and outer doors takes from the open sky.
+
+    What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
+    every second ray runs up inside the wall.
+    """
     import drjit as dr
 
     mi = mitsuba()
     e = np.zeros((len(lux.position), 3), np.float32)
-    outer = {o.id for o in house.openings if None in o.rooms}
-    of_outer = np.array([k == "opening" and o.split("/")[0] in outer for o, k in zip(atlas.owners, atlas.kinds)])
-    mine = np.nonzero(of_outer[lux.owner])[0]
+    into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
+    room = np.array([into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2 for o, k in zip(atlas.owners, atlas.kinds)])
+    mine = np.nonzero((lux.face_normal[:, :2] * room[lux.owner]).sum(1) < 0.7)[0]
     if not len(mine):
         return e
     p = subset(lux, mine)

@@ -97,17 +97,30 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
       fridge: whether the kitchen still needs one.
     """
     kits = kitchen_sets(ctx)
-    for clear, spare in ((0.6, 1), (0.5, 0), (0.35, 0)):
+    for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
         for with_fridge in ((True, False) if fridge else (False,)):
-            for kit in kits:
-                for wall, a, b in _best_runs(ctx, kit):
-                    found = _run(ctx, kit, wall, a, b, with_fridge, clear, spare)
-                    if found is None:
-                        continue
-                    if fridge and not with_fridge:
-                        lone_fridge(ctx)
-                    _more_runs(ctx, kit, found)
-                    return found
+            found = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
+            if found is None:
+                continue
+            kit, things = found
+            if fridge and not with_fridge:
+                lone_fridge(ctx)
+            _more_runs(ctx, kit, things)
+            return things
+    return None
+
+
+def _line_at_a_wall(
+    ctx: Context, kits: list[KitchenSet], with_fridge: bool, clear: float, spare: int, aside: float,
+) -> tuple[KitchenSet, list[Thing]] | None:
+    """The first kit that finds a wall; `aside` metres of it stay free at one end or both, for a door beside it."""
+    ends = ((aside, 0.0), (0.0, aside), (aside, aside)) if aside else ((0.0, 0.0),)
+    for kit in kits:
+        for wall, a, b in _best_runs(ctx, kit):
+            for left, right in ends:
+                things = _run(ctx, kit, wall, a + left, b - right, with_fridge, clear, spare)
+                if things is not None:
+                    return kit, things
     return None
 
 
