@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-VERSION = 13
+VERSION = 14
 """Counts up whenever a bake would come out differently; older bakes are then made anew."""
 
 
