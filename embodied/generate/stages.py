@@ -40,8 +40,6 @@ class Draft:
     seed: int
     config: HouseConfig
     catalogue: Catalogue | None
-    first: int = 0
-    """Attempts at the rooms that are skipped: what came of them was not good enough."""
     area: float = 0.0
     shape: str = "rectangle"
     footprints: tuple[Footprint, ...] = ()
@@ -50,6 +48,8 @@ class Draft:
     plan: Plan | None = None
     palette: Palette | None = None
     house: House | None = None
+    first: int = 0
+    """Attempts at the rooms that are skipped: what came of them was not good enough."""
 
 
 def footprint(draft: Draft) -> Draft:
@@ -181,7 +181,7 @@ def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogu
     """
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
-        draft = Draft(seed, config, catalogue, first)
+        draft = Draft(seed, config, catalogue, first=first)
         try:
             for stage in stages.values():
                 draft = stage(draft)
