@@ -109,7 +109,9 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
     p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
     seen = lux.albedo * (light.soft + light.sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32)) + lux.glow
     width = np.square(rough) + np.where(rough > DULL, AROUND, 0.0)
-    table, spread_of = mi.Float(seen.astype(np.float32).ravel()), mi.Float(width.astype(np.float32))
+    limit = (3.0 if rays == DULL_RAYS else 8.0) * np.percentile(seen.mean(1), 95)  # of a lamp's glint: few rays would find it
+    seen = np.minimum(seen, limit).astype(np.float32)
+    table, spread_of = mi.Float(seen.ravel()), mi.Float(width.astype(np.float32))
     straight, total = vector(bounced), dr.zeros(mi.Color3f, p.n)
     for k in range(rays):
         a, b = (constant(x) for x in r2(k))
@@ -123,7 +125,6 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
         dr.eval(total)
     share = metal[i, None]
     tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])
-    limit = 8.0 * np.percentile(seen.mean(1), 95)
     mirrored = np.minimum(array(total) / rays, limit)
     if rays == DULL_RAYS:
         mirrored = evened(mirrored, t.index[i], t.shape)
