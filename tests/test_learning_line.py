@@ -12,6 +12,7 @@ import torch
 from test_datasets import build
 
 from agents import commands, options
+from agents import study as module
 from agents.evaluate import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
 from agents.study import Setting, run_study
@@ -122,9 +123,15 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     assert {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in once} == once, "nothing was trained twice"
 
 
-def test_a_study_of_more_houses_than_there_are_is_refused_before_anything_is_trained(study):
-    with pytest.raises(ValueError, match="more training houses"):
-        run_study(study, ["houses"])
+def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):
+    monkeypatch.setitem(module.VARIANTS, "8 houses", {"training_houses": 1})  # of the two of the hand-made data set
+    run_study(study, ["houses"])
+    rows = json.loads((study.out / "table_houses.json").read_text())
+    assert [r["agent"] for r in rows if r["split"] == "test_unseen"] == ["8 houses", "all houses"]
+    assert sorted(p.name for p in (study.out / "agents").iterdir()) == ["8_houses", "final"]
+
+
+def test_an_unknown_study_is_refused_before_anything_is_trained(study):
     with pytest.raises(ValueError, match="unknown studies"):
         run_study(study, ["5.1"])
     assert not study.out.exists()

@@ -88,10 +88,14 @@ def turn_words(angle: float) -> str:
     return f"turn around to your {side} and go"
 
 
+MASSES = ("bread", "butter", "firewood", "tape")
+"""Last words of nouns that are not counted."""
+
+
 def with_article(noun: str) -> str:
-    """'a mug', 'an armchair', 'a row of books'; nouns that are plural in form keep 'some'."""
+    """'a mug', 'an armchair', 'a row of books'; nouns that are plural in form or not counted get 'some'."""
     head = noun.split(" of ")[0]
-    if head.endswith("s") and not head.endswith(("ss", "us", "is")):
+    if head.split()[-1] in MASSES or head.endswith("s") and not head.endswith(("ss", "us", "is")):
         return f"some {noun}"
     vowel = noun[0] in "aeiou" and not noun.startswith(("uten", "uni", "use"))
     return f"an {noun}" if vowel else f"a {noun}"
