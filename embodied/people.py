@@ -192,7 +192,7 @@ def _passable(house: House, people: list[Placement]) -> list[Placement]:
     if open_with(people):
         return people
     kept: list[Placement] = []
-    while people:  # the longest run of them that shuts nobody off; whoever follows it would
+    while people:  # the longest run that shuts nobody off, and whoever follows it would: more people never open a way
         run = bisect.bisect_left(range(1, len(people) + 1), True, key=lambda n: not open_with([*kept, *people[:n]]))
         kept, people = [*kept, *people[:run]], people[run + 1 :]
     return kept

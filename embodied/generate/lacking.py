@@ -17,7 +17,10 @@ NEEDS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "kids_room": (BEDS,),
     "living_room": (("sofa", "sofa bed", "corner sofa", "armchair", "lounge chair"),),
 }
-"""Room kind to groups of object classes; a room should have one of every group."""
+"""Room kind to groups of object classes; a room should have one of every group.
+
+Fewer than the furnisher tries for (furnish/rooms.py), and asked of the finished house: clearing the ways may take a bed out again.
+"""
 
 
 def lacking(house: House) -> tuple[str, ...]:

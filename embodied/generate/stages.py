@@ -49,7 +49,7 @@ class Draft:
     palette: Palette | None = None
     house: House | None = None
     first: int = 0
-    """Attempts at the rooms that are skipped: what came of them was not good enough."""
+    """Attempts at the rooms that are skipped: no doors or no furniture fitted what came of them."""
 
 
 def footprint(draft: Draft) -> Draft:
@@ -67,9 +67,9 @@ def program(draft: Draft) -> Draft:
         draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program")))
 
 
-def rooms(draft: Draft, first: int = 0) -> Draft:
-    """The best of many plans; `first` skips more attempts that turned out badly."""
-    for attempt in range(draft.first + first, draft.first + ATTEMPTS):
+def rooms(draft: Draft) -> Draft:
+    """The best of many plans."""
+    for attempt in range(draft.first, draft.first + ATTEMPTS):
         rng = stream(draft.seed, "house", "rooms", attempt)
         footprints, spaces = draft.footprints, draft.spaces
         if attempt:
@@ -84,14 +84,14 @@ def rooms(draft: Draft, first: int = 0) -> Draft:
 
 def openings(draft: Draft) -> Draft:
     """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
-    palette = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette"))
+    palette, begun = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette")), draft.first
     for attempt in range(2 * ATTEMPTS):
         rng = stream(draft.seed, "house", "openings", attempt)
         house = _bare_house(draft, palette, rng)
         if not unreachable_rooms(house):
             return dataclasses.replace(draft, palette=palette, house=house)
         if attempt % 4 == 3:
-            draft = rooms(draft, first=1 + attempt // 4)
+            draft = rooms(dataclasses.replace(draft, first=begun + 1 + attempt // 4))
     raise HouseError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
 
 

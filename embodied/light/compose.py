@@ -86,14 +86,14 @@ def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels
         return
     rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
     dull = rough > DULL
-    for some, rays in ((i[~dull], SHARP_RAYS), (i[dull], DULL_RAYS)):
+    for some, is_dull in ((i[~dull], False), (i[dull], True)):
         if len(some):
-            _reflect(some, rays, metal, radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
+            _reflect(some, is_dull, metal, radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
 
 
-def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels,
+def _reflect(i: np.ndarray, dull: bool, metal: np.ndarray, radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels,
              colour: np.ndarray, lux: Luxels, light: Radiosity, space: Space, outdoors: Outdoors) -> None:
-    """`_add_metal` for the texels `i`, with so many rays for each."""
+    """`_add_metal` for the texels `i`, all of them dull or none."""
     mi = mitsuba()
     import drjit as dr
 
@@ -108,8 +108,8 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
     p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
     seen = lux.albedo * (light.soft + light.sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32)) + lux.glow
-    width = np.square(rough) + np.where(rough > DULL, AROUND, 0.0)
-    limit = (3.0 if rays == DULL_RAYS else 8.0) * np.percentile(seen.mean(1), 95)  # of a lamp's glint: few rays would find it
+    rays, width = DULL_RAYS if dull else SHARP_RAYS, np.square(rough) + AROUND * dull
+    limit = (3.0 if dull else 8.0) * np.percentile(seen.mean(1), 95)  # of a lamp's glint: few rays would find it
     seen = np.minimum(seen, limit).astype(np.float32)
     table, spread_of = mi.Float(seen.ravel()), mi.Float(width.astype(np.float32))
     straight, total = vector(bounced), dr.zeros(mi.Color3f, p.n)
@@ -126,7 +126,7 @@ def _reflect(i: np.ndarray, rays: int, metal: np.ndarray, radiance: np.ndarray, 
     share = metal[i, None]
     tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])
     mirrored = np.minimum(array(total) / rays, limit)
-    if rays == DULL_RAYS:
+    if dull:
         mirrored = evened(mirrored, t.index[i], t.shape)
     radiance[i] = radiance[i] * (1 - share) + mirrored * tint * share
 

@@ -175,8 +175,8 @@ def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: 
     mi = mitsuba()
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
-    room = np.array([into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2 for o, k in zip(atlas.owners, atlas.kinds)])
-    mine = np.nonzero((lux.face_normal[:, :2] * room[lux.owner]).sum(1) < 0.7)[0]
+    inwards = np.array([into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2 for o, k in zip(atlas.owners, atlas.kinds)])
+    mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
     if not len(mine):
         return e
     p = subset(lux, mine)

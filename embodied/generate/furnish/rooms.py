@@ -437,7 +437,10 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "study": (("desk",),),
     "laundry_room": (("washing machine",),),
 }
-"""Room kind to the roles it should not lack, most important first; any one of a tuple will do."""
+"""Room kind to the roles it should not lack, most important first; any one of a tuple will do.
+
+This orders the attempts at one room; generate/lacking.py says over which of them a finished house is drawn anew.
+"""
 
 def _piece(role: str, **limits) -> Callable[[Context], object]:
     """A filler that puts one piece of storage at a wall."""
