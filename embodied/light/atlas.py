@@ -15,7 +15,7 @@ import numpy as np
 
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
-from embodied.light.backend import mitsuba, scene_of
+from embodied.light.backend import drjit, mitsuba, scene_of
 from embodied.light.unwrap import Unwrapped, areas_of, cached_model, face_normals, pack, unwrap_planes
 
 SHELL = ("wall", "floor", "ceiling")
@@ -199,9 +199,7 @@ def rasterise(page: Page, fineness: int) -> Texels:
 
 def _straight_down(scene, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Whether a face lies under (x, y), which, and where on it."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     above = mi.Point3f(mi.Float(np.asarray(x, np.float32)), mi.Float(np.asarray(y, np.float32)), 1.0)
     hit = scene.ray_intersect_preliminary(mi.Ray3f(above, mi.Vector3f(0, 0, -1)), True)
     u, v, f, ok = hit.prim_uv.x, hit.prim_uv.y, hit.prim_index, hit.is_valid()

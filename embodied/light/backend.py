@@ -1,7 +1,8 @@
 """Where Mitsuba is found and started, and the few array helpers all of `embodied.light` shares.
 
 Mitsuba's fast variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
-needs a shared libLLVM of version 15 or later (Debian: `apt install libllvm19`).
+needs a shared libLLVM of version 15 or later (Debian: `apt install libllvm19`). Without either its
+scalar variant does, with arrays of NumPy's (`embodied.light.scalar`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from embodied.errors import UnableError
+from embodied.light import scalar
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*",
@@ -28,6 +30,9 @@ _LLVM_PLACES = (
 OLDEST_LLVM = 15
 VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
+SCALAR = "scalar_rgb"
+SLOWER = "one ray at a time and some ten times slower"
+REMEDY = "Debian: apt install libllvm19"
 
 
 class LightError(UnableError):
@@ -46,12 +51,8 @@ def find_llvm() -> str | None:
 
 
 @functools.cache
-def mitsuba() -> types.ModuleType:
-    """Mitsuba with its best variant switched on.
-
-    Raises:
-      LightError: Mitsuba is not installed, or neither CUDA nor LLVM can be used.
-    """
+def _module() -> types.ModuleType:
+    """Mitsuba itself, with its best variant switched on."""
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
     try:
@@ -67,31 +68,42 @@ def mitsuba() -> types.ModuleType:
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:
-    """The Mitsuba variant to use: CUDA's before LLVM's.
-
-    Differs from issue 3, which asks for the scalar variant where both are missing: that one has no
-    arrays, in which all of this package is written. It would need a second copy of the package that
-    follows a house's 500 million rays one by one in Python. What is left then is quality 'unlit'.
+    """The Mitsuba variant to use: CUDA's before LLVM's; with a warning the scalar one where both are missing.
 
     Args:
       has_backend: whether Dr.Jit can use 'CUDA' or 'LLVM' here.
-
-    Raises:
-      LightError: it can use neither.
     """
     for variant, name in VARIANTS:
         if has_backend(name):
             return variant
-    tried = "; ".join(f"{variant}: Dr.Jit finds no usable {name} library" for variant, name in VARIANTS)
-    raise LightError(
-        f"no vectorised Mitsuba variant works here ({tried}); install LLVM {OLDEST_LLVM} or later "
-        "(Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or use quality='unlit'"
+    warn(
+        f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
+        f"{OLDEST_LLVM} or later ({REMEDY}) or name it in DRJIT_LIBLLVM_PATH, or look at houses with quality='unlit'"
     )
+    return SCALAR
+
+
+def mitsuba() -> types.ModuleType:
+    """Mitsuba's arrays, rays and warps, in its best variant; `embodied.light.scalar` in the scalar one.
+
+    Raises:
+      LightError: Mitsuba is not installed.
+    """
+    return scalar if device() == "scalar" else _module()
+
+
+def drjit() -> types.ModuleType:
+    """Dr.Jit, for what can be done with Mitsuba's arrays; `embodied.light.scalar` in the scalar variant."""
+    if device() == "scalar":
+        return scalar
+    import drjit as dr
+
+    return dr
 
 
 def device() -> str:
-    """'cuda' or 'llvm': what the light is computed on, for fingerprints and tables."""
-    return mitsuba().variant().split("_")[0]
+    """'cuda', 'llvm' or 'scalar': what the light is computed on, for fingerprints and tables."""
+    return _module().variant().split("_")[0]
 
 
 def scene_of(corners: np.ndarray):
@@ -100,14 +112,15 @@ def scene_of(corners: np.ndarray):
     Args:
       corners: (m, 3, 3) metres; triangle i is primitive i.
     """
-    mi = mitsuba()
+    mi = _module()
     m = len(corners)
     mesh = mi.Mesh("triangles", 3 * m, m)
     params = mi.traverse(mesh)
     params["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
     params["faces"] = np.arange(3 * m, dtype=np.uint32)
     params.update()
-    return mi.load_dict({"type": "scene", "triangles": mesh})
+    scene = mi.load_dict({"type": "scene", "triangles": mesh})
+    return scalar.Scene(scene, mi) if device() == "scalar" else scene
 
 
 def vector(a: np.ndarray):
@@ -119,25 +132,19 @@ def vector(a: np.ndarray):
 
 def array(v) -> np.ndarray:
     """A Dr.Jit vector or colour as an (n, 3) float32 array."""
-    import drjit as dr
-
-    dr.eval(v)
+    drjit().eval(v)
     return np.ascontiguousarray(np.stack([np.asarray(v[k]) for k in range(3)], axis=-1), np.float32)
 
 
 def constant(x: float):
     """A number that kernels read as data, so that changing it compiles nothing anew."""
-    import drjit as dr
-
-    return dr.opaque(mitsuba().Float, float(x))
+    return drjit().opaque(mitsuba().Float, float(x))
 
 
 def rest() -> None:
     """Give back the memory that finished stages held: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
-    import drjit as dr
-
     gc.collect()
-    dr.flush_malloc_cache()
+    drjit().flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)

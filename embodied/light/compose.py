@@ -12,7 +12,7 @@ import shapely
 from embodied.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, Texels, albedo, gamma, nearest, rasterise
-from embodied.light.backend import array, constant, mitsuba, r2, vector
+from embodied.light.backend import array, constant, drjit, mitsuba, r2, vector
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Space, points_of
 from embodied.light.settings import Settings
@@ -94,9 +94,7 @@ def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels
 def _reflect(i: np.ndarray, dull: bool, metal: np.ndarray, radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels,
              colour: np.ndarray, lux: Luxels, light: Radiosity, space: Space, outdoors: Outdoors) -> None:
     """`_add_metal` for the texels `i`, all of them dull or none."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
     room = house.room_by_id.get(atlas.rooms[page.owner[t.face[i[0]]]], house.rooms[0])
     eye = [*shapely.Polygon(room.polygon).representative_point().coords[0], house.storey_of(room).elevation + 1.5]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from embodied.light.atlas import Atlas, Texels
-from embodied.light.backend import array, constant, mitsuba, vector
+from embodied.light.backend import array, constant, drjit, mitsuba, vector
 
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 """B3 spline, as in Dammertz et al."""
@@ -35,9 +35,7 @@ def smooth_pages(
       variance: (n,) of each luxel's brightness; where given, likeness is widened by the noise that is
         left, as in SVGF (Schied et al. 2017, sec. 4.4): noise goes, contact shadows stay.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     grid = _Grid(atlas, luxels, chosen)
     if not len(grid.mine):
         return e
@@ -75,9 +73,7 @@ NOISES = 2.5
 
 def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> np.ndarray:
     """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     grid, out = _Grid(atlas, luxels, chosen), np.zeros(len(e), np.float32)
     if not len(grid.mine):
         return out
@@ -99,9 +95,7 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[n
     And (m,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
     all missed is no shadow.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     values, squares = mi.Float(e.mean(1)), mi.Float(np.asarray(variance, np.float32))
     mean, spread, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
@@ -119,9 +113,7 @@ def cap_sparks(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.n
 
     One ray in a hundred that meets a lampshade makes such a luxel; smoothing would spread it into a blob.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     grid = _Grid(atlas, luxels, chosen)
     if not len(grid.mine):
         return e
@@ -165,9 +157,7 @@ class _Grid:
 
     def around(self, step: int):
         """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
-        mi = mitsuba()
-        import drjit as dr
-
+        mi, dr = mitsuba(), drjit()
         for j in range(-2, 3):
             for i in range(-2, 3):
                 x, spot = self._column + i * step, self._at + j * step * self._width + i * step
@@ -217,9 +207,7 @@ def smooth_space(
       near: (m, k) from `neighbours` for the m chosen.
       chosen: (n,) bool.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     mine = np.nonzero(chosen)[0]
     if not len(mine):
         return e

@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.house import House, Opening
 from embodied.light.atlas import Atlas
-from embodied.light.backend import constant, mitsuba, r2, vector
+from embodied.light.backend import constant, drjit, mitsuba, r2, vector
 from embodied.light.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
@@ -135,9 +135,7 @@ def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lam
     """
     if not lamp.normals.any():
         return lamp
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     n = vector(lamp.normals)
     origin, frame, free = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n), dr.zeros(mi.Float, len(lamp.points))
     for k in range(rays):

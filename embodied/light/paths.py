@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.light import radiosity
-from embodied.light.backend import constant, mitsuba
+from embodied.light.backend import constant, drjit, mitsuba
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
 from embodied.light.solve import AMBIENT, Luxels
@@ -127,9 +127,7 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
 
 
 def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator):
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     u = rng.random((3, p.n), np.float32)
     weights, whole = [], mi.Float(0.0)
     for c, power in zip(lights.centre, lights.power):
@@ -170,9 +168,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
 
 def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST):
     """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
     for depth in range(deepest):
         p = _turned(p, rng)
@@ -199,9 +195,7 @@ def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, r
 
 def hit_points(space: Space, surfaces: Surfaces, ray, active, p: Points):
     """Where rays meet the house from the front: luxel, whether they do, and the points there."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     luxel, hit, front, _ = radiosity.hit_luxel(space, ray, active)
     flat = dr.gather(mi.Vector3f, space.normal, h.prim_index, hit)

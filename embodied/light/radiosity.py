@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.light.atlas import Atlas, Texels, nearest
-from embodied.light.backend import array, constant, mitsuba, r2, scene_of, vector
+from embodied.light.backend import array, constant, drjit, mitsuba, r2, scene_of, vector
 from embodied.light.emitters import GLASS, Lamp, Portal
 from embodied.light.unwrap import face_normals
 
@@ -40,9 +40,7 @@ class Points:
 
 def points_of(position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, seed: int = 0) -> Points:
     """Upload points; all arrays (n, 3) but `thin` (n,)."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     turn = np.random.default_rng(seed).random((2, len(position)), np.float32)
     p = Points(len(position), mi.Point3f(vector(position)), vector(normal), vector(face_normal),
                mi.Bool(np.ascontiguousarray(thin)), mi.Float(turn[0]), mi.Float(turn[1]))
@@ -127,9 +125,7 @@ def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | Non
 
 def env_lookup(space: Space, d, active=True):
     """Outdoor radiance in direction `d`, bilinear in yaw and nearest in the few rows of the small picture."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     h, w = ENV_ROWS, 2 * ENV_ROWS
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * w - 0.5
     y = dr.clip(dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * h - 0.5, 0, h - 1.001)
@@ -149,9 +145,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     One sample is clamped at 10 / samples and the sum at full view of the portal: without it, things
     a few centimetres from the glass turn into fireflies.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal))
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
     total, seen = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
@@ -177,9 +171,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
 
 def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
     """e (a Color3f) from one lamp."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     bare = not lamp.normals.any()
     count = len(lamp.points)
     at = mi.Float(np.ascontiguousarray(lamp.points, np.float32).ravel())
@@ -215,9 +207,7 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
       directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
       radius: of the disc, radians; a little over the real 0.0047 for soft edges at texel size.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     total = dr.zeros(mi.Float, p.n)
     frame = mi.Frame3f(mi.Vector3f(*(float(x) for x in towards)))
     for k in range(directions):
@@ -238,9 +228,7 @@ def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarra
     Args:
       position, normal: (k, 3). thin: (k,) bool, shines to both sides. flux: (k, 3) radiosity times area. extent: (k,) area in square metres.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     total = dr.zeros(mi.Color3f, p.n)
     for q, n, both, f, a in zip(np.where(thin[:, None], position, position + normal * LIFT), normal, thin, flux, extent):
         d = mi.Point3f(*(constant(x) for x in q)) - p.position
@@ -268,9 +256,7 @@ def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: 
       (n, 3) e, (n,) share of rays that met a back face or something nearer than 12 mm, and (n,)
       variance of the mean brightness.
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     b = mi.Float(np.ascontiguousarray(radiosity, np.float32).ravel())
     total, bad, square = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n), dr.zeros(mi.Float, p.n)
     for k in range(samples):
@@ -294,9 +280,7 @@ def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: 
 
 def hit_luxel(space: Space, ray, active=True):
     """Luxel number where a ray hits, whether it hits, whether from the front, whether nearer than 12 mm."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, near = _met(space, ray, active)
     x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
     y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
@@ -305,9 +289,7 @@ def hit_luxel(space: Space, ray, active=True):
 
 def hit_colour(space: Space, table, ray, active=True):
     """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits anything."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, _ = _met(space, ray, active)
     x, y = dr.clip(q.x - 0.5, 0.0, mi.Float(w) - 1), dr.clip(q.y - 0.5, 0.0, mi.Float(height) - 1)
     x0, y0 = mi.UInt32(x), mi.UInt32(y)
@@ -322,9 +304,7 @@ def hit_colour(space: Space, table, ray, active=True):
 
 def _met(space: Space, ray, active):
     """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the front, within 12 mm."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     hit = h.is_valid() & active
     f = h.prim_index
@@ -367,7 +347,7 @@ def reached(units: np.ndarray, sees: Callable[[np.ndarray], np.ndarray], *, trie
 
 def facing(p: Points, d):
     """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
-    import drjit as dr
+    dr = drjit()
 
     cos, flat = dr.dot(p.normal, d), dr.dot(p.face_normal, d)
     cos = dr.select(p.thin, dr.abs(cos) * 0.5, cos)

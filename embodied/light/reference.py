@@ -10,7 +10,7 @@ import numpy as np
 
 from embodied.house import House
 from embodied.light import paths, radiosity
-from embodied.light.backend import array, mitsuba
+from embodied.light.backend import array, drjit, mitsuba
 from embodied.light.baking import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
@@ -103,7 +103,7 @@ class Tracer:
         Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
         curved noise is too dark.
         """
-        import drjit as dr
+        dr = drjit()
 
         world = self._world
         hit = look(world, ray)
@@ -138,9 +138,7 @@ class Tracer:
 
         Source: Walter et al. 2007 eq. 35 for the half vector, Schlick 1994 for F; F0 = 0.08 specular.
         """
-        import drjit as dr
-
-        mi, world = mitsuba(), self._world
+        mi, dr, world = mitsuba(), drjit(), self._world
         rough, specular, metal = hit.gloss.x, hit.gloss.y, hit.gloss.z
         if self.quality == "diffuse":
             specular = mi.Float(0.0)
@@ -200,9 +198,7 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
 
 def _camera_rays(position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None):
     """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     h, w = size
     f, u = np.asarray(forward, float), np.asarray(up, float)
     right = np.cross(f, u)

@@ -11,7 +11,7 @@ import numpy as np
 from embodied.house import House
 from embodied.light import denoise, radiosity
 from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
-from embodied.light.backend import array, constant, mitsuba, r2
+from embodied.light.backend import array, constant, drjit, mitsuba, r2
 from embodied.light.emitters import Lamp, Portal, portals_of
 from embodied.light.radiosity import Points, Space, points_of
 from embodied.light.settings import Settings
@@ -170,9 +170,7 @@ def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: 
     What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
     every second ray runs up inside the wall.
     """
-    import drjit as dr
-
-    mi = mitsuba()
+    mi, dr = mitsuba(), drjit()
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
     inwards = np.array([into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2 for o, k in zip(atlas.owners, atlas.kinds)])

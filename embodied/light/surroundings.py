@@ -10,7 +10,7 @@ import numpy as np
 from embodied.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, albedo, atlas_of, rasterise, things_of
-from embodied.light.backend import array, constant, mitsuba, r2, scene_of, vector
+from embodied.light.backend import array, constant, drjit, mitsuba, r2, scene_of, vector
 from embodied.light.compose import spread
 from embodied.light.radiosity import ENV_ROWS, LIFT, Space, points_of
 from embodied.light.sky import Outdoors
@@ -68,9 +68,7 @@ def _flat(part):
 
 def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 24) -> np.ndarray:
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
     rows = outdoors.picture.shape[0] // ENV_ROWS
     small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)

@@ -10,7 +10,7 @@ import numpy as np
 from embodied.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import linear
-from embodied.light.backend import mitsuba, scene_of
+from embodied.light.backend import drjit, mitsuba, scene_of
 from embodied.light.baking import Bake
 from embodied.light.emitters import Lamp, portals_of
 from embodied.light.paths import Lights, Surfaces, lights_of
@@ -204,9 +204,7 @@ class Hit:
 
 def look(world: World, ray, active=True) -> Hit:
     """Bilinear lookup of the pages where rays hit."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     h = world.space.scene.ray_intersect_preliminary(ray, False, active)
     ok = h.is_valid() & active
     f = h.prim_index
@@ -240,9 +238,7 @@ def through(panes: Panes, ray, behind, most: int = 6):
     Returns:
       Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0 without).
     """
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     colour, left, start = mi.Color3f(0.0), mi.Float(1.0), mi.Float(0.0)
     first, face = mi.Float(dr.inf), mi.UInt32(0)
     for _ in range(most):
@@ -271,9 +267,7 @@ def through(panes: Panes, ray, behind, most: int = 6):
 
 def picture_at(table, rows: int, d, active=True):
     """Value of an outdoor picture (flat, rows x 2 rows) in direction d, nearest texel."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (2 * rows)
     y = dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * rows
     i = mi.UInt32(dr.clip(y, 0, rows - 1)) * (2 * rows) + mi.UInt32(dr.clip(x, 0, 2 * rows - 1))

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from assets.cache import atomic_path, digest
 from assets.records import MeshPart
-from embodied.light.backend import constant, mitsuba, r2, scene_of, vector
+from embodied.light.backend import constant, drjit, mitsuba, r2, scene_of, vector
 
 VERSION = 6
 """Counts up whenever an unwrapping would come out differently."""
@@ -268,9 +268,7 @@ def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarray]:
     """Share of cosine-distributed rays that leave the model from the front and the back of each face."""
-    mi = mitsuba()
-    import drjit as dr
-
+    mi, dr = mitsuba(), drjit()
     scene, n, centre = scene_of(corners), vector(face_normals(corners)), vector(corners.mean(1))
     turn = np.random.default_rng(0).random((2, len(corners)), np.float32)
     r0, r1 = mi.Float(turn[0]), mi.Float(turn[1])
