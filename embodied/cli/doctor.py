@@ -10,6 +10,7 @@ import argparse
 import importlib.metadata
 import platform
 import shutil
+import warnings
 from dataclasses import asdict, dataclass
 
 from embodied.cli import message_of
@@ -98,13 +99,17 @@ def packs(args: argparse.Namespace) -> Finding:
 
 
 def path_tracer(_: argparse.Namespace) -> Finding:
-    """Mitsuba's back end: CUDA or LLVM; without it houses are drawn unlit."""
-    from embodied.light.backend import LightError, device
+    """Mitsuba's back end: CUDA or LLVM; slow without them; houses are drawn unlit without Mitsuba."""
+    from embodied.light.backend import SLOWER, LightError, device
 
     try:
-        return Finding("path tracer", True, f"Mitsuba on {device()}", needed=False)
+        with warnings.catch_warnings(action="ignore"):
+            found = device()
     except LightError as e:
-        return Finding("path tracer", False, str(e), "apt-get install libllvm19; until then use --quality unlit", False)
+        return Finding("path tracer", False, str(e), "pip install mitsuba; until then use --quality unlit", False)
+    if found == "scalar":
+        return Finding("path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "apt-get install libllvm19", False)
+    return Finding("path tracer", True, f"Mitsuba on {found}", needed=False)
 
 
 def vulkan(_: argparse.Namespace) -> Finding:

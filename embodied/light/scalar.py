@@ -3,7 +3,8 @@
 Mitsuba's scalar variant follows one ray at a time and has no arrays. Here numbers of many rays are
 NumPy arrays, and the rays are put to it one by one. Names and meanings are Mitsuba's and Dr.Jit's,
 so that the rest of the package is written once: `backend.mitsuba()` and `backend.drjit()` both
-return this module then. As there, `a += b` makes a new array, and arrays of one entry fit all others.
+return this module then. As there, arrays of one entry fit all others, also in `a += b`; unlike there that
+leaves other names of `a` alone, so that no code may count on either.
 """
 
 from __future__ import annotations
