@@ -10,7 +10,7 @@ leaves other names of `a` alone, so that no code may count on either.
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, pi
 
@@ -222,7 +222,11 @@ class Scene:
         """How many rays there are, which are active, and those as the variant's own."""
         o, d, far, on = np.broadcast_arrays(*(_bare(a) for a in (ray.o, ray.d, ray.maxt, active)))
         which = np.nonzero(on[0])[0]
-        point, vector, one = self._point, self._vector, self._ray
-        numbers = (a[which].tolist() for a in (*o, *d, far[0]))
-        return o.shape[1], which, (
-            one(point(ox, oy, oz), vector(dx, dy, dz), reach, 0.0, ()) for ox, oy, oz, dx, dy, dz, reach in zip(*numbers))
+        return o.shape[1], which, self._rays((*o, *d, far[0]), which)
+
+    def _rays(self, numbers: Sequence[np.ndarray], which: np.ndarray) -> Iterator:
+        point, vector, ray = self._point, self._vector, self._ray
+        for start in range(0, len(which), 100_000):  # Python's numbers take eight times the memory of NumPy's
+            part = which[start : start + 100_000]
+            for ox, oy, oz, dx, dy, dz, far in zip(*(a[part].tolist() for a in numbers)):
+                yield ray(point(ox, oy, oz), vector(dx, dy, dz), far, 0.0, ())
