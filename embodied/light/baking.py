@@ -28,8 +28,8 @@ from embodied.house import House
 from embodied.light import tone
 from embodied.light.atlas import Atlas, albedo, atlas_of, coarsened, linear, rasterise, read_colours, things_of  # noqa: F401
 from embodied.light.backend import LightError, device, rest, scene_of, warn
-from embodied.light.compose import Ingredients, page_of
-from embodied.light.emitters import in_the_open, lamps_of, portals_of
+from embodied.light.compose import Ingredients, Solved, page_of
+from embodied.light.emitters import in_the_open, lamps_of
 from embodied.light.radiosity import space_of
 from embodied.light.settings import VERSION, Settings, settings_of
 from embodied.light.sky import outdoors as outdoors_of
@@ -195,19 +195,6 @@ def _drop_damaged(folder: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A house with its light, in memory: what pages are composed from and checks are made on."""
-
-    house: House
-    atlas: Atlas
-    lux: Luxels
-    light: Radiosity
-    outdoors: object
-    lamps: tuple
-    exposure: Exposure
-
-
 def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder: Path | None = None, *,
                 read: Callable[[str], np.ndarray] | None = None, progress: Progress = lambda s, d: None,
                 took: dict[str, float] | None = None) -> Solved:
@@ -252,11 +239,10 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     error = check(s)
     clock("check")
     space = space_of(s.atlas, s.lux.texels, s.outdoors.picture)
-    portals = portals_of(house)
     for i in range(len(s.atlas.pages)):
         progress("pages", i / len(s.atlas.pages))
         if not all((folder / n).exists() for n in _page_files(i)):
-            one = page_of(i, house, s.atlas, s.lux, s.light, space, portals, s.lamps, s.outdoors, s.exposure, settings, read)
+            one = page_of(i, s, space, settings, read)
             _write_page(folder, i, one, settings.jpeg)
     clock("pages")
     outer, outer_pages, dome = surroundings(house, [p for p in house_parts(house, catalogue) if p.kind == "outdoor" and len(p.mesh.faces)],

@@ -6,6 +6,7 @@ import numpy as np
 
 from embodied.light import paths, radiosity
 from embodied.light.backend import LightError, array
+from embodied.light.compose import Solved
 from embodied.light.emitters import portals_of
 from embodied.light.solve import AMBIENT, subset
 from embodied.seeds import stream
@@ -25,7 +26,7 @@ AGAIN = 5
 """A bake that seems wrong is judged by this many times more luxels before it is refused."""
 
 
-def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first") -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def compare(solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first") -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and (k, 3).
 
     Rooms that get less than a twentieth of the house's middle light are left out: there the
@@ -50,7 +51,7 @@ def compare(solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str 
     return whole[pick] @ y, traced.mean(1), traced.std(1) / np.sqrt(paths_each), s.lux.position[pick]
 
 
-def check(solved) -> dict:
+def check(solved: Solved) -> dict:
     """How far the bake is off: {'luxels', 'bias', 'beyond'}, the last being the share of luxels that differ too much.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -13,7 +13,7 @@ from embodied.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, Texels, albedo, gamma, nearest, rasterise
 from embodied.light.backend import array, constant, drjit, mitsuba, r2, vector
-from embodied.light.emitters import Lamp, Portal
+from embodied.light.emitters import Lamp, portals_of
 from embodied.light.radiosity import Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
@@ -43,11 +43,23 @@ AROUND = 0.15
 """What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
 
 
-def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosity, space: Space, portals: Sequence[Portal],
-            lamps: Sequence[Lamp], outdoors: Outdoors, exposure: Exposure, settings: Settings,
-            read: Callable[[str], np.ndarray]) -> Ingredients:
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A house with its light, in memory: what pages are composed from and checks are made on."""
+
+    house: House
+    atlas: Atlas
+    lux: Luxels
+    light: Radiosity
+    outdoors: Outdoors
+    lamps: tuple[Lamp, ...]
+    exposure: Exposure
+
+
+def page_of(number: int, solved: Solved, space: Space, settings: Settings, read: Callable[[str], np.ndarray]) -> Ingredients:
     """Compose page `number` of the atlas."""
-    page = atlas.pages[number]
+    lux, light = solved.lux, solved.light
+    page = solved.atlas.pages[number]
     start = sum(len(t.index) for t in lux.texels[:number])
     mine = slice(start, start + len(lux.texels[number].index))
     coarse = lux.texels[number]
@@ -58,13 +70,13 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     colour = albedo(page, t, read)
     size = (page.width * page.fineness, page.height * page.fineness)
     e = cv2.resize(soft, size, interpolation=cv2.INTER_LINEAR).reshape(-1, 3)[t.index]
-    sun = _sharp_sun(page, t, share, space, portals, outdoors, settings)
-    radiance = colour * (e + sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32))
-    _add_metal(radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
-    radiance += glow_of(house, atlas, page, t, lamps)
+    sun = _sharp_sun(solved, page, t, share, space, settings)
+    radiance = colour * (e + sun[:, None] * (solved.outdoors.sun * radiosity.GLASS).astype(np.float32))
+    _add_metal(radiance, solved, page, t, colour, space)
+    radiance += glow_of(solved.house, solved.atlas, page, t, solved.lamps)
     shown_by = sources(t.index, t.shape)
     page_like = lambda values: values[shown_by].reshape(*t.shape, -1) if len(t.index) else np.zeros((*t.shape, values.shape[1]), values.dtype)
-    picture = page_like(display(radiance, exposure.at(t.position)))
+    picture = page_like(display(radiance, solved.exposure.at(t.position)))
     whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
     whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
     shown = page_like((gamma(colour) * 255 + 0.5).astype(np.uint8))
@@ -74,28 +86,26 @@ def page_of(number: int, house: House, atlas: Atlas, lux: Luxels, light: Radiosi
     return Ingredients(half(soft), whole.reshape(t.shape), shown, picture, half(glow))
 
 
-def _add_metal(radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels, colour: np.ndarray, lux: Luxels,
-               light: Radiosity, space: Space, outdoors: Outdoors) -> None:
+def _add_metal(radiance: np.ndarray, solved: Solved, page, t: Texels, colour: np.ndarray, space: Space) -> None:
     """Mirrors and metals in place of their diffuse light: what somebody in the middle of the room sees in them.
 
     A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
     """
     metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish[t.face]]
     i = np.nonzero(metal > 0.3)[0]
-    if not len(i):
-        return
     rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
-    dull = rough > DULL
-    for some, is_dull in ((i[~dull], False), (i[dull], True)):
-        if len(some):
-            _reflect(some, is_dull, metal, radiance, house, atlas, page, t, colour, lux, light, space, outdoors)
+    for dull in (False, True):
+        some = (rough > DULL) == dull
+        mine, share = i[some], metal[i[some], None]
+        if len(mine):
+            tint = np.maximum(colour[mine], np.where(rough[some] < 0.02, 0.85, 0.0)[:, None])
+            radiance[mine] = radiance[mine] * (1 - share) + _mirrored(solved, page, t, mine, rough[some], space, dull=dull) * tint * share
 
 
-def _reflect(i: np.ndarray, dull: bool, metal: np.ndarray, radiance: np.ndarray, house: House, atlas: Atlas, page, t: Texels,
-             colour: np.ndarray, lux: Luxels, light: Radiosity, space: Space, outdoors: Outdoors) -> None:
-    """`_add_metal` for the texels `i`, all of them dull or none."""
+def _mirrored(solved: Solved, page, t: Texels, i: np.ndarray, rough: np.ndarray, space: Space, *, dull: bool) -> np.ndarray:
+    """(k, 3) radiance that the texels `i` of one roughness each mirror, all of them dull or none."""
     mi, dr = mitsuba(), drjit()
-    rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
+    house, atlas, lux, light, sun = solved.house, solved.atlas, solved.lux, solved.light, solved.outdoors.sun
     room = house.room_by_id.get(atlas.rooms[page.owner[t.face[i[0]]]], house.rooms[0])
     eye = [*shapely.Polygon(room.polygon).representative_point().coords[0], house.storey_of(room).elevation + 1.5]
     to_eye = np.asarray(eye, np.float32) - t.position[i]
@@ -105,7 +115,7 @@ def _reflect(i: np.ndarray, dull: bool, metal: np.ndarray, radiance: np.ndarray,
     cos = (normal * to_eye).sum(1, keepdims=True)
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
     p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
-    seen = lux.albedo * (light.soft + light.sun[:, None] * (outdoors.sun * radiosity.GLASS).astype(np.float32)) + lux.glow
+    seen = lux.albedo * (light.soft + light.sun[:, None] * (sun * radiosity.GLASS).astype(np.float32)) + lux.glow
     rays, width = DULL_RAYS if dull else SHARP_RAYS, np.square(rough) + AROUND * dull
     limit = (3.0 if dull else 8.0) * np.percentile(seen.mean(1), 95)  # of a lamp's glint: few rays would find it
     seen = np.minimum(seen, limit).astype(np.float32)
@@ -121,12 +131,8 @@ def _reflect(i: np.ndarray, dull: bool, metal: np.ndarray, radiance: np.ndarray,
         far = radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS
         total += dr.select(hit, near, far)
         dr.eval(total)
-    share = metal[i, None]
-    tint = np.maximum(colour[i], np.where(rough < 0.02, 0.85, 0.0)[:, None])
     mirrored = np.minimum(array(total) / rays, limit)
-    if dull:
-        mirrored = evened(mirrored, t.index[i], t.shape)
-    radiance[i] = radiance[i] * (1 - share) + mirrored * tint * share
+    return evened(mirrored, t.index[i], t.shape) if dull else mirrored
 
 
 def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -181,9 +187,9 @@ def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.
     return values[sources(index, shape)].reshape(*shape, -1)
 
 
-def _sharp_sun(page, t: Texels, share: np.ndarray, space: Space, portals: Sequence[Portal], outdoors: Outdoors,
-               settings: Settings) -> np.ndarray:
+def _sharp_sun(solved: Solved, page, t: Texels, share: np.ndarray, space: Space, settings: Settings) -> np.ndarray:
     """(n,) share of the sun per texel: traced where luxels around disagree, else taken from them."""
+    outdoors, portals = solved.outdoors, portals_of(solved.house)
     if not outdoors.sun.any() or not portals or share.max() <= 0:
         return np.zeros(len(t.index), np.float32)
     facing = np.clip(t.normal @ outdoors.sun_direction.astype(np.float32), 0, 1)
