@@ -22,7 +22,7 @@ from agents.evaluate import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.imitation.checkpoint import Progress
 from agents.imitation.config import SCALES, TrainingConfig
-from agents.imitation.parallel import check_device, join_launcher
+from agents.imitation.parallel import check_device, join_launcher, one_voice
 from agents.imitation.training import Split, train
 from agents.options import chosen
 from agents.vision.config import VisionConfig
@@ -214,7 +214,7 @@ def train_agent(
     Raises:
       ValueError: `begin` has networks of other sizes, or learned from another encoder.
     """
-    houses = config.training_houses or None
+    houses, note = config.training_houses or None, one_voice(note)
     training = split_of(data, "train", encoder, device, houses=houses)
     validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
     other = None if begin is None else load_agent(begin)

@@ -35,6 +35,8 @@ from agents.imitation.losses import (
     relative_entropy,
 )
 from agents.imitation.training import (
+    ADDED,
+    NUMBERS,
     Clock,
     Split,
     TrainingError,
@@ -478,8 +480,9 @@ def save_gradients(path: Path) -> None:
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0))
     optimizer = torch.optim.SGD(agent.network.parameters(), 0.0)
-    learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
+    numbers = learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
     torch.save([p.grad for p in agent.network.parameters()], path)
+    path.with_suffix(".json").write_text(json.dumps(numbers))
 
 
 def test_two_processes_learn_what_one_would(tmp_path):
@@ -491,3 +494,7 @@ def test_two_processes_learn_what_one_would(tmp_path):
         if a is not None:
             assert torch.equal(b, c)
             assert torch.allclose(a, b, atol=1e-4, rtol=1e-3)
+    alone, *both = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("alone", "0", "1"))
+    assert set(alone) <= set(NUMBERS) and both[0] == both[1]
+    for name in (*ADDED, "gradient", "success", "requests"):
+        assert both[0][name] == pytest.approx(alone[name], rel=1e-3), name

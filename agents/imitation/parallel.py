@@ -7,7 +7,7 @@ but for rounding and for the draws of dropout.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 import torch
@@ -68,6 +68,23 @@ def add_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
     for g in gradients:
         g.copy_(flat[at : at + g.numel()].view_as(g))
         at += g.numel()
+
+
+def whole(
+    numbers: Mapping[str, float], names: Sequence[str], added: Collection[str], device: torch.device
+) -> dict[str, float]:
+    """`numbers` of all processes, each named in `names`: those in `added` summed up, of the others the mean over
+    the processes that have them."""
+    if processes() == 1:
+        return dict(numbers)
+    table = torch.tensor([[numbers.get(n, 0.0), float(n in numbers)] for n in names], device=device)
+    dist.all_reduce(table)
+    return {n: total / (1 if n in added else count) for n, (total, count) in zip(names, table.tolist(), strict=True) if count}
+
+
+def one_voice(note: Callable[[str], None]) -> Callable[[str], None]:
+    """`note` in the first process, silence in the others."""
+    return note if rank() == 0 else lambda line: None
 
 
 def any_of_us(flag: bool, device: torch.device) -> bool:

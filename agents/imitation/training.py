@@ -100,7 +100,7 @@ def train(
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
       CheckpointError, OSError.
     """
-    config, folder = agent.config, Path(folder)
+    config, folder, note = agent.config, Path(folder), parallel.one_voice(note)
     folder.mkdir(parents=True, exist_ok=True)
     optimizer = torch.optim.Adam(agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay)
     checkpoint = folder / "checkpoint.pt"
@@ -111,7 +111,7 @@ def train(
         (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
     guided = config.guided_asking if config.ask_rule == "learned" else 0.0
     learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided)
-    report = Report(folder, config.iterations, progress, note if parallel.rank() == 0 else lambda line: None)
+    report = Report(folder, config.iterations, progress, note)
     began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
 
     def now() -> Progress:
@@ -183,7 +183,8 @@ def learn_once(
         )
     with clock.on("backward"):
         optimizer.step()
-    return numbers_of(experience, losses, float(norm), training.worlds)
+    numbers = numbers_of(experience, losses, float(norm), training.worlds)
+    return parallel.whole(numbers, NUMBERS, ADDED, norm.device)
 
 
 def tasks_of_update(tasks: Sequence[Task], update: int, batch: int, seed: int) -> list[Task]:
@@ -208,6 +209,12 @@ def dropout_of(seed: int, update: int) -> Iterator[None]:
     with torch.random.fork_rng(devices=devices):
         torch.manual_seed(int(stream(seed, "dropout", update).integers(2**31)))
         yield
+
+
+NUMBERS = ("loss navigation", "loss asking", "gradient", "right moves", "steps", "success", "requests", "should ask", "right asks")
+"""What is reported of an update; the last two only where help could be asked for."""
+ADDED = ("loss navigation", "loss asking", "steps")
+"""Those that are sums over the batch, of which every process has a share."""
 
 
 def numbers_of(

@@ -32,7 +32,6 @@ VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
 SCALAR = "scalar_rgb"
 SLOWER = "one ray at a time and some ten times slower"
-REMEDY = "Debian: apt install libllvm19"
 
 
 class LightError(UnableError):
@@ -78,7 +77,7 @@ def variant_of(has_backend: Callable[[str], bool]) -> str:
             return variant
     warn(
         f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
-        f"{OLDEST_LLVM} or later ({REMEDY}) or name it in DRJIT_LIBLLVM_PATH, or look at houses with quality='unlit'"
+        f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses with quality='unlit'"
     )
     return SCALAR
 

@@ -20,7 +20,7 @@ two_pi = 2 * pi
 
 
 class Values(np.ndarray):
-    """(n,) numbers, or (c, n) vectors of c components; single precision, no warnings about lanes that nobody reads."""
+    """(n,) numbers, or (c, n) vectors of c components; single precision, no warnings about entries that nobody reads."""
 
     x = property(lambda self: self[0])
     y = property(lambda self: self[1])
