@@ -2,7 +2,8 @@
 
 Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
 not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
---rrd. On several GPUs: `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`.
+--rrd. On several GPUs: `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`,
+and on several cores the same without --device.
 """
 
 from __future__ import annotations
