@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from assets.cache import default_cache
     from assets.catalogue import load_catalogue
     from embodied.generate import HouseConfig, generate_house
-    from embodied.house import House
+    from embodied.house.house import House
     from embodied.navgraph import NavGraph, build_graph
     from embodied.panorama import Panorama
     from embodied.render import Renderer
@@ -40,7 +40,7 @@ __all__ = ["House", "HouseConfig", "NavGraph", "Panorama", "Renderer", "World", 
            "generate_house", "load_catalogue", "open_world", "stream"]
 
 HOMES = {
-    "House": "embodied.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navgraph",
+    "House": "embodied.house.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navgraph",
     "Panorama": "embodied.panorama", "Renderer": "embodied.render", "World": "embodied.world",
     "build_graph": "embodied.navgraph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
     "load_catalogue": "assets.catalogue", "open_world": "embodied.world", "stream": "embodied.seeds",

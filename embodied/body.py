@@ -25,7 +25,7 @@ from embodied.interface import Reply
 from embodied.scene import build_spec, owner_of_name
 
 if TYPE_CHECKING:
-    from embodied.house import House
+    from embodied.house.house import House
 
 RADIUS, HEIGHT = 0.19, 1.4
 """Of the body, metres: the graph keeps 0.2 m free around every edge."""

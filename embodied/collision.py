@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from assets.cache import atomic_path, digest
 from assets.records import Asset, MeshPart
-from embodied.house import House, Room
+from embodied.house.house import House, Room
 
 BOXES_VERSION = 1
 """Counts up whenever `object_boxes` would give other boxes."""

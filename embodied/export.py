@@ -14,7 +14,7 @@ import trimesh
 
 from assets.cache import write_bytes
 from assets.records import Finish
-from embodied.house import House
+from embodied.house.house import House
 from embodied.lit import LitPages
 from embodied.parts import Part, house_parts
 from embodied.scene import build_spec, compile_spec, load_texture

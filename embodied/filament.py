@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 
 from embodied.errors import UnableError
-from embodied.house import House
+from embodied.house.house import House
 from embodied.lit import LitPages
 from embodied.render import Camera
 from embodied.scene import build_spec, compile_spec

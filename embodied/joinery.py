@@ -16,7 +16,7 @@ import shapely
 
 from assets.built.primitives import Shape, box, cylinder, joined, moved, part, quads, scaled, tube, turned, two_sided
 from assets.records import Finish
-from embodied.house import House, Opening
+from embodied.house.house import House, Opening
 from embodied.outdoors import facade_finish
 from embodied.part import Part
 from embodied.seeds import stream

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
-from embodied.house import DOORS, House, HouseError
+from embodied.house.house import DOORS, House, HouseError
 from embodied.walkable import EYE, free_floor, sight_floor
 
 RADIUS = 0.2

@@ -21,7 +21,7 @@ from assets.built.primitives import (
     tube,
 )
 from assets.records import Finish
-from embodied.house import House
+from embodied.house.house import House
 from embodied.part import Part
 from embodied.seeds import stream
 from embodied.walls import hole_on, room_union, wall_face

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typing
 
 from assets.records import Finish, MeshPart
-from embodied.house import House
+from embodied.house.house import House
 from embodied.part import Part
 from embodied.shell import shell_owners, shell_parts
 

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from embodied.geometry import rectangle, rotation, yaw_facing
-from embodied.house import House, Placement, Room, rounded
+from embodied.house.house import House, Placement, Room, rounded
 from embodied.navgraph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from embodied import visibility
-from embodied.house import House
+from embodied.house.house import House
 from embodied.lit import LitPages
 from embodied.panorama import FACES, Panorama
 from embodied.scene import COLLISION, VISUAL, Scene, compile_scene, give_memory_back

@@ -24,7 +24,7 @@ import numpy as np
 
 from assets.records import Finish, MeshPart
 from embodied import collision
-from embodied.house import House, Placement
+from embodied.house.house import House, Placement
 from embodied.lit import LitPages
 from embodied.parts import Part, house_parts, owners
 from embodied.shell import shell_parts

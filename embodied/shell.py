@@ -16,7 +16,7 @@ import numpy as np
 from assets.built.primitives import Shape, flat, joined, part, quads
 from assets.records import Finish
 from embodied import joinery, outdoors, stairs
-from embodied.house import House, Opening, Room
+from embodied.house.house import House, Opening, Room
 from embodied.part import Part
 from embodied.walls import floor_turn, hole_on, inset, turned_uv, wall_face
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from assets.cache import atomic_path
-from embodied.house import House
+from embodied.house.house import House
 from embodied.panorama import face_rays, ray_stretch
 
 FACE = 64

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from embodied.geometry import TWO_PI
-from embodied.house import House, Opening
+from embodied.house.house import House, Opening
 
 OUTDOORS = ""
 FULL = (-math.pi, math.pi)

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from embodied.geometry import rectangle
-from embodied.house import DOORS, House, Opening, Placement, Room
+from embodied.house.house import DOORS, House, Opening, Placement, Room
 
 EYE = 1.5
 """Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""

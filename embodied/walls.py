@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from assets.built.primitives import Shape
-from embodied.house import House, Opening
+from embodied.house.house import House, Opening
 
 TOLERANCE = 2e-3
 """How far an opening's jambs may lie off a wall's centre line, metres."""

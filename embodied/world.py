@@ -13,8 +13,8 @@ from tqdm import tqdm
 
 from assets.cache import digest
 from embodied import gl, navgraph
-from embodied.house import House
-from embodied.known import load_house
+from embodied.house.house import House
+from embodied.house.validation import load_house
 from embodied.lit import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from embodied.house import House, Opening, Placement, Room, Storey
+from embodied.house.house import House, Opening, Placement, Room, Storey
 
 FINISHES = {
     "floor_finish": "oak_planks/0", "wall_finish": "paint_white/0",

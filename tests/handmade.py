@@ -10,7 +10,7 @@ import numpy as np
 
 from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.geometry import rotation
-from embodied.house import House, Placement
+from embodied.house.house import House, Placement
 from embodied.lit import LitMesh, LitPages
 from embodied.parts import house_parts
 

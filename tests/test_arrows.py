@@ -72,7 +72,7 @@ def test_a_wrong_arrow_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr("test_arrows.ROOT", tmp_path)
     bad = tmp_path / "assets" / "bad.py"
     bad.parent.mkdir()
-    bad.write_text("import torch\nfrom embodied.house import House\n")
+    bad.write_text("import torch\nfrom embodied.house.house import House\n")
     assert len(wrong_arrows(bad)) == 2
 
 

@@ -28,7 +28,7 @@ from embodied import cli
 from embodied.errors import UnableError
 from embodied.fields import field_docs
 from embodied.generate import HouseConfig
-from embodied.house import House, HouseError
+from embodied.house.house import House, HouseError
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, write_panoramas
 from embodied.scene import load_texture

@@ -14,7 +14,7 @@ from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_un
 from embodied.datasets.parts import object_part, room_part
 from embodied.datasets.scale import PAPER, quota, scale
 from embodied.datasets.store import Dataset, DatasetError
-from embodied.house import HouseError
+from embodied.house.house import HouseError
 from embodied.interface import Ask
 from embodied.policies import Asking, Shortest, ask_every_5
 from embodied.rollout import play

@@ -21,7 +21,7 @@ from embodied.generate.furnish.lights import LUMENS
 from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.lacking import BEDS, lacking
 from embodied.geometry import facing_of, rectangle, wrap
-from embodied.house import DOORS, House, Opening, Room, Storey, check
+from embodied.house.house import DOORS, House, Opening, Room, Storey, check
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "check")}
 TOUCH = 2e-3

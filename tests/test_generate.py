@@ -19,7 +19,7 @@ from embodied.generate.finishes import STYLES
 from embodied.generate.footprint import draw_footprint
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.stages import Draft
-from embodied.house import DOORS, House, HouseError, Placement, Room, check
+from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
 from embodied.navgraph import unreachable_rooms
 from embodied.seeds import stream
 from embodied.walkable import inward

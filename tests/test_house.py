@@ -9,7 +9,7 @@ import math
 import pytest
 from conftest import two_rooms
 
-from embodied.house import House, HouseError, Light, Placement, Sky, check
+from embodied.house.house import House, HouseError, Light, Placement, Sky, check
 
 
 def with_opening(number: int, **changes) -> House:

@@ -9,8 +9,8 @@ import pytest
 
 from assets.catalogue import Catalogue, CatalogueError, load_catalogue
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import House, HouseError, Placement
-from embodied.known import check_known, load_house
+from embodied.house.house import House, HouseError, Placement
+from embodied.house.validation import check_known, load_house
 
 
 @functools.cache

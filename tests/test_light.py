@@ -15,7 +15,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
 from assets.records import Finish, MeshPart
-from embodied.house import House, Light, Room, Sky, Storey
+from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import (
     LightError,
     StaleBake,

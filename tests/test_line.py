@@ -18,7 +18,7 @@ from assets.catalogue import load_catalogue
 from embodied.cli import main
 from embodied.env import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import House
+from embodied.house.house import House
 from embodied.language import People
 from embodied.metrics import spl, success
 from embodied.policies import RandomWalk, Shortest

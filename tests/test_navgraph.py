@@ -15,7 +15,7 @@ from conftest import two_rooms
 
 from assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
-from embodied.house import HouseError, Placement
+from embodied.house.house import HouseError, Placement
 from embodied.navgraph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 from embodied.walkable import EYE, free_floor, leaves, sight_floor
 

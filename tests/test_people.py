@@ -13,7 +13,7 @@ from hand_worlds import grid_world, thing
 from assets.records import Asset, SupportSurface
 from embodied.assistants.routes import route_paths
 from embodied.geometry import facing_of, wrap
-from embodied.house import House, Placement, check
+from embodied.house.house import House, Placement, check
 from embodied.navgraph import RADIUS
 from embodied.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.tasks.goals import find_instances

@@ -15,7 +15,7 @@ from assets.packs import find_packs
 from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied import collision, scene
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import Placement
+from embodied.house.house import Placement
 from embodied.lit import LitMesh, LitPages
 from embodied.parts import house_parts, owners
 

@@ -13,7 +13,7 @@ import shapely
 from assets.built import MAKERS
 from assets.materials import MATERIALS
 from assets.records import Finish
-from embodied.house import House, Opening, Room, Stair, Storey
+from embodied.house.house import House, Opening, Room, Stair, Storey
 from embodied.parts import house_parts, owners
 from embodied.walls import floor_turn, inset, room_union, wall_face
 

@@ -6,7 +6,7 @@ import numpy as np
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TextLogColumn
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.interface import Ask, Episode
 
 

@@ -14,7 +14,7 @@ from agents.vision.features import EQUIRECT, margin, strip_of
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from assets.cache import atomic_path
 from assets.records import ROOM_KINDS
-from embodied.house import OPENING_KINDS, House
+from embodied.house.house import OPENING_KINDS, House
 from embodied.parts import owners
 
 if TYPE_CHECKING:

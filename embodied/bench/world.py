@@ -15,7 +15,7 @@ from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, from_values, measure, ratio
 from embodied.env import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import House
+from embodied.house.house import House
 from embodied.interface import Move
 from embodied.language.plain import PlainLanguage
 from embodied.navgraph import NavGraph, build_graph

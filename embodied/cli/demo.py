@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     """The whole line; both episodes also go to `viewers`."""
     from embodied.generate import generate_house
-    from embodied.plan import save_plan
+    from embodied.house.floor_plan import save_plan
 
     catalogue, seconds = catalogue_of(args), {}
     args.out.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ from embodied.cli.options import add_options, read_options
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
 from embodied.generate.finishes import STYLES
-from embodied.house import WEATHERS
+from embodied.house.house import WEATHERS
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.export import export_glb, export_mjcf
     from embodied.navgraph import build_graph, to_matterport
-    from embodied.plan import save_plan
+    from embodied.house.floor_plan import save_plan
 
     catalogue, config = catalogue_of(args), read_options(args, HouseConfig)
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:

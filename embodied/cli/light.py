@@ -28,7 +28,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.known import load_house
+    from embodied.house.validation import load_house
     from embodied.light import bake, progress_bar
 
     path = args.folder / "house.json"

@@ -20,7 +20,7 @@ from embodied.assistants.routes import WORDINGS, route_paths, spanning_paths, wo
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import House, HouseError
+from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.navgraph import NavGraph, build_graph, from_matterport, to_matterport

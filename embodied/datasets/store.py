@@ -15,7 +15,7 @@ from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
 from embodied.datasets.scale import Scale, scale
 from embodied.env import HelpEnv
 from embodied.environments import environment_maker
-from embodied.house import House
+from embodied.house.house import House
 from embodied.interface import FindObject, Language, Route, Task
 from embodied.navgraph import NavGraph, from_matterport
 from embodied.records import load_lines

@@ -9,7 +9,7 @@ import shapely
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from embodied.house import House, HouseError
+from embodied.house.house import House, HouseError
 from embodied.navgraph import CELL, RADIUS, closed_rooms, reachable
 from embodied.walkable import HEAD, STEP, footprint
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.generate.finishes import STYLES
-from embodied.house import HouseError
+from embodied.house.house import HouseError
 
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 AREAS = (32.0, 700.0)

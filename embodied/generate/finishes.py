@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from embodied.generate.kinds import BEDROOMS
-from embodied.house import House, HouseError, Room
+from embodied.house.house import House, HouseError, Room
 
 WET = ("bathroom", "toilet", "laundry_room")
 TALK = ("living_room", "dining_room", "family_room", "hall", "corridor", "library", "study")

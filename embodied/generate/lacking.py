@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from embodied.house import House
+from embodied.house.house import House
 
 BEDS = ("bed", "child bed", "bunk bed", "loft bed", "day bed", "sofa bed", "crib", "cradle")
 NEEDS: Mapping[str, tuple[tuple[str, ...], ...]] = {

@@ -11,7 +11,7 @@ from embodied.generate.access import Wall, outer_stretches, walls_between
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.layout import Plan
 from embodied.generate.modules import Cell
-from embodied.house import Opening, rounded
+from embodied.house.house import Opening, rounded
 
 NIB = 0.16
 """From a wall's centre-line corner to the jamb: half an inner wall and 0.1 m, metres."""

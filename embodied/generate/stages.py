@@ -20,7 +20,7 @@ from embodied.generate.layout import Plan, draw_plan, turned, with_short_corrido
 from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
 from embodied.geometry import wrap
-from embodied.house import House, HouseError, Room, Sky, Storey, check
+from embodied.house.house import House, HouseError, Room, Sky, Storey, check
 from embodied.navgraph import unreachable_rooms
 from embodied.seeds import stream
 from embodied.walkable import inward

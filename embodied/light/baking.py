@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.records import Finish
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import tone
 from embodied.light.atlas import Atlas, albedo, atlas_of, coarsened, linear, rasterise, read_colours, things_of  # noqa: F401
 from embodied.light.backend import LightError, device, rest, scene_of, warn

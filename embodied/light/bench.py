@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 from assets.cache import write_bytes, write_json
 from embodied import gl
 from embodied.generate import HouseConfig, generate_house
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light.backend import device
 from embodied.light.baking import Bake, bake
 from embodied.light.reference import Tracer

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, Texels, albedo, gamma, nearest, rasterise
 from embodied.light.backend import array, constant, drjit, mitsuba, r2, vector

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.house import House, Opening
+from embodied.house.house import House, Opening
 from embodied.light.atlas import Atlas
 from embodied.light.backend import constant, drjit, mitsuba, r2, vector
 from embodied.light.unwrap import areas_of, face_normals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.house import Room
+from embodied.house.house import Room
 from embodied.light import radiosity
 from embodied.light.backend import array
 from embodied.light.emitters import portals_of

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import paths, radiosity
 from embodied.light.backend import array, drjit, mitsuba
 from embodied.light.baking import Bake

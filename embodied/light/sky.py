@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.house import House, Sky
+from embodied.house.house import House, Sky
 from embodied.seeds import stream
 
 LATITUDE = np.radians(48.0)

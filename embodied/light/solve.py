@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import denoise, radiosity
 from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
 from embodied.light.backend import array, constant, drjit, mitsuba, r2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import Atlas, albedo, atlas_of, rasterise, things_of
 from embodied.light.backend import array, constant, drjit, mitsuba, r2, scene_of, vector

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from scipy.ndimage import map_coordinates
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light.atlas import gamma
 
 TARGET = 1.05

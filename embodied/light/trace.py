@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from embodied.house import House
+from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.atlas import linear
 from embodied.light.backend import drjit, mitsuba, scene_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.house import House, Placement
+from embodied.house.house import House, Placement
 
 if TYPE_CHECKING:
     from embodied.world import World

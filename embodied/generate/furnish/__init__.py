@@ -19,7 +19,7 @@ from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
 from embodied.generate.furnish.walls import hang_all
 from embodied.geometry import wrap
-from embodied.house import House, Placement, Room, rounded
+from embodied.house.house import House, Placement, Room, rounded
 from embodied.seeds import stream
 
 ATTEMPTS = 6

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from embodied.generate.furnish.style import Style
-from embodied.house import Light, Placement, rounded
+from embodied.house.house import Light, Placement, rounded
 
 LUMENS: dict[str, float] = {
     "ceiling lamp": 1500.0, "pendant lamp": 1300.0, "chandelier": 2600.0, "fluorescent lamp": 2800.0,

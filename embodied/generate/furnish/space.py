@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.house import DOORS, House, Opening, Room
+from embodied.house.house import DOORS, House, Opening, Room
 
 CELL = 0.05
 """Side of a cell of the walking plan, metres."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from assets.catalogue import Catalogue
 from assets.materials import MATERIALS
 from embodied.generate.finishes import STYLES
-from embodied.house import House, HouseError, Placement
+from embodied.house.house import House, HouseError, Placement
 
 
 def load_house(path: Path, catalogue: Catalogue) -> House:
@@ -26,7 +26,7 @@ def load_house(path: Path, catalogue: Catalogue) -> House:
 def check_known(house: House, catalogue: Catalogue) -> None:
     """Refuse a house that names what neither the catalogue nor the materials hold.
 
-    `embodied.house.check` asks whether a house can be; this asks whether it can be drawn.
+    `embodied.house.house.check` asks whether a house can be; this asks whether it can be drawn.
 
     Raises:
       HouseError: an unknown style, material, asset, object class, surface or parameter.

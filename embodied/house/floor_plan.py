@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from assets.cache import write_bytes
 from embodied.geometry import rectangle, rotation
-from embodied.house import House, Opening, Placement, Room
+from embodied.house.house import House, Opening, Placement, Room
 
 PAPER, INK, SOFT = (250, 248, 243), (52, 50, 56), (128, 124, 122)
 ROOM_COLOURS = {

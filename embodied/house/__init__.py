@@ -1,0 +1,1 @@
+"""A house as plain data: its record, its floor plan, its validation."""
