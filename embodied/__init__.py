@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from assets.catalogue import load_catalogue
     from embodied.generate import HouseConfig, generate_house
     from embodied.house.house import House
-    from embodied.navgraph import NavGraph, build_graph
+    from embodied.navigation.graph import NavGraph, build_graph
     from embodied.panorama import Panorama
     from embodied.render import Renderer
     from embodied.seeds import stream
@@ -40,9 +40,9 @@ __all__ = ["House", "HouseConfig", "NavGraph", "Panorama", "Renderer", "World", 
            "generate_house", "load_catalogue", "open_world", "stream"]
 
 HOMES = {
-    "House": "embodied.house.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navgraph",
+    "House": "embodied.house.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navigation.graph",
     "Panorama": "embodied.panorama", "Renderer": "embodied.render", "World": "embodied.world",
-    "build_graph": "embodied.navgraph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
+    "build_graph": "embodied.navigation.graph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
     "load_catalogue": "assets.catalogue", "open_world": "embodied.world", "stream": "embodied.seeds",
 }
 """The module behind each public name."""

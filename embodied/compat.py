@@ -31,12 +31,12 @@ from assets.cache import atomic_path, write_bytes
 from embodied.geometry import heading_of_yaw, wrap
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Pose, Route, Task
 from embodied.moves import directions, nearest_views
-from embodied.navgraph import to_matterport
+from embodied.navigation.graph import to_matterport
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, Place
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
 
 REGIONS = {
     "bathroom": "a", "main_bedroom": "b", "bedroom": "b", "kids_room": "b", "guest_room": "b", "closet": "c",

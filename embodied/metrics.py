@@ -15,7 +15,7 @@ import numpy as np
 from embodied.interface import Ask, Episode, FollowRoute, Mode, Move, Stop
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
 
 
 def navigation_error(episode: Episode, graph: NavGraph) -> float:

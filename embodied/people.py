@@ -13,13 +13,13 @@ import shapely
 
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
-from embodied.navgraph import RADIUS, unreachable_rooms
+from embodied.navigation.graph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from assets.records import Asset
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
 
 CLASS = "person"
 NEAREST, FARTHEST = 0.5, 2.0

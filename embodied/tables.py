@@ -18,7 +18,7 @@ from embodied import metrics
 from embodied.interface import Episode
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
 
 PERCENT = ("success", "spl", "oracle success", "room success", "subtask success", "mistake repeat", "request repeat")
 """Columns shown in per cent."""

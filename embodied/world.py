@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Self
 from tqdm import tqdm
 
 from assets.cache import digest
-from embodied import gl, navgraph
+from embodied import gl
+from embodied.navigation import graph as navgraph
 from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.lit import LitPages

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.house.house import House, Opening, Placement, Room, Storey
-from embodied.navgraph import NavGraph, graph_of
+from embodied.navigation.graph import NavGraph, graph_of
 
 FINISHES = ("oak_planks/0", "paint_white/0", "paint_white/0", "paint_white/0")
 

@@ -13,7 +13,7 @@ from embodied.body import DrivenHannaEnv, Driver, driven, total_bumps
 from embodied.datasets.store import Place
 from embodied.env import HannaEnv
 from embodied.interface import Ask, FindObject, Move, Pose, Route, Stop, Task
-from embodied.navgraph import build_graph
+from embodied.navigation.graph import build_graph
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from embodied.compat import (
 )
 from embodied.geometry import heading_of_yaw
 from embodied.interface import Pose
-from embodied.navgraph import from_matterport
+from embodied.navigation.graph import from_matterport
 
 
 def test_views_agree_about_where_they_look():

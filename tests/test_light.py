@@ -40,7 +40,7 @@ from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
 from embodied.part import Part
-from embodied.walkable import inward
+from embodied.navigation.free_space import inward
 
 TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)
 DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))

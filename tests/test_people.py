@@ -14,7 +14,7 @@ from assets.records import Asset, SupportSurface
 from embodied.assistants.routes import route_paths
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Placement, check
-from embodied.navgraph import RADIUS
+from embodied.navigation.graph import RADIUS
 from embodied.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.tasks.goals import find_instances
 

@@ -10,7 +10,7 @@ import pytest
 from conftest import two_rooms
 
 from embodied.house.house import Placement
-from embodied.navgraph import build_graph
+from embodied.navigation.graph import build_graph
 from embodied.house.floor_plan import INK, ROOM_COLOURS, draw_plan, save_plan
 
 SCALE = 60.0

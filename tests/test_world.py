@@ -13,7 +13,7 @@ from handmade import HandCatalogue, furnished
 
 from embodied import world as worlds
 from embodied.interface import Sight
-from embodied.navgraph import graph_of
+from embodied.navigation.graph import graph_of
 from embodied.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
 

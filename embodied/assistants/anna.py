@@ -10,7 +10,7 @@ import numpy as np
 from embodied.interface import Intention, Pose, Reply, Route, Sight, Situation, Subtask
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
 
 ATTENTION = 2.0
 """epsilon_attn, metres (Table D.1)."""

@@ -15,7 +15,7 @@ from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
     from embodied.world import World
 
 TRIES = 12

@@ -18,7 +18,7 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.interface import Move
 from embodied.language.plain import PlainLanguage
-from embodied.navgraph import NavGraph, build_graph
+from embodied.navigation.graph import NavGraph, build_graph
 from embodied.render import Renderer, face_cameras
 from embodied.scene import compile_scene
 from embodied.tasks.find import find_pool, find_task

@@ -71,7 +71,7 @@ def inhabited(house, catalogue, args: argparse.Namespace):
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.routes import WORDINGS, route_paths, worded
     from embodied.language import People
-    from embodied.navgraph import build_graph
+    from embodied.navigation.graph import build_graph
     from embodied.people import add_people, meet
     from embodied.world import open_world
 

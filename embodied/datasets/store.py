@@ -17,7 +17,7 @@ from embodied.env import HelpEnv
 from embodied.environments import environment_maker
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Route, Task
-from embodied.navgraph import NavGraph, from_matterport
+from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import load_lines
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 

@@ -20,7 +20,7 @@ from embodied.house.house import House
 from embodied.light.backend import device
 from embodied.light.baking import Bake, bake
 from embodied.light.reference import Tracer
-from embodied.navgraph import build_graph
+from embodied.navigation.graph import build_graph
 from embodied.render import Renderer, camera_at
 
 AREA = (35.0, 70.0)

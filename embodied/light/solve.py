@@ -17,7 +17,7 @@ from embodied.light.radiosity import Points, Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
 from embodied.light.unwrap import areas_of
-from embodied.walkable import inward
+from embodied.navigation.free_space import inward
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""

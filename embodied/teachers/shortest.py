@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from embodied.interface import Episode, Label, Move, Pose, Situation, Stop
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
     from embodied.world import World
 
 

@@ -17,7 +17,7 @@ from embodied.moves import WORDS, MonocularMoves, directions
 from embodied.teachers.shortest import nearest
 
 if TYPE_CHECKING:
-    from embodied.navgraph import NavGraph
+    from embodied.navigation.graph import NavGraph
     from embodied.world import World
 
 ACTION = 1e-3

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
 from embodied.house.house import DOORS, House, HouseError
-from embodied.walkable import EYE, free_floor, sight_floor
+from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
 RADIUS = 0.2
 """Radius of the agent's body, metres."""

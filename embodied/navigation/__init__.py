@@ -1,0 +1,1 @@
+"""Where one can stand and walk: free space and the navigation graph."""
