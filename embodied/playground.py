@@ -23,7 +23,7 @@ from embodied.environments import environment_maker
 from embodied.features import semantic_features
 from embodied.interface import Language, Task
 from embodied.language import People, PlainLanguage
-from embodied.people import add_people, meet
+from embodied.generate.people import add_people, meet
 from embodied.world import World, open_world
 
 if TYPE_CHECKING:

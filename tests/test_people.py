@@ -15,7 +15,7 @@ from embodied.assistants.routes import route_paths
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Placement, check
 from embodied.navigation.graph import RADIUS
-from embodied.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
+from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
@@ -107,7 +107,7 @@ def test_whoever_shuts_a_room_steps_aside_alone(monkeypatch):
     world = grid_world(6, spacing=2.2)
     everybody = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
     first = next(iter(everybody.values()))
-    monkeypatch.setattr("embodied.people.unreachable_rooms", lambda house: ["kitchen_1"] if any(
+    monkeypatch.setattr("embodied.generate.people.unreachable_rooms", lambda house: ["kitchen_1"] if any(
         p.position == first.position for p in house.placements) else [])
     left = {p.position for p in meet(world.house, world.graph, catalogue(FIGURE), seed=1).values()}
     assert first.position not in left and left >= {p.position for p in everybody.values()} - {first.position}

@@ -72,7 +72,7 @@ def inhabited(house, catalogue, args: argparse.Namespace):
     from embodied.assistants.routes import WORDINGS, route_paths, worded
     from embodied.language import People
     from embodied.navigation.graph import build_graph
-    from embodied.people import add_people, meet
+    from embodied.generate.people import add_people, meet
     from embodied.world import open_world
 
     graph = build_graph(house, catalogue)

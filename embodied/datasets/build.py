@@ -24,7 +24,7 @@ from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
-from embodied.people import add_people, meet
+from embodied.generate.people import add_people, meet
 from embodied.records import save_lines
 from embodied.seeds import stream
 from embodied.world import World, open_world
