@@ -1,6 +1,6 @@
 """A body with wheels that drives the edges of the graph physically (dm_control's composer).
 
-The house is its arena (the collision boxes of embodied.scene), and the same tasks are played: a
+The house is its arena (the collision boxes of embodied.scene.model), and the same tasks are played: a
 Move is driven by a simple controller, bumps are counted, and a way that turns out to be blocked
 leaves the agent where it came from.
 """
@@ -22,7 +22,7 @@ except ImportError as e:
 from embodied.env import HannaEnv, HelpEnv
 from embodied.geometry import wrap
 from embodied.interface import Reply
-from embodied.scene import build_spec, owner_of_name
+from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
     from embodied.house.house import House

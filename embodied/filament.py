@@ -23,9 +23,9 @@ import shapely
 
 from embodied.errors import UnableError
 from embodied.house.house import House
-from embodied.lit import LitPages
+from embodied.scene.lit_pages import LitPages
 from embodied.render import Camera
-from embodied.scene import build_spec, compile_spec
+from embodied.scene.model import build_spec, compile_spec
 
 EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""

@@ -20,9 +20,9 @@ import numpy as np
 
 from embodied import visibility
 from embodied.house.house import House
-from embodied.lit import LitPages
+from embodied.scene.lit_pages import LitPages
 from embodied.panorama import FACES, Panorama
-from embodied.scene import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
+from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
 QUALITIES = ("unlit", "baked")
 BACKENDS = ("classic", "filament")

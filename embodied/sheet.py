@@ -16,8 +16,8 @@ from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
 from assets.cache import atomic_path
-from embodied import scene
-from embodied.part import Part
+from embodied.scene.model import model as scene
+from embodied.scene.part import Part
 
 COLUMNS, ROWS = 6, 4
 TILE, LABEL, INSET = 300, 44, 104

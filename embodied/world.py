@@ -16,10 +16,10 @@ from embodied import gl
 from embodied.navigation import graph as navgraph
 from embodied.house.house import House
 from embodied.house.validation import load_house
-from embodied.lit import LitPages
+from embodied.scene.lit_pages import LitPages
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.parts import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.render import Renderer
 from embodied.sightings import FACE, Sighting, SightingTable, load_table, save_table, sightings_table
 

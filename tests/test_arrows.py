@@ -16,8 +16,8 @@ MAY_IMPORT = {
     "agents": {"assets", "embodied", "agents"},
     "viz": {"assets", "embodied", "viz"},
 }
-GRAPHICS = ("embodied/scene.py", "embodied/render.py", "embodied/gl.py", "embodied/sheet.py", "embodied/export.py",
-            "embodied/collision.py", "embodied/body.py", "embodied/filament.py")
+GRAPHICS = ("embodied/scene/model.py", "embodied/render.py", "embodied/gl.py", "embodied/sheet.py", "embodied/scene/export.py",
+            "embodied/scene/collision.py", "embodied/body.py", "embodied/filament.py")
 HOMES = {
     "torch": ("agents/",),
     "rerun": ("viz/",),

@@ -31,7 +31,7 @@ from embodied.generate import HouseConfig
 from embodied.house.house import House, HouseError
 from embodied.panorama import Panorama
 from embodied.panorama_file import PanoramaFile, write_panoramas
-from embodied.scene import load_texture
+from embodied.scene.model import load_texture
 
 
 def said(capsys, *words: str) -> str:

@@ -11,10 +11,10 @@ import trimesh
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.export import export_glb, export_mjcf
-from embodied.lit import LitMesh, LitPages
-from embodied.parts import house_parts
-from embodied.scene import compile_scene, loose
+from embodied.scene.export import export_glb, export_mjcf
+from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.house_meshes import house_parts
+from embodied.scene.model import compile_scene, loose
 
 
 @pytest.fixture(scope="module")

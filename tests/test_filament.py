@@ -10,7 +10,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished, painted
 
 from embodied import filament
-from embodied.parts import owners
+from embodied.scene.house_meshes import owners
 from embodied.render import Renderer
 
 EYE = (2.5, 2.6, 1.2)

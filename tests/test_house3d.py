@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.lit import LitMesh
+from embodied.scene.lit_pages import LitMesh
 from viz.house3d import BUDGET, FIGURES, _lit_piece, _share
 
 

@@ -39,7 +39,7 @@ from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
-from embodied.part import Part
+from embodied.scene.part import Part
 from embodied.navigation.free_space import inward
 
 TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)

@@ -14,9 +14,9 @@ from handmade import HandCatalogue, furnished
 
 from embodied import gl, visibility
 from embodied.panorama import face_rays, ray_stretch
-from embodied.parts import owners
+from embodied.scene.house_meshes import owners
 from embodied.render import NEAR, Renderer, camera_at, depth_of_reversed_z
-from embodied.scene import VISUAL, compile_scene
+from embodied.scene.model import VISUAL, compile_scene
 
 EYE = (2.5, 2.6, 1.2)
 

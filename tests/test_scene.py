@@ -13,11 +13,12 @@ from handmade import HandCatalogue, box_mesh, furnished
 from assets.catalogue import load_catalogue
 from assets.packs import find_packs
 from assets.records import Asset, Finish, MeshPart, SupportSurface
-from embodied import collision, scene
+from embodied.scene.model import collision
+from embodied.scene.model import model as scene
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
-from embodied.lit import LitMesh, LitPages
-from embodied.parts import house_parts, owners
+from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.house_meshes import house_parts, owners
 
 
 @pytest.fixture(scope="module")

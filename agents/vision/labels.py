@@ -15,7 +15,7 @@ from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from assets.cache import atomic_path
 from assets.records import ROOM_KINDS
 from embodied.house.house import OPENING_KINDS, House
-from embodied.parts import owners
+from embodied.scene.house_meshes import owners
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue

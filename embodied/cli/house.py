@@ -30,7 +30,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.export import export_glb, export_mjcf
+    from embodied.scene.export import export_glb, export_mjcf
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.house.floor_plan import save_plan
 

@@ -98,7 +98,7 @@ def things_of(
     """Group parts by owner and unwrap each; furniture from the cache.
 
     Args:
-      parts: embodied.parts.Part of one house; kind 'outdoor' must be left out.
+      parts: embodied.scene.house_meshes.Part of one house; kind 'outdoor' must be left out.
       density: luxels per metre of walls, floors and ceilings.
       budget: luxels per piece of furniture.
       finest: texels per luxel at most.

@@ -16,7 +16,7 @@ from embodied.light.radiosity import ENV_ROWS, LIFT, Space, points_of
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
 from embodied.light.unwrap import face_normals
-from embodied.lit import LitMesh
+from embodied.scene.lit_pages import LitMesh
 
 RADIUS = 70.0
 """Metres to the dome."""

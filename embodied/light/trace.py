@@ -17,7 +17,7 @@ from embodied.light.paths import Lights, Surfaces, lights_of
 from embodied.light.radiosity import Space
 from embodied.light.sky import Outdoors, outdoors
 from embodied.light.unwrap import face_normals
-from embodied.lit import LitPages
+from embodied.scene.lit_pages import LitPages
 
 
 @dataclass(frozen=True, eq=False)

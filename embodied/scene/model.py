@@ -23,11 +23,11 @@ import mujoco
 import numpy as np
 
 from assets.records import Finish, MeshPart
-from embodied import collision
+from embodied.scene.model import collision
 from embodied.house.house import House, Placement
-from embodied.lit import LitPages
-from embodied.parts import Part, house_parts, owners
-from embodied.shell import shell_parts
+from embodied.scene.lit_pages import LitPages
+from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.shell import shell_parts
 
 VISUAL, COLLISION = 2, 3
 """Geom groups."""

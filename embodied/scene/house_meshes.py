@@ -6,8 +6,8 @@ import typing
 
 from assets.records import Finish, MeshPart
 from embodied.house.house import House
-from embodied.part import Part
-from embodied.shell import shell_owners, shell_parts
+from embodied.scene.part import Part
+from embodied.scene.shell import shell_owners, shell_parts
 
 __all__ = ["Meshes", "Part", "house_parts", "owners"]
 

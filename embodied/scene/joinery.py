@@ -17,10 +17,10 @@ import shapely
 from assets.built.primitives import Shape, box, cylinder, joined, moved, part, quads, scaled, tube, turned, two_sided
 from assets.records import Finish
 from embodied.house.house import House, Opening
-from embodied.outdoors import facade_finish
-from embodied.part import Part
+from embodied.scene.outdoors import facade_finish
+from embodied.scene.part import Part
 from embodied.seeds import stream
-from embodied.walls import floor_turn, turned_uv
+from embodied.scene.walls import floor_turn, turned_uv
 
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
 """Owners of an opening are '<opening>/<piece>'."""

@@ -15,9 +15,9 @@ import trimesh
 from assets.cache import write_bytes
 from assets.records import Finish
 from embodied.house.house import House
-from embodied.lit import LitPages
-from embodied.parts import Part, house_parts
-from embodied.scene import build_spec, compile_spec, load_texture
+from embodied.scene.lit_pages import LitPages
+from embodied.scene.house_meshes import Part, house_parts
+from embodied.scene.model import build_spec, compile_spec, load_texture
 
 MESHES, TEXTURES = "meshes", "textures"
 """Folders beside house.xml."""
@@ -27,7 +27,7 @@ def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] =
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer as it is.
 
     Args:
-      free: placements that physics may move, see embodied.scene.loose.
+      free: placements that physics may move, see embodied.scene.model.loose.
       lit: write the house with its baked light instead of its materials.
 
     Returns:

@@ -1,7 +1,7 @@
 """The fixed part of a house as meshes: walls with their openings, floors, ceilings, skirting, facade.
 
 Each room has its own wall faces on the edges of `house.floor(room)`, looking into the room; joinery
-and reveals (embodied.joinery) close the gap between the faces of two rooms, and a facade closes the
+and reveals (embodied.scene.joinery) close the gap between the faces of two rooms, and a facade closes the
 house from outside. Every wall is one planar mesh around its holes, so that it makes one light-map
 chart. Texture coordinates are metres divided by the finish's tile.
 """
@@ -15,10 +15,12 @@ import numpy as np
 
 from assets.built.primitives import Shape, flat, joined, part, quads
 from assets.records import Finish
-from embodied import joinery, outdoors, stairs
+from embodied.scene.model import joinery
+from embodied.scene.model import outdoors
+from embodied.scene.model import stairs
 from embodied.house.house import House, Opening, Room
-from embodied.part import Part
-from embodied.walls import floor_turn, hole_on, inset, turned_uv, wall_face
+from embodied.scene.part import Part
+from embodied.scene.walls import floor_turn, hole_on, inset, turned_uv, wall_face
 
 FinishOf = Callable[[str], Finish]
 

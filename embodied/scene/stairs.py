@@ -11,7 +11,7 @@ import shapely
 from assets.built.primitives import bar, box, moved, part, quads, turned
 from assets.records import Finish
 from embodied.house.house import House, Stair
-from embodied.part import Part
+from embodied.scene.part import Part
 
 TREAD = 0.035
 """Thickness of a tread, metres."""

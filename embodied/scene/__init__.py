@@ -1,0 +1,1 @@
+"""A house as meshes and as an MjModel."""
