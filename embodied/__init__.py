@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from embodied.generate import HouseConfig, generate_house
     from embodied.house.house import House
     from embodied.navigation.graph import NavGraph, build_graph
-    from embodied.panorama import Panorama
-    from embodied.render import Renderer
+    from embodied.render.panorama import Panorama
+    from embodied.render.classic import Renderer
     from embodied.seeds import stream
     from embodied.world import World, open_world
 
@@ -41,7 +41,7 @@ __all__ = ["House", "HouseConfig", "NavGraph", "Panorama", "Renderer", "World", 
 
 HOMES = {
     "House": "embodied.house.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navigation.graph",
-    "Panorama": "embodied.panorama", "Renderer": "embodied.render", "World": "embodied.world",
+    "Panorama": "embodied.render.panorama", "Renderer": "embodied.render.classic", "World": "embodied.world",
     "build_graph": "embodied.navigation.graph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
     "load_catalogue": "assets.catalogue", "open_world": "embodied.world", "stream": "embodied.seeds",
 }

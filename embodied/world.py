@@ -17,11 +17,11 @@ from embodied.navigation import graph as navgraph
 from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.scene.lit_pages import LitPages
-from embodied.panorama import Panorama
-from embodied.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.scene.house_meshes import Part, house_parts, owners
-from embodied.render import Renderer
-from embodied.sightings import FACE, Sighting, SightingTable, load_table, save_table, sightings_table
+from embodied.render.classic import Renderer
+from embodied.render.sightings import FACE, Sighting, SightingTable, load_table, save_table, sightings_table
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue

@@ -16,8 +16,8 @@ MAY_IMPORT = {
     "agents": {"assets", "embodied", "agents"},
     "viz": {"assets", "embodied", "viz"},
 }
-GRAPHICS = ("embodied/scene/model.py", "embodied/render.py", "embodied/gl.py", "embodied/sheet.py", "embodied/scene/export.py",
-            "embodied/scene/collision.py", "embodied/body.py", "embodied/filament.py")
+GRAPHICS = ("embodied/scene/model.py", "embodied/render/classic.py", "embodied/gl.py", "embodied/render/contact_sheet.py", "embodied/scene/export.py",
+            "embodied/scene/collision.py", "embodied/body.py", "embodied/render/filament.py")
 HOMES = {
     "torch": ("agents/",),
     "rerun": ("viz/",),
@@ -25,7 +25,7 @@ HOMES = {
     "drjit": ("embodied/light/",),
     "mujoco": (*GRAPHICS, "embodied/light/", "embodied/bench/"),
     "dm_control": ("embodied/body.py",),
-    "OpenGL": ("embodied/gl.py", "embodied/render.py"),
+    "OpenGL": ("embodied/gl.py", "embodied/render/classic.py"),
     "gymnasium": ("embodied/gym_env.py", "embodied/spaces.py", "agents/"),
 }
 """Heavy library -> path prefixes of the files that may import it."""

@@ -29,8 +29,8 @@ from embodied.errors import UnableError
 from embodied.fields import field_docs
 from embodied.generate import HouseConfig
 from embodied.house.house import House, HouseError
-from embodied.panorama import Panorama
-from embodied.panorama_file import PanoramaFile, write_panoramas
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.scene.model import load_texture
 
 

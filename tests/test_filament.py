@@ -9,9 +9,9 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished, painted
 
-from embodied import filament
+from embodied.render.classic import filament
 from embodied.scene.house_meshes import owners
-from embodied.render import Renderer
+from embodied.render.classic import Renderer
 
 EYE = (2.5, 2.6, 1.2)
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from embodied.panorama import FACES, Panorama, face_rays, ray_stretch
-from embodied.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
+from embodied.render.panorama import FACES, Panorama, face_rays, ray_stretch
+from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
 
 S = 64
 
@@ -27,7 +27,7 @@ def smooth(rays: np.ndarray) -> np.ndarray:
 
 
 def pinhole(yaw: float, pitch: float, vfov: float, h: int, w: int) -> np.ndarray:
-    """(h, w, 3) rays by explicit rotation matrices, independent of embodied.panorama."""
+    """(h, w, 3) rays by explicit rotation matrices, independent of embodied.render.panorama."""
     tall = math.tan(vfov / 2)
     y, x = np.meshgrid(1 - 2 * (np.arange(h) + 0.5) / h, 2 * (np.arange(w) + 0.5) / w - 1, indexing="ij")
     local = np.stack([np.ones((h, w)), -x * tall * w / h, y * tall], axis=-1)

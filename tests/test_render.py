@@ -12,10 +12,11 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied import gl, visibility
-from embodied.panorama import face_rays, ray_stretch
+from embodied import gl
+from embodied.render.classic import visibility
+from embodied.render.panorama import face_rays, ray_stretch
 from embodied.scene.house_meshes import owners
-from embodied.render import NEAR, Renderer, camera_at, depth_of_reversed_z
+from embodied.render.classic import NEAR, Renderer, camera_at, depth_of_reversed_z
 from embodied.scene.model import VISUAL, compile_scene
 
 EYE = (2.5, 2.6, 1.2)

@@ -7,7 +7,7 @@ import pytest
 from test_assets import CUBE, write_own
 
 from assets.catalogue import load_catalogue
-from embodied.sheet import LABEL, TILE, draw_sheets, sheet
+from embodied.render.contact_sheet import LABEL, TILE, draw_sheets, sheet
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from handmade import HandCatalogue, furnished
 from embodied import world as worlds
 from embodied.interface import Sight
 from embodied.navigation.graph import graph_of
-from embodied.panorama_file import PanoramaFile
+from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
 
 NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])

@@ -21,7 +21,7 @@ from agents.vision.resnet import read_weights
 from agents.vision.strip import HEIGHT, VFOV
 from assets.cache import atomic_path
 from embodied.interface import STEP, TURNS, VIEWS
-from embodied.panorama import Panorama
+from embodied.render.panorama import Panorama
 
 FORMAT = "embodied-features-1"
 EQUIRECT = 288

@@ -53,7 +53,7 @@ def list_assets(args: argparse.Namespace, catalogue, chosen) -> int:
 
 def sheet(args: argparse.Namespace, catalogue, chosen) -> int:
     """Draw the contact sheets."""
-    from embodied.sheet import draw_sheets
+    from embodied.render.contact_sheet import draw_sheets
 
     out = args.out or Path("out/sheets")
     paths = draw_sheets(catalogue, [a.key for a in chosen], out)

@@ -1,6 +1,6 @@
 """Panoramas by ray tracing: 'glossy' reads the bake and adds one reflection, 'reference' path-traces everything.
 
-Both return an embodied.panorama.Panorama with the bake's exposure, so that pictures compare.
+Both return an embodied.render.panorama.Panorama with the bake's exposure, so that pictures compare.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from embodied.light.baking import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
 from embodied.light.trace import Hit, look, picture_at, through, world_of
-from embodied.panorama import FACES, Panorama
+from embodied.render.panorama import FACES, Panorama
 from embodied.seeds import stream
 
 BRIGHTEST = 12.0

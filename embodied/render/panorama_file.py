@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path
-from embodied.panorama import Panorama
+from embodied.render.panorama import Panorama
 
 MAGIC = b"EMBPANO1"
 TAIL = struct.Struct("<Q32s8s")

@@ -11,7 +11,7 @@ import numpy as np
 
 from assets.cache import atomic_path
 from embodied.house.house import House
-from embodied.panorama import face_rays, ray_stretch
+from embodied.render.panorama import face_rays, ray_stretch
 
 FACE = 64
 """Side in pixels of the cube faces that sightings are counted on; a pixel spans about 1.4 degrees."""

@@ -18,10 +18,10 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied import visibility
+from embodied.render.classic import visibility
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitPages
-from embodied.panorama import FACES, Panorama
+from embodied.render.panorama import FACES, Panorama
 from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
 QUALITIES = ("unlit", "baked")
@@ -113,7 +113,7 @@ class Renderer:
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, self.scene)
         if backend == "filament":
-            from embodied.filament import Painter  # late: loads Vulkan
+            from embodied.render.filament import Painter  # late: loads Vulkan
 
             self._painter = Painter(house, catalogue, lit)
         self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None

@@ -24,7 +24,7 @@ import shapely
 from embodied.errors import UnableError
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitPages
-from embodied.render import Camera
+from embodied.render.classic import Camera
 from embodied.scene.model import build_spec, compile_spec
 
 EXPOSURE = 0.73
@@ -76,7 +76,7 @@ class Painter:
         self._room: str | None = None
 
     def rgb(self, camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
-        """(h, w, 3) uint8 as an embodied.render.Camera sees it, top row first."""
+        """(h, w, 3) uint8 as an embodied.render.classic.Camera sees it, top row first."""
         room = room_at(self._house, camera.position)
         if room != self._room:
             self._reflect(room, near, far)

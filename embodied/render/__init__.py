@@ -1,0 +1,1 @@
+"""A house as pictures: back ends, visibility, panoramas, sightings."""
