@@ -32,7 +32,7 @@ from embodied.light import (
 )
 from embodied.light.atlas import Thing, atlas_of, coarsened, things_of
 from embodied.light.backend import array, drjit, find_llvm, mitsuba, variant_of
-from embodied.light.bench import psnr, ssim
+from embodied.bench.light import psnr, ssim
 from embodied.light.denoise import lift_specks, neighbours
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
 def light(args: argparse.Namespace, catalogue) -> int:
     """The comparison of all ways of drawing."""
-    from embodied.light.bench import compare
+    from embodied.bench.light import compare
 
     report = compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
     show(args, report.facts, report.text)
