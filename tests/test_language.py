@@ -15,7 +15,7 @@ from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, count_cost, follow
 from embodied.language.plain import with_article
-from embodied.language.routes import legs_of, shortened
+from embodied.language.route_clauses import legs_of, shortened
 from embodied.language.seen import Eyes, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import SLIPS, TEMPLATES

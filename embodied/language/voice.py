@@ -12,7 +12,7 @@ from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
 from embodied.language.plain import PlainLanguage
-from embodied.language.routes import plan, shortened
+from embodied.language.route_clauses import plan, shortened
 from embodied.language.seen import Eyes
 from embodied.language.speakers import draw_speaker
 
