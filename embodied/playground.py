@@ -14,7 +14,7 @@ import numpy as np
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
-from embodied.assistants.routes import WORDINGS, route_paths, worded
+from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset

@@ -11,7 +11,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied import metrics
 from embodied.assistants.anna import Anna, AssistantError
-from embodied.assistants.routes import (
+from embodied.assistants.route_system import (
     RouteConfig,
     benchmark_lemma2,
     build_routes,

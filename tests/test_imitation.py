@@ -50,7 +50,7 @@ from agents.vision.bank import FeatureBank
 from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied import metrics
 from embodied.assistants.anna import Anna
-from embodied.assistants.routes import build_routes
+from embodied.assistants.route_system import build_routes
 from embodied.env import HannaEnv
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from assets.catalogue import load_catalogue
-from embodied.assistants.routes import RouteConfig, sampled_paths
+from embodied.assistants.route_system import RouteConfig, sampled_paths
 from embodied.generate import HouseConfig, generate_house
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.grammar import Phrase, kind_of, normalised, parse, say

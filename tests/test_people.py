@@ -11,7 +11,7 @@ import shapely
 from hand_worlds import grid_world, thing
 
 from assets.records import Asset, SupportSurface
-from embodied.assistants.routes import route_paths
+from embodied.assistants.route_system import route_paths
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Placement, check
 from embodied.navigation.graph import RADIUS

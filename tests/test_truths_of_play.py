@@ -9,7 +9,7 @@ import pytest
 from hand_worlds import grid_world
 
 from embodied import metrics
-from embodied.assistants.routes import build_routes
+from embodied.assistants.route_system import build_routes
 from embodied.datasets.parts import part_tasks
 from embodied.environments import environment_maker
 from embodied.evaluate import AGENTS, LOOKING, agent

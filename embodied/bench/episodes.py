@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from assets.catalogue import Catalogue
-from embodied.assistants.routes import benchmark_lemma2, build_routes
+from embodied.assistants.route_system import benchmark_lemma2, build_routes
 from embodied.bench.timing import Measure, from_values, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks

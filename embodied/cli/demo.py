@@ -69,7 +69,7 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
 
 def inhabited(house, catalogue, args: argparse.Namespace):
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
-    from embodied.assistants.routes import WORDINGS, route_paths, worded
+    from embodied.assistants.route_system import WORDINGS, route_paths, worded
     from embodied.language import People
     from embodied.navigation.graph import build_graph
     from embodied.generate.people import add_people, meet

@@ -16,7 +16,7 @@ import joblib
 
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
-from embodied.assistants.routes import WORDINGS, route_paths, spanning_paths, worded
+from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
