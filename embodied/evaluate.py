@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from embodied.interface import Episode, Policy, Task
-from embodied.listening import ListeningInterpreter, ScriptedListener
-from embodied.policies import (
+from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
+from embodied.policies.baselines import (
     Asking,
     Forward10,
     HalfwaySkyline,
@@ -51,7 +51,7 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Policy]]] = {
 }
 """Agents without learning, by kind of task. In HANNA's 'no ask', 'random ask' and 'ask every 5' the
 teacher navigates, so they show what asking by that rule costs; who learns to navigate brings an own
-policy to the same rules (embodied.policies.Asking)."""
+policy to the same rules (embodied.policies.baselines.Asking)."""
 
 
 def agent(kind: str, name: str) -> Policy:

@@ -16,7 +16,7 @@ from embodied.datasets.scale import PAPER, quota, scale
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.house.house import HouseError
 from embodied.interface import Ask
-from embodied.policies import Asking, Shortest, ask_every_5
+from embodied.policies.baselines import Asking, Shortest, ask_every_5
 from embodied.rollout import play
 from embodied.teachers.vnla import VnlaTeacher
 

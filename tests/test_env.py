@@ -13,7 +13,7 @@ from embodied.env import ActionError, HelpEnv, TaskError
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.moves import MonocularMoves, PanoramicMoves, nearest_views
-from embodied.policies import Forward10, RandomWalk, Shortest
+from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.rollout import play
 from embodied.tasks.find import find_pool, find_task
 from embodied.tasks.goals import count_hops, find_instances

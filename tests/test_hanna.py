@@ -38,7 +38,7 @@ from embodied.interface import (
 )
 from embodied.language.plain import PlainLanguage
 from embodied.moves import PanoramicMoves
-from embodied.policies import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
+from embodied.policies.baselines import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
 from embodied.rollout import play
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops

@@ -15,7 +15,7 @@ from embodied.env import ActionError
 from embodied.hari_env import Costs, HariEnv, shaped_costs
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
-from embodied.policies import HalfwaySkyline, Shortest
+from embodied.policies.baselines import HalfwaySkyline, Shortest
 from embodied.rollout import play
 from embodied.tasks.goals import count_hops
 from embodied.tasks.hari import hari_pool, hari_task

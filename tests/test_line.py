@@ -21,7 +21,7 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.language import People
 from embodied.metrics import spl, success
-from embodied.policies import RandomWalk, Shortest
+from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.rollout import play, rollout
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world

@@ -14,7 +14,7 @@ from embodied.env import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnl
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.moves import WORDS, MonocularMoves
-from embodied.policies import Shortest, SubgoalListener, VnlaAsking
+from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.rollout import play
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason, stepwise_action

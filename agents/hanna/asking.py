@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied import policies
+from embodied.policies.baselines import baselines as policies
 from embodied.interface import Observation
 
 

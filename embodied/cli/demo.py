@@ -87,7 +87,7 @@ def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) ->
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.environments import environment_maker
     from embodied.language import People
-    from embodied.policies import Shortest
+    from embodied.policies.baselines import Shortest
     from embodied.rollout import play
     from embodied.tasks.find import find_pool, find_task
 

@@ -84,7 +84,7 @@ def world_of(args: argparse.Namespace):
 
 def policy_of(name: str):
     """The policy behind an --agent word."""
-    from embodied.policies import Forward10, RandomWalk, Shortest
+    from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 
     return {"shortest": Shortest, "random": RandomWalk, "forward10": Forward10}[name]()
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from embodied.interface import Action, Mode, Move, Observation, Situation, Stop
 from embodied.language import follow
-from embodied.policies import Actions, Observations, PerfectInterpreter
+from embodied.policies.baselines import Actions, Observations, PerfectInterpreter
 
 Plan = tuple[str, tuple[int, ...]]
 """The text that was heard and the nodes still to walk, the current one first."""
