@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
-from embodied.env import ActionError, HelpEnv
+from embodied.envs.base import ActionError, HelpEnv
 from embodied.features import FeatureTable
 from embodied.interface import FeatureSource, Observation, Task
 from embodied.metrics import PER_EPISODE
@@ -189,7 +189,7 @@ def make(
 def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:
     """The same rule of play with a body."""
     from assets.catalogue import load_catalogue
-    from embodied.body import DrivenEnv, DrivenHannaEnv, driven  # physics, only where wanted
+    from embodied.envs.driven import DrivenEnv, DrivenHannaEnv, driven  # physics, only where wanted
 
     kinds = {"find": DrivenEnv, "vln": DrivenEnv, "hanna": DrivenHannaEnv}
     if kind not in kinds:

@@ -18,8 +18,8 @@ from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
-from embodied.env import HelpEnv
-from embodied.environments import environment_maker
+from embodied.envs.base import HelpEnv
+from embodied.envs.make import environment_maker
 from embodied.features import semantic_features
 from embodied.interface import Language, Task
 from embodied.language import People, PlainLanguage

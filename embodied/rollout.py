@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, Observation, Policy, Situation, Step, Task
 from embodied.seeds import stream
 

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from embodied.env import ActionError
+from embodied.envs.base import ActionError
 from embodied.interface import (
     TURNS,
     VIEWS,

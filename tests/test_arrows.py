@@ -17,14 +17,14 @@ MAY_IMPORT = {
     "viz": {"assets", "embodied", "viz"},
 }
 GRAPHICS = ("embodied/scene/model.py", "embodied/render/classic.py", "embodied/gl.py", "embodied/render/contact_sheet.py", "embodied/scene/export.py",
-            "embodied/scene/collision.py", "embodied/body.py", "embodied/render/filament.py")
+            "embodied/scene/collision.py", "embodied/envs/driven.py", "embodied/render/filament.py")
 HOMES = {
     "torch": ("agents/",),
     "rerun": ("viz/",),
     "mitsuba": ("embodied/light/",),
     "drjit": ("embodied/light/",),
     "mujoco": (*GRAPHICS, "embodied/light/", "embodied/bench/"),
-    "dm_control": ("embodied/body.py",),
+    "dm_control": ("embodied/envs/driven.py",),
     "OpenGL": ("embodied/gl.py", "embodied/render/classic.py"),
     "gymnasium": ("embodied/gym_env.py", "embodied/spaces.py", "agents/"),
 }

@@ -9,9 +9,9 @@ from conftest import two_rooms
 import embodied.gym_env
 from assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
-from embodied.body import DrivenHannaEnv, Driver, driven, total_bumps
+from embodied.envs.driven import DrivenHannaEnv, Driver, driven, total_bumps
 from embodied.datasets.store import Place
-from embodied.env import HannaEnv
+from embodied.envs.base import HannaEnv
 from embodied.interface import Ask, FindObject, Move, Pose, Route, Stop, Task
 from embodied.navigation.graph import build_graph
 

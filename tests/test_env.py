@@ -9,7 +9,7 @@ import pytest
 from hand_worlds import grid_world, line_world
 
 from embodied import metrics
-from embodied.env import ActionError, HelpEnv, TaskError
+from embodied.envs.base import ActionError, HelpEnv, TaskError
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.moves import MonocularMoves, PanoramicMoves, nearest_views

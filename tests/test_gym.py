@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
 import embodied.gym_env
-from embodied.env import ActionError
+from embodied.envs.base import ActionError
 from embodied.interface import Ask, Intention, Move, Stop
 from embodied.registration import IDS
 from embodied.spaces import Layout, Numbers, decode, number, text_of

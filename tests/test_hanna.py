@@ -20,7 +20,7 @@ from embodied.assistants.route_system import (
     sampled_paths,
     spanning_paths,
 )
-from embodied.env import ActionError, HannaEnv
+from embodied.envs.base import ActionError, HannaEnv
 from embodied.interface import (
     VIEWS,
     Ask,

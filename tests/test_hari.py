@@ -11,8 +11,8 @@ from hand_worlds import grid_world, line_world, room, thing
 from embodied import metrics
 from embodied.assistants.descriptions import Describer, DescriberConfig, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
-from embodied.env import ActionError
-from embodied.hari_env import Costs, HariEnv, shaped_costs
+from embodied.envs.base import ActionError
+from embodied.envs.hari import Costs, HariEnv, shaped_costs
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.policies.baselines import HalfwaySkyline, Shortest

@@ -51,7 +51,7 @@ from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied import metrics
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
-from embodied.env import HannaEnv
+from embodied.envs.base import HannaEnv
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.moves import PanoramicMoves

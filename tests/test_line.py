@@ -16,7 +16,7 @@ import pytest
 
 from assets.catalogue import load_catalogue
 from embodied.cli import main
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.language import People

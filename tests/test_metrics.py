@@ -8,7 +8,7 @@ import pytest
 from hand_worlds import line_world
 
 from embodied import metrics
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, Task
 
 

@@ -11,7 +11,7 @@ from hand_worlds import grid_world
 from embodied import metrics
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.parts import part_tasks
-from embodied.environments import environment_maker
+from embodied.envs.make import environment_maker
 from embodied.evaluate import AGENTS, LOOKING, agent
 from embodied.interface import Ask, Move, Observation, Task
 from embodied.language.plain import PlainLanguage

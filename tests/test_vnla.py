@@ -10,7 +10,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied import metrics
 from embodied.assistants.advisor import Advisor
-from embodied.env import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
+from embodied.envs.base import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.moves import WORDS, MonocularMoves

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
 from agents.imitation.losses import IGNORE, help_loss, navigation_loss
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher
 from embodied.rollout import rollout
 

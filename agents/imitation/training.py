@@ -35,7 +35,7 @@ from agents.imitation.collect import Experience, collect, imitation_loss
 from agents.imitation.losses import IGNORE
 from agents.vision.bank import FeatureBank
 from embodied import metrics
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.interface import Ask, Episode, Task, Teacher
 from embodied.rollout import play

@@ -10,8 +10,8 @@ from embodied.bench.timing import Measure, from_values, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Place
-from embodied.env import HelpEnv
-from embodied.environments import environment_maker
+from embodied.envs.base import HelpEnv
+from embodied.envs.make import environment_maker
 from embodied.interface import Ask, Intention, Move, Task
 from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, from_values, measure, ratio
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.interface import Move

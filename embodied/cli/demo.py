@@ -85,7 +85,7 @@ def inhabited(house, catalogue, args: argparse.Namespace):
 
 def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
-    from embodied.environments import environment_maker
+    from embodied.envs.make import environment_maker
     from embodied.language import People
     from embodied.policies.baselines import Shortest
     from embodied.rollout import play
@@ -107,7 +107,7 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
-    from embodied.environments import environment_maker
+    from embodied.envs.make import environment_maker
     from embodied.language import People
     from embodied.rollout import play
     from embodied.tasks.hanna import hanna_pool, hanna_task

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
 def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     """Play, film and record; recordings also go to `viewers`."""
-    from embodied.env import HelpEnv
+    from embodied.envs.base import HelpEnv
     from embodied.language import People
     from embodied.metrics import PER_EPISODE
     from embodied.rollout import play

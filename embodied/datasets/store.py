@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
 from embodied.datasets.scale import Scale, scale
-from embodied.env import HelpEnv
-from embodied.environments import environment_maker
+from embodied.envs.base import HelpEnv
+from embodied.envs.make import environment_maker
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport

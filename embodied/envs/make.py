@@ -9,8 +9,8 @@ from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
-from embodied.env import HannaEnv, HelpEnv, VnlaEnv
-from embodied.hari_env import HariEnv
+from embodied.envs.base import HannaEnv, HelpEnv, VnlaEnv
+from embodied.envs.hari import HariEnv
 from embodied.interface import Language, Route
 from embodied.language.plain import PlainLanguage
 from embodied.moves import PanoramicMoves

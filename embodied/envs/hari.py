@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from embodied.assistants.descriptions import Describer
-from embodied.env import HelpEnv
+from embodied.envs.base import HelpEnv
 from embodied.interface import (
     Action,
     Ask,

@@ -1,0 +1,1 @@
+"""The rules of play: what happens when an agent moves, asks or stops."""
