@@ -10,7 +10,7 @@ import pytest
 from hand_worlds import line_world
 from test_datasets import build
 
-from embodied.compat import (
+from embodied.datasets.matterport import (
     action_list,
     export,
     in_matterport_order,
