@@ -36,16 +36,16 @@ from agents.vocabulary import build_vocabulary
 from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
-from embodied.evaluate import agent as agent_without_learning
-from embodied.evaluate import evaluate, spread
+from embodied.evaluation.evaluate import agent as agent_without_learning
+from embodied.evaluation.evaluate import evaluate, spread
 from embodied.interface import VIEWS, Episode
 from embodied.records import episodes_file, save_lines
-from embodied.tables import as_json, markdown, save
+from embodied.evaluation.tables import as_json, markdown, save
 from embodied.teachers.hanna import HannaTeacher
 
 Note = Callable[[str], None]
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
-"""Agents of embodied.evaluate that are judged beside the learned one; they need no pictures."""
+"""Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
 FACES = 192
 """Side of the cube faces from which features are made: the strip's resolution."""
 

@@ -1,6 +1,6 @@
 """Learned HANNA agents to be judged beside those without learning, and why their episodes fail.
 
-The judging itself is embodied.evaluate.evaluate, the same for everybody.
+The judging itself is embodied.evaluation.evaluate.evaluate, the same for everybody.
 """
 
 from __future__ import annotations

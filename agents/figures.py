@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from assets.cache import atomic_path
-from embodied.tables import Estimate
+from embodied.evaluation.tables import Estimate
 
 BLUE, GREY = "#2b6cb0", "#a0aec0"
 

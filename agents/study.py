@@ -24,11 +24,11 @@ from agents.imitation.config import TrainingConfig
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset
-from embodied.evaluate import agent as agent_without_learning
-from embodied.evaluate import evaluate
+from embodied.evaluation.evaluate import agent as agent_without_learning
+from embodied.evaluation.evaluate import evaluate
 from embodied.interface import Episode, Policy
 from embodied.records import episodes_file, save_lines
-from embodied.tables import Row, save, shown
+from embodied.evaluation.tables import Row, save, shown
 
 Note = Callable[[str], None]
 

@@ -19,7 +19,7 @@ from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.features import FeatureTable
 from embodied.interface import FeatureSource, Observation, Task
-from embodied.metrics import PER_EPISODE
+from embodied.evaluation.metrics import PER_EPISODE
 from embodied.house.floor_plan import draw_plan, font
 from embodied.playground import make_playground
 from embodied.spaces import Layout, action_space, decode, encode, observation_space

@@ -8,9 +8,9 @@ import math
 import pytest
 from test_datasets import build
 
-from embodied import tables
+from embodied.evaluation import tables
 from embodied.cli import main
-from embodied.evaluate import AGENTS, LOOKING, agent, evaluate, spread
+from embodied.evaluation.evaluate import AGENTS, LOOKING, agent, evaluate, spread
 
 
 def test_the_interval_of_independent_values_is_the_textbook_one():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
+from embodied.evaluation import metrics
 from embodied.assistants.anna import Anna, AssistantError
 from embodied.assistants.route_system import (
     RouteConfig,
@@ -39,7 +39,7 @@ from embodied.interface import (
 from embodied.language.plain import PlainLanguage
 from embodied.moves import PanoramicMoves
 from embodied.policies.baselines import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
-from embodied.rollout import play
+from embodied.evaluation.rollout import play
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
 from embodied.tasks.hanna import hanna_pool, hanna_task

@@ -48,14 +48,14 @@ from agents.imitation.training import (
 )
 from agents.vision.bank import FeatureBank
 from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
-from embodied import metrics
+from embodied.evaluation import metrics
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.base import HannaEnv
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.moves import PanoramicMoves
-from embodied.rollout import play
+from embodied.evaluation.rollout import play
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher
 

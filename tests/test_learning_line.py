@@ -18,7 +18,7 @@ from agents.hanna.agent import load_agent
 from agents.study import Setting, run_study
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
-from embodied.evaluate import evaluate
+from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
 torch.set_num_threads(1)

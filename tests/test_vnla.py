@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
+from embodied.evaluation import metrics
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.moves import WORDS, MonocularMoves
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
-from embodied.rollout import play
+from embodied.evaluation.rollout import play
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason, stepwise_action
 

@@ -21,7 +21,7 @@ from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
 from agents.imitation.losses import IGNORE, help_loss, navigation_loss
 from embodied.envs.base import HelpEnv
 from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher
-from embodied.rollout import rollout
+from embodied.evaluation.rollout import rollout
 
 if TYPE_CHECKING:
     from embodied.world import World

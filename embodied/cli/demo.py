@@ -88,7 +88,7 @@ def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) ->
     from embodied.envs.make import environment_maker
     from embodied.language import People
     from embodied.policies.baselines import Shortest
-    from embodied.rollout import play
+    from embodied.evaluation.rollout import play
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
@@ -109,7 +109,7 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
     from agents.vision.features import encode_panoramas
     from embodied.envs.make import environment_maker
     from embodied.language import People
-    from embodied.rollout import play
+    from embodied.evaluation.rollout import play
     from embodied.tasks.hanna import hanna_pool, hanna_task
     from embodied.world import open_world
 
@@ -127,7 +127,7 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
 
 def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
     """Record an episode into the file `path` and to `viewers`; what is worth telling about it."""
-    from embodied.metrics import navigation_error, spl, success
+    from embodied.evaluation.metrics import navigation_error, spl, success
     from viz.blueprint import blueprint_of
     from viz.recording import record
     from viz.sinks import Sinks, open_recording

@@ -20,8 +20,8 @@ from embodied.policies.baselines import (
     ask_every_5,
     never_ask,
 )
-from embodied.rollout import play
-from embodied.tables import Row, row
+from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import Row, row
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:

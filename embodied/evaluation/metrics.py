@@ -1,7 +1,7 @@
 """Judges: each quantity is defined once, over finished episodes, with the source of its formula.
 
 Distances are metres along the graph. A function of one episode takes the episode and the graph of
-its world; tables over many episodes are in embodied.tables.
+its world; tables over many episodes are in embodied.evaluation.tables.
 """
 
 from __future__ import annotations

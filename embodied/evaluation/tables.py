@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assets.cache import write_bytes
-from embodied import metrics
+from embodied.evaluation import metrics
 from embodied.interface import Episode
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Playing and judging: rollouts, metrics, tables."""
