@@ -15,7 +15,7 @@ Tasks and people are in embodied.interface; read it first when you write an agen
 Each name is imported when it is first used, so that `import embodied` costs nothing; and off-screen
 OpenGL is chosen before mujoco is imported, whichever name comes first. The Gymnasium environments
 embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0 are registered by `import embodied`; Gymnasium
-itself is not imported for that (embodied.registration).
+itself is not imported for that (embodied.gym.registration).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from embodied.registration import register_with_gymnasium
+from embodied.gym.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
     from assets.cache import default_cache

@@ -26,7 +26,7 @@ HOMES = {
     "mujoco": (*GRAPHICS, "embodied/light/", "embodied/bench/"),
     "dm_control": ("embodied/envs/driven.py",),
     "OpenGL": ("embodied/gl.py", "embodied/render/classic.py"),
-    "gymnasium": ("embodied/gym_env.py", "embodied/spaces.py", "agents/"),
+    "gymnasium": ("embodied/gym/env.py", "embodied/gym/spaces.py", "agents/"),
 }
 """Heavy library -> path prefixes of the files that may import it."""
 COMPOSERS = ("embodied/cli/",)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import two_rooms
 
-import embodied.gym_env
+import embodied.gym.env
 from assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
 from embodied.envs.driven import DrivenHannaEnv, Driver, driven, total_bumps
@@ -72,12 +72,12 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
 
 
 def test_gymnasium_plays_on_wheels_too(place, tmp_path):
-    env = embodied.gym_env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
+    env = embodied.gym.env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
     o, _ = env.reset(seed=0)
     _, _, _, _, info = env.step(int(np.flatnonzero(o["action_mask"])[0]))
     assert info["bumps"] == 0
     with pytest.raises(ValueError, match="wheels"):
-        embodied.gym_env.make("hari", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
+        embodied.gym.env.make("hari", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
 
 
 class Blank:

@@ -14,18 +14,18 @@ import stable_baselines3
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
-import embodied.gym_env
+import embodied.gym.env
 from embodied.envs.base import ActionError
 from embodied.interface import Ask, Intention, Move, Stop
-from embodied.registration import IDS
-from embodied.spaces import Layout, Numbers, decode, number, text_of
+from embodied.gym.registration import IDS
+from embodied.gym.spaces import Layout, Numbers, decode, number, text_of
 from embodied.teachers.shortest import shortest_action
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")
 
 
 def make(kind: str, tmp: str, **options):
-    return embodied.gym_env.make(kind, cache=tmp, worlds={"grid": grid_world()}, **options)
+    return embodied.gym.env.make(kind, cache=tmp, worlds={"grid": grid_world()}, **options)
 
 
 @pytest.fixture
@@ -45,13 +45,13 @@ def test_the_environment_checker_has_nothing_to_say(kind, tmp):
 
 def test_all_are_registered():
     for name in ("Find", "VLN", "VNLA", "HANNA", "HARI"):
-        assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym_env:make"
+        assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym.env:make"
 
 
 @pytest.mark.parametrize("imports", ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"])
 def test_import_embodied_registers_in_any_order(imports):
     code = (f"import {imports}; import gymnasium; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
-            "('Find', 'VLN', 'VNLA', 'HANNA', 'HARI')], sys.modules.keys() & {'mujoco', 'torch', 'embodied.gym_env'})")
+            "('Find', 'VLN', 'VNLA', 'HANNA', 'HARI')], sys.modules.keys() & {'mujoco', 'torch', 'embodied.gym.env'})")
     done = subprocess.run([sys.executable, "-c", f"import sys; {code}"], check=True, capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == f"{[{'kind': kind} for kind in KINDS]} set()"
 

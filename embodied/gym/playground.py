@@ -20,7 +20,7 @@ from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
-from embodied.features import semantic_features
+from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, Task
 from embodied.language import People, PlainLanguage
 from embodied.generate.people import add_people, meet
