@@ -12,7 +12,7 @@ from embodied.evaluation import metrics
 from embodied.envs.base import ActionError, HelpEnv, TaskError
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage
-from embodied.moves import MonocularMoves, PanoramicMoves, nearest_views
+from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.evaluation.rollout import play
 from embodied.tasks.find import find_pool, find_task

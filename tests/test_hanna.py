@@ -37,7 +37,7 @@ from embodied.interface import (
     Thought,
 )
 from embodied.language.plain import PlainLanguage
-from embodied.moves import PanoramicMoves
+from embodied.action_spaces import PanoramicMoves
 from embodied.policies.baselines import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
 from embodied.evaluation.rollout import play
 from embodied.seeds import stream

@@ -54,7 +54,7 @@ from embodied.assistants.route_system import build_routes
 from embodied.envs.base import HannaEnv
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
-from embodied.moves import PanoramicMoves
+from embodied.action_spaces import PanoramicMoves
 from embodied.evaluation.rollout import play
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher

@@ -13,7 +13,7 @@ from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
-from embodied.moves import WORDS, MonocularMoves
+from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.evaluation.rollout import play
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task

@@ -34,7 +34,7 @@ from embodied.interface import (
     Stop,
     Task,
 )
-from embodied.moves import WORDS, Moves, PanoramicMoves, Reach, directions
+from embodied.action_spaces import WORDS, Moves, PanoramicMoves, Reach, directions
 from embodied.seeds import stream
 from embodied.teachers.shortest import nearest
 

@@ -24,7 +24,7 @@ from embodied.interface import (
     Reply,
     Stop,
 )
-from embodied.moves import Moves
+from embodied.action_spaces import Moves
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:

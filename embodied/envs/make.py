@@ -13,7 +13,7 @@ from embodied.envs.base import HannaEnv, HelpEnv, VnlaEnv
 from embodied.envs.hari import HariEnv
 from embodied.interface import Language, Route
 from embodied.language.plain import PlainLanguage
-from embodied.moves import PanoramicMoves
+from embodied.action_spaces import PanoramicMoves
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:

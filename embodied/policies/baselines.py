@@ -27,7 +27,7 @@ from embodied.interface import (
     Thought,
 )
 from embodied.language.plain import heard_subgoal
-from embodied.moves import WORDS
+from embodied.action_spaces import WORDS
 from embodied.teachers.shortest import ShortestTeacher, shortest_action
 from embodied.teachers.vnla import ask_reason
 

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from embodied.geometry import wrap
 from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Pose, Situation, Stop, Thought
-from embodied.moves import WORDS, MonocularMoves, directions
+from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.teachers.shortest import nearest
 
 if TYPE_CHECKING:
