@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from assets.importer import Recipe
+from assets.importing.importer import Recipe
 from assets.records import ROOM_KINDS, SUPPORTS, Asset, SupportSurface
 
 CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")

@@ -23,7 +23,7 @@ from agents.vision.config import VisionConfig
 from assets.cache import atomic_path
 from assets.catalogue import CatalogueError, load_catalogue
 from assets.materials import finish
-from assets.sh3f import CATALOGUE, PackError, open_pack
+from assets.importing.sh3f import CATALOGUE, PackError, open_pack
 from embodied import cli
 from embodied.errors import UnableError
 from embodied.fields import field_docs

@@ -11,7 +11,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
 from assets.catalogue import load_catalogue
-from assets.packs import find_packs
+from assets.importing.packs import find_packs
 from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.scene.model import collision
 from embodied.scene.model import model as scene

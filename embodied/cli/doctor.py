@@ -85,7 +85,7 @@ def renderer(_: argparse.Namespace) -> Finding:
 
 def packs(args: argparse.Namespace) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
-    from assets.packs import find_packs
+    from assets.importing.packs import find_packs
 
     remedy = "apt-get install sweethome3d-furniture (version 1.8 or later), or name existing files with --pack and folders with --own"
     try:

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from assets.obj import Material
+from assets.importing.obj import Material
 from assets.records import Finish
 
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Sequence
 from pathlib import Path
 
-from assets.sh3f import Pack, PackError, open_pack
+from assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""

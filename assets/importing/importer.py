@@ -19,11 +19,11 @@ import numpy as np
 from PIL import Image
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
-from assets.finishes import corrected, finish_of
-from assets.meshing import crease_normals, decimate, indexed, sound_faces, weld
-from assets.obj import Material, MeshError, parse_mtl, parse_obj
+from assets.importing.mtl_finish import corrected, finish_of
+from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
+from assets.importing.obj import Material, MeshError, parse_mtl, parse_obj
 from assets.records import Finish, MeshPart
-from assets.sh3f import IDENTITY, Pack, PackError
+from assets.importing.sh3f import IDENTITY, Pack, PackError
 
 VERSION = 3
 """Part of every cache key; raise it when the import changes."""
@@ -53,7 +53,7 @@ class Recipe:
     dropped: tuple[str, ...] = ()
     """Materials that are left out: shadows painted on the floor, helper planes."""
     looks: tuple[tuple[str, str], ...] = ()
-    """Material and the reviewer's words for it (assets.finishes.corrected)."""
+    """Material and the reviewer's words for it (assets.importing.mtl_finish.corrected)."""
     faces: int = 0
     """Face budget; 0 takes FACE_BUDGETS."""
     model: str = ""

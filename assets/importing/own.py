@@ -10,12 +10,12 @@ import numpy as np
 import trimesh
 
 from assets.cache import digest
-from assets.importer import RawPart, Recipe, cached, import_model, read_obj
-from assets.meshing import face_normals
-from assets.obj import MeshError
+from assets.importing.importer import RawPart, Recipe, cached, import_model, read_obj
+from assets.importing.meshing import face_normals
+from assets.importing.obj import MeshError
 from assets.records import Asset, Finish
 from assets.rows import CatalogueError, check_classes, read_json, read_models
-from assets.sh3f import MAX_ENTRY, PackError, open_pack
+from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 
 KINDS = (".glb", ".obj", ".sh3f")
 

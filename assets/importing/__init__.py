@@ -1,0 +1,1 @@
+"""Importing of furniture in one folder."""
