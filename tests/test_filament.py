@@ -9,7 +9,7 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished, painted
 
-from embodied.render.classic import filament
+from embodied.render import filament
 from embodied.scene.house_meshes import owners
 from embodied.render.classic import Renderer
 

@@ -13,7 +13,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied import gl
-from embodied.render.classic import visibility
+from embodied.render import visibility
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.scene.house_meshes import owners
 from embodied.render.classic import NEAR, Renderer, camera_at, depth_of_reversed_z

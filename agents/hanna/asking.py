@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied.policies.baselines import baselines as policies
+from embodied.policies import baselines
 from embodied.interface import Observation
 
 
@@ -38,15 +38,15 @@ ask_greedily = ask_above(0.5)
 """Ask where the network finds it more likely than not."""
 
 
-def heuristic(rule: policies.AskRule) -> AskRule:
+def heuristic(rule: baselines.AskRule) -> AskRule:
     """A rule that does not listen to the network."""
     return lambda probability, observation, last_asked, *, rng: rule(observation, last_asked, rng=rng)
 
 
 RULES: dict[str, tuple[AskRule, AskRule]] = {
     "learned": (ask_sampled, ask_greedily),
-    "never": (heuristic(policies.never_ask),) * 2,
-    "random": (heuristic(policies.ask_at_random),) * 2,
-    "every5": (heuristic(policies.ask_every_5),) * 2,
+    "never": (heuristic(baselines.never_ask),) * 2,
+    "random": (heuristic(baselines.ask_at_random),) * 2,
+    "every5": (heuristic(baselines.ask_every_5),) * 2,
 }
 """Name of a help-request policy -> its rule in training and its rule in evaluation."""

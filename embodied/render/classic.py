@@ -18,7 +18,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied.render.classic import visibility
+from embodied.render import visibility
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitPages
 from embodied.render.panorama import FACES, Panorama

@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
 from assets.cache import atomic_path
-from embodied.scene.model import model as scene
+from embodied.scene import model as scene
 from embodied.scene.part import Part
 
 COLUMNS, ROWS = 6, 4

@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 
 from assets.records import Finish, MeshPart
-from embodied.scene.model import collision
+from embodied.scene import collision
 from embodied.house.house import House, Placement
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.house_meshes import Part, house_parts, owners
