@@ -20,7 +20,8 @@ from embodied.assistants.route_system import (
     sampled_paths,
     spanning_paths,
 )
-from embodied.envs.base import ActionError, HannaEnv
+from embodied.envs.base import ActionError
+from embodied.envs.hanna import HannaEnv
 from embodied.interface import (
     VIEWS,
     Ask,

@@ -51,7 +51,7 @@ from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied.evaluation import metrics
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
-from embodied.envs.base import HannaEnv
+from embodied.envs.hanna import HannaEnv
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.action_spaces import PanoramicMoves

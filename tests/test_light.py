@@ -454,7 +454,8 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
     import cv2
 
     from embodied.light.reference import Tracer
-    from embodied.render.classic import Renderer, camera_at
+    from embodied.render.camera import camera_at
+    from embodied.render.classic import Renderer
 
     house, catalogue, _, baked = lit
     at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)

@@ -10,7 +10,8 @@ from hand_worlds import grid_world, line_world
 
 from embodied.evaluation import metrics
 from embodied.assistants.advisor import Advisor
-from embodied.envs.base import ActionError, Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
+from embodied.envs.base import ActionError
+from embodied.envs.vnla import Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.action_spaces import WORDS, MonocularMoves

@@ -21,7 +21,8 @@ from embodied.light.backend import device
 from embodied.light.baking import Bake, bake
 from embodied.light.reference import Tracer
 from embodied.navigation.graph import build_graph
-from embodied.render.classic import Renderer, camera_at
+from embodied.render.camera import camera_at
+from embodied.render.classic import Renderer
 
 AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""

@@ -19,7 +19,8 @@ from embodied.house.house import House
 from embodied.interface import Move
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import NavGraph, build_graph
-from embodied.render.classic import Renderer, face_cameras
+from embodied.render.camera import face_cameras
+from embodied.render.classic import Renderer
 from embodied.scene.model import compile_scene
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world

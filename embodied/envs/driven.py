@@ -19,7 +19,8 @@ try:
 except ImportError as e:
     raise ImportError(f"a driven body needs dm-control ({e}); pip install --no-deps dm-control") from e
 
-from embodied.envs.base import HannaEnv, HelpEnv
+from embodied.envs.base import HelpEnv
+from embodied.envs.hanna import HannaEnv
 from embodied.geometry import wrap
 from embodied.interface import Reply
 from embodied.scene.model import build_spec, owner_of_name

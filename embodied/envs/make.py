@@ -9,7 +9,9 @@ from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
-from embodied.envs.base import HannaEnv, HelpEnv, VnlaEnv
+from embodied.envs.base import HelpEnv
+from embodied.envs.hanna import HannaEnv
+from embodied.envs.vnla import VnlaEnv
 from embodied.envs.hari import HariEnv
 from embodied.interface import Language, Route
 from embodied.language.plain import PlainLanguage

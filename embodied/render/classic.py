@@ -7,7 +7,6 @@ behind walls, things outside the field of view) is left out of the list of geoms
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Self
 
 from embodied import gl
@@ -19,9 +18,10 @@ import mujoco
 import numpy as np
 
 from embodied.render import visibility
+from embodied.render.camera import Camera, View, camera_at, face_cameras
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitPages
-from embodied.render.panorama import FACES, Panorama
+from embodied.render.panorama import Panorama
 from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
 QUALITIES = ("unlit", "baked")
@@ -34,35 +34,6 @@ there than multi-sampling, which multiplies the cost of every small triangle, an
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """One perspective picture."""
-
-    rgb: np.ndarray
-    """(h, w, 3) uint8 sRGB, top row first."""
-    depth: np.ndarray
-    """(h, w) float32 metres along the optical axis; inf where nothing is (the sky)."""
-    ids: np.ndarray
-    """(h, w) int32: i + 1 for parts.owners(house)[i], 0 where nothing is."""
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A pinhole camera in world metres."""
-
-    position: tuple[float, float, float]
-    forward: tuple[float, float, float]
-    up: tuple[float, float, float]
-    vfov: float = math.pi / 2
-    """Vertical field of view, radians."""
-
-
-def camera_at(position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2) -> Camera:
-    """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
-    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    return Camera(tuple(float(x) for x in position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
 
 
 class Renderer:
@@ -260,12 +231,6 @@ def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> 
     """
     depth = near * far / (near + z.astype(np.float64) * (far - near))
     return np.where(z > 0, depth, np.inf).astype(np.float32)
-
-
-def face_cameras(position) -> list[Camera]:
-    """The cameras of the six cube faces, in the order of panorama.FACES."""
-    at = tuple(float(x) for x in position)
-    return [Camera(at, forward, up) for forward, up in FACES]
 
 
 def _check(house: House, quality: str, backend: str, size: int, lit: LitPages | None) -> None:

@@ -1,0 +1,45 @@
+"""Cameras and what they give: a pinhole camera in world metres, the six of a panorama, one perspective picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.render.panorama import FACES
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One perspective picture."""
+
+    rgb: np.ndarray
+    """(h, w, 3) uint8 sRGB, top row first."""
+    depth: np.ndarray
+    """(h, w) float32 metres along the optical axis; inf where nothing is (the sky)."""
+    ids: np.ndarray
+    """(h, w) int32: i + 1 for parts.owners(house)[i], 0 where nothing is."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera in world metres."""
+
+    position: tuple[float, float, float]
+    forward: tuple[float, float, float]
+    up: tuple[float, float, float]
+    vfov: float = math.pi / 2
+    """Vertical field of view, radians."""
+
+
+def camera_at(position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2) -> Camera:
+    """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    return Camera(tuple(float(x) for x in position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
+
+
+def face_cameras(position) -> list[Camera]:
+    """The cameras of the six cube faces, in the order of panorama.FACES."""
+    at = tuple(float(x) for x in position)
+    return [Camera(at, forward, up) for forward, up in FACES]
