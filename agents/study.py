@@ -16,19 +16,20 @@ from pathlib import Path
 import joblib
 import torch
 
-from agents.commands import about, split_of, train_agent
-from agents.evaluate import hanna_policies
+from agents.failures import hanna_policies
 from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.imitation.config import TrainingConfig
+from agents.imitation.run import split_of, train_agent
+from agents.judging import about
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
+from embodied.evaluation.tables import Row, save, shown
 from embodied.interface import Episode, Policy
 from embodied.records import episodes_file, save_lines
-from embodied.evaluation.tables import Row, save, shown
 
 Note = Callable[[str], None]
 
@@ -58,7 +59,7 @@ class Line:
     variant: str
     """Key of VARIANTS, or '' for an agent that does not learn."""
     played: str = "learned"
-    """Which of agents.evaluate.hanna_policies, or the name of an agent without learning."""
+    """Which of agents.failures.hanna_policies, or the name of an agent without learning."""
     printed: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Column to the dissertation's numbers, one per split."""
 

@@ -21,9 +21,9 @@ from assets.cache import default_cache
 from assets.importing.importer import Recipe, import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own
 from assets.importing.packs import find_packs, pack_of
+from assets.importing.sh3f import open_pack
 from assets.records import Asset, Finish, MeshPart
 from assets.rows import CatalogueError, check_classes, read_json, read_models
-from assets.importing.sh3f import open_pack
 
 DATA = Path(__file__).parent / "data"
 

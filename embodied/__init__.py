@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from embodied.generate import HouseConfig, generate_house
     from embodied.house.house import House
     from embodied.navigation.graph import NavGraph, build_graph
-    from embodied.render.panorama import Panorama
     from embodied.render.classic import Renderer
+    from embodied.render.panorama import Panorama
     from embodied.seeds import stream
     from embodied.world import World, open_world
 

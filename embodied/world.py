@@ -13,15 +13,15 @@ from tqdm import tqdm
 
 from assets.cache import digest
 from embodied import gl
-from embodied.navigation import graph as navgraph
 from embodied.house.house import House
 from embodied.house.validation import load_house
-from embodied.scene.lit_pages import LitPages
+from embodied.navigation.graph import NavGraph, build_graph
+from embodied.render.classic import Renderer
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.scene.house_meshes import Part, house_parts, owners
-from embodied.render.classic import Renderer
 from embodied.render.sightings import FACE, Sighting, SightingTable, load_table, save_table, sightings_table
+from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -38,16 +38,15 @@ KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
 ROOT = Path(__file__).resolve().parent.parent
-PICTURE_SOURCES = ("assets/**/*.py", "assets/data/*.json", "embodied/light/*.py",
-                   *(f"embodied/{m}.py" for m in ("parts", "shell", "walls", "joinery", "outdoors", "stairs", "scene",
-                                                  "visibility", "render", "panorama", "panorama_file", "sightings")))
+PICTURE_SOURCES = ("assets/**/*.py", "assets/data/*.json", "embodied/light/*.py", "embodied/house/house.py",
+                   "embodied/scene/*.py", "embodied/render/*.py")
 """Files that decide what a picture shows; a cached picture made by other versions of them is not used."""
 
 
 class World:
     """Owns, while open, a renderer (made on first need) and the panorama file (where there is one)."""
 
-    def __init__(self, house: House, catalogue: Catalogue, graph: navgraph.NavGraph, cache: Path, *, size: int = 256,
+    def __init__(self, house: House, catalogue: Catalogue, graph: NavGraph, cache: Path, *, size: int = 256,
                  quality: str = "unlit", backend: str = "classic", light: str = "normal", file: Path | None = None) -> None:
         """See `open_world`."""
         if quality not in QUALITIES:
@@ -216,7 +215,7 @@ class World:
         return table
 
 
-def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: navgraph.NavGraph | None = None, size: int = 256,
+def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: NavGraph | None = None, size: int = 256,
                quality: str = "unlit", backend: str = "classic", light: str = "normal") -> World:
     """A world over `house`; nothing is drawn until asked for.
 
@@ -229,7 +228,7 @@ def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: navgra
       backend: 'classic' or 'filament'.
       light: name of the light settings that the baked qualities use, one of embodied.light.QUALITIES.
     """
-    graph = graph or navgraph.build_graph(house, catalogue)
+    graph = graph or build_graph(house, catalogue)
     return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light)
 
 
@@ -240,7 +239,7 @@ def open_folder(folder: Path, catalogue: Catalogue, cache: Path, *, size: int = 
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
-    graph = navgraph.build_graph(house, catalogue)
+    graph = build_graph(house, catalogue)
     return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light,
                  file=folder / "panoramas.pano")
 

@@ -11,8 +11,8 @@ import numpy as np
 from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.house_meshes import house_parts
+from embodied.scene.lit_pages import LitMesh, LitPages
 
 RED, GREEN, BLUE, WOOD = (0.9, 0.05, 0.05, 1.0), (0.05, 0.8, 0.1, 1.0), (0.1, 0.15, 0.9, 1.0), (0.6, 0.4, 0.25, 1.0)
 

@@ -16,10 +16,10 @@ from assets.catalogue import DATA, load_catalogue
 from assets.importing.importer import Recipe, bounds, finish_parts, read_obj
 from assets.importing.obj import MeshError, parse_obj
 from assets.importing.packs import find_packs
-from assets.records import ROOM_KINDS, SUPPORTS
-from assets.rows import CatalogueError
 from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from assets.importing.support_surfaces import contact, find_surfaces
+from assets.records import ROOM_KINDS, SUPPORTS
+from assets.rows import CatalogueError
 
 SOME = (
     "scopia/bed1", "blendswap-cc-0/oakTable", "blendswap-cc-by/bookcase", "scopia/tubular_chair", "scopia/toaster",

@@ -22,11 +22,11 @@ from agents.imitation.config import TrainingConfig
 from agents.vision.config import VisionConfig
 from assets.cache import atomic_path
 from assets.catalogue import CatalogueError, load_catalogue
-from assets.materials import finish
 from assets.importing.sh3f import CATALOGUE, PackError, open_pack
+from assets.materials import finish
 from embodied import cli
+from embodied.cli.options import field_docs
 from embodied.errors import UnableError
-from embodied.fields import field_docs
 from embodied.generate import HouseConfig
 from embodied.house.house import House, HouseError
 from embodied.render.panorama import Panorama

@@ -9,8 +9,8 @@ from conftest import two_rooms
 import embodied.gym.env
 from assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
-from embodied.envs.driven import DrivenHannaEnv, Driver, driven, total_bumps
 from embodied.datasets.store import Place
+from embodied.envs.driven import DrivenHannaEnv, Driver, driven, total_bumps
 from embodied.envs.hanna import HannaEnv
 from embodied.interface import Ask, FindObject, Move, Pose, Route, Stop, Task
 from embodied.navigation.graph import build_graph

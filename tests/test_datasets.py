@@ -9,15 +9,15 @@ import shutil
 import pytest
 from hand_worlds import grid_world, thing
 
-from embodied.evaluation import metrics
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
 from embodied.datasets.scale import PAPER, quota, scale
 from embodied.datasets.store import Dataset, DatasetError
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
 from embodied.policies.baselines import Asking, Shortest, ask_every_5
-from embodied.evaluation.rollout import play
 from embodied.teachers.vnla import VnlaTeacher
 
 

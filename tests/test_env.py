@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied.evaluation import metrics
+from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.envs.base import ActionError, HelpEnv, TaskError
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage
-from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
-from embodied.evaluation.rollout import play
 from embodied.tasks.find import find_pool, find_task
 from embodied.tasks.goals import count_hops, find_instances
 

@@ -8,8 +8,8 @@ import math
 import pytest
 from test_datasets import build
 
-from embodied.evaluation import tables
 from embodied.cli import main
+from embodied.evaluation import tables
 from embodied.evaluation.evaluate import AGENTS, LOOKING, agent, evaluate, spread
 
 

@@ -12,8 +12,8 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied.scene.export import export_glb, export_mjcf
-from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.house_meshes import house_parts
+from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.model import compile_scene, loose
 
 

@@ -10,8 +10,8 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished, painted
 
 from embodied.render import filament
-from embodied.scene.house_meshes import owners
 from embodied.render.classic import Renderer
+from embodied.scene.house_meshes import owners
 
 EYE = (2.5, 2.6, 1.2)
 

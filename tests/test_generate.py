@@ -20,9 +20,9 @@ from embodied.generate.footprint import draw_footprint
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.stages import Draft
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
+from embodied.navigation.free_space import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
-from embodied.navigation.free_space import inward
 
 SEEDS = 24
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}

@@ -16,9 +16,9 @@ from hand_worlds import grid_world
 
 import embodied.gym.env
 from embodied.envs.base import ActionError
-from embodied.interface import Ask, Intention, Move, Stop
 from embodied.gym.registration import IDS
 from embodied.gym.spaces import Layout, Numbers, decode, number, text_of
+from embodied.interface import Ask, Intention, Move, Stop
 from embodied.teachers.shortest import shortest_action
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")

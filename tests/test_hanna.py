@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied.evaluation import metrics
+from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
 from embodied.assistants.route_system import (
     RouteConfig,
@@ -22,6 +22,8 @@ from embodied.assistants.route_system import (
 )
 from embodied.envs.base import ActionError
 from embodied.envs.hanna import HannaEnv
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import (
     VIEWS,
     Ask,
@@ -38,9 +40,15 @@ from embodied.interface import (
     Thought,
 )
 from embodied.language.plain import PlainLanguage
-from embodied.action_spaces import PanoramicMoves
-from embodied.policies.baselines import Asking, PerfectInterpreter, RandomWalk, Shortest, ask_at_random, ask_every_5, never_ask
-from embodied.evaluation.rollout import play
+from embodied.policies.baselines import (
+    Asking,
+    PerfectInterpreter,
+    RandomWalk,
+    Shortest,
+    ask_at_random,
+    ask_every_5,
+    never_ask,
+)
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
 from embodied.tasks.hanna import hanna_pool, hanna_task

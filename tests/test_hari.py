@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world, room, thing
 
-from embodied.evaluation import metrics
 from embodied.assistants.descriptions import Describer, DescriberConfig, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariEnv, shaped_costs
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.policies.baselines import HalfwaySkyline, Shortest
-from embodied.evaluation.rollout import play
 from embodied.tasks.goals import count_hops
 from embodied.tasks.hari import hari_pool, hari_task
 

@@ -22,6 +22,7 @@ from hand_worlds import grid_world
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
+from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.imitation.checkpoint import CheckpointError
 from agents.imitation.collect import collect, imitation_loss
 from agents.imitation.config import SCALES, TrainingConfig
@@ -47,15 +48,14 @@ from agents.imitation.training import (
     train,
 )
 from agents.vision.bank import FeatureBank
-from agents.vocabulary import Vocabulary, build_vocabulary, tokenize
-from embodied.evaluation import metrics
+from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
-from embodied.action_spaces import PanoramicMoves
-from embodied.evaluation.rollout import play
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher
 

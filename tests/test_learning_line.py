@@ -11,13 +11,18 @@ import pytest
 import torch
 from test_datasets import build
 
-from agents import commands, options
 from agents import study as module
-from agents.evaluate import failures, hanna_policies, predictions, request_share
-from agents.hanna.agent import load_agent
+from agents.failures import failures, hanna_policies, predictions, request_share
+from agents.hanna.agent import load_agent, new_agent
+from agents.imitation.config import SCALES
+from agents.imitation.run import run_train_hanna, split_of, vocabulary_of
+from agents.judging import run_eval
+from agents.shipped import WEIGHTS
 from agents.study import Setting, run_study
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
+from agents.vision.run import encoder_of
+from embodied.cli import learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
@@ -25,6 +30,10 @@ torch.set_num_threads(1)
 SMALL = ["--hidden-size", "16", "--navigation-embedding", "16", "--ask-embedding", "8", "--self-heads", "2", "--text-heads",
          "2", "--batch", "4", "--training-steps", "6", "--evaluation-steps", "8", "--validation-tasks", "3",
          "--validate-every", "1", "--threads", "1", "--network", "random"]
+
+
+def train_hanna(arguments, note=print, **more):
+    return run_train_hanna(arguments, learning.chosen(arguments, SCALES[arguments.scale]), note, **more)
 
 
 def parsed(add, *words):
@@ -49,8 +58,8 @@ def data(tmp_path_factory):
 
 def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
     lines = []
-    run = lambda updates: commands.run_train_hanna(
-        parsed(options.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL, "--iterations", updates),
+    run = lambda updates: train_hanna(
+        parsed(learning.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL, "--iterations", updates),
         lines.append,
     )
     assert run(2) == 0
@@ -59,10 +68,10 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
     assert len((tmp_path / "validation.jsonl").read_text().splitlines()) == 3
     said = []
     judge = parsed(
-        options.add_eval, "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random",
+        learning.add_eval, "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random",
         "--tasks", 4, "--out", tmp_path / "table", "--threads", 1,
     )
-    assert commands.run_eval(judge, said.append) == 0
+    assert run_eval(judge, said.append) == 0
     table = (tmp_path / "table" / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
         assert f"| {row} |" in table
@@ -73,9 +82,9 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
-    config = commands.chosen(parsed(options.add_train_hanna, "--data", ".", "--out", ".", *SMALL), options.SCALES["mini"])
-    bank = commands.split_of(data, "test_unseen", random_encoder(seed=0)).bank
-    agent = commands.new_agent(config, commands.vocabulary_of(data), bank.digest, bank.size)
+    config = learning.chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
+    bank = split_of(data, "test_unseen", random_encoder(seed=0)).bank
+    agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
     policies = hanna_policies(agent, bank)
@@ -97,7 +106,7 @@ def study(data, tmp_path):
         place = data.place(name)
         features = stream(0, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
         save_features(feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest)
-    config = commands.chosen(parsed(options.add_train_hanna, "--data", ".", "--out", ".", *SMALL), options.SCALES["mini"])
+    config = learning.chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
     config = dataclasses.replace(config, iterations=2)
     return Setting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
 
@@ -139,19 +148,19 @@ def test_an_unknown_study_is_refused_before_anything_is_trained(study):
 
 def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     encoder = random_encoder(seed=0)
-    some, every = (commands.split_of(data, "train", encoder, houses=n) for n in (1, None))
+    some, every = (split_of(data, "train", encoder, houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
-    assert len(commands.vocabulary_of(data, 1).words) <= len(commands.vocabulary_of(data).words)
+    assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)
 
 
 def test_missing_features_and_wrong_rows_are_named(data, tmp_path):
-    arguments = parsed(options.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL[:-2])
+    arguments = parsed(learning.add_train_hanna, "--data", data.folder, "--out", tmp_path, *SMALL[:-2])
     if SHIPPED.exists():
         with pytest.raises(FileNotFoundError, match="embodied features"):
-            commands.run_train_hanna(arguments, lambda line: None)
+            train_hanna(arguments, lambda line: None)
     with pytest.raises(ValueError, match="unknown network 'resnet1'"):
-        commands.encoder_of(parsed(options.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1"))
+        encoder_of(parsed(learning.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1"))
 
 
 def _empty(folder):
@@ -164,6 +173,6 @@ def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():
     encoder, agent = load_encoder(), load_agent()
     assert agent.encoder_digest == encoder.digest
     assert agent.feature_size == encoder.size
-    assert sum(p.stat().st_size for p in options.WEIGHTS.iterdir()) < 15e6
+    assert sum(p.stat().st_size for p in WEIGHTS.iterdir()) < 15e6
     look = encoder.encode_strips(np.zeros((1, 192, 576, 3), np.uint8))
     assert look.shape == (1, 36, encoder.size) and np.isfinite(look).all()

@@ -15,6 +15,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
 from assets.records import Finish, MeshPart
+from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import (
     LightError,
@@ -32,15 +33,14 @@ from embodied.light import (
 )
 from embodied.light.atlas import Thing, atlas_of, coarsened, things_of
 from embodied.light.backend import array, drjit, find_llvm, mitsuba, variant_of
-from embodied.bench.light import psnr, ssim
 from embodied.light.denoise import lift_specks, neighbours
 from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
-from embodied.scene.part import Part
 from embodied.navigation.free_space import inward
+from embodied.scene.part import Part
 
 TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)
 DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))

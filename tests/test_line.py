@@ -17,12 +17,12 @@ import pytest
 from assets.catalogue import load_catalogue
 from embodied.cli import main
 from embodied.envs.base import HelpEnv
+from embodied.evaluation.metrics import spl, success
+from embodied.evaluation.rollout import play, rollout
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.language import People
-from embodied.evaluation.metrics import spl, success
 from embodied.policies.baselines import RandomWalk, Shortest
-from embodied.evaluation.rollout import play, rollout
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 from viz.blueprint import episode_blueprint

@@ -16,8 +16,8 @@ from conftest import two_rooms
 from assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house.house import HouseError, Placement
-from embodied.navigation.graph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 from embodied.navigation.free_space import EYE, free_floor, leaves, sight_floor
+from embodied.navigation.graph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 

@@ -12,10 +12,10 @@ from hand_worlds import grid_world, thing
 
 from assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
+from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Placement, check
 from embodied.navigation.graph import RADIUS
-from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")

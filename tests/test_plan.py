@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from conftest import two_rooms
 
+from embodied.house.floor_plan import INK, ROOM_COLOURS, draw_plan, save_plan
 from embodied.house.house import Placement
 from embodied.navigation.graph import build_graph
-from embodied.house.floor_plan import INK, ROOM_COLOURS, draw_plan, save_plan
 
 SCALE = 60.0
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_hanna import LINE_TASK, grid_setup, line_env
 
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, FollowRoute, Move, Pose, Route, Stop, Task, Thought
 from embodied.policies.baselines import Asking, Shortest, ask_at_random
 from embodied.records import RecordError, from_json, load_lines, save_lines, to_json
-from embodied.evaluation.rollout import play
 
 
 def test_episodes_with_replies_survive():

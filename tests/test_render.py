@@ -14,10 +14,10 @@ from handmade import HandCatalogue, furnished
 
 from embodied import gl
 from embodied.render import visibility
-from embodied.render.panorama import face_rays, ray_stretch
-from embodied.scene.house_meshes import owners
 from embodied.render.camera import camera_at
 from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z
+from embodied.render.panorama import face_rays, ray_stretch
+from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
 
 EYE = (2.5, 2.6, 1.2)

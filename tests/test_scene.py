@@ -13,12 +13,12 @@ from handmade import HandCatalogue, box_mesh, furnished
 from assets.catalogue import load_catalogue
 from assets.importing.packs import find_packs
 from assets.records import Asset, Finish, MeshPart, SupportSurface
-from embodied.scene import collision
-from embodied.scene import model as scene
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
-from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene import collision
+from embodied.scene import model as scene
 from embodied.scene.house_meshes import house_parts, owners
+from embodied.scene.lit_pages import LitMesh, LitPages
 
 
 @pytest.fixture(scope="module")

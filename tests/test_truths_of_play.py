@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world
 
-from embodied.evaluation import metrics
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.parts import part_tasks
 from embodied.envs.make import environment_maker
+from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import AGENTS, LOOKING, agent
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
-from embodied.evaluation.rollout import play
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")
 

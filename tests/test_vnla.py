@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied.evaluation import metrics
+from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
 from embodied.envs.vnla import Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
-from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
-from embodied.evaluation.rollout import play
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason, stepwise_action
 

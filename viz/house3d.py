@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
-from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.house_meshes import Part
+from embodied.scene.lit_pages import LitMesh, LitPages
 
 BUDGET = 500
 """Triangles kept per mesh of an object; the shell is left as it is."""

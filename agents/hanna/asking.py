@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied.policies import baselines
 from embodied.interface import Observation
+from embodied.policies import baselines
 
 
 class AskRule(Protocol):

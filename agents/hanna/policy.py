@@ -16,8 +16,8 @@ from agents.hanna.asking import RULES, AskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.hanna.vocabulary import Vocabulary
 from agents.vision.bank import FeatureBank
-from agents.vocabulary import Vocabulary
 from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action
 

@@ -20,8 +20,8 @@ from torch import Tensor
 from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
 from agents.imitation.losses import IGNORE, help_loss, navigation_loss
 from embodied.envs.base import HelpEnv
-from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher
 from embodied.evaluation.rollout import rollout
+from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher
 
 if TYPE_CHECKING:
     from embodied.world import World

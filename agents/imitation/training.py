@@ -34,11 +34,11 @@ from agents.imitation.checkpoint import Progress, load_checkpoint, save_checkpoi
 from agents.imitation.collect import Experience, collect, imitation_loss
 from agents.imitation.losses import IGNORE
 from agents.vision.bank import FeatureBank
-from embodied.evaluation import metrics
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
-from embodied.interface import Ask, Episode, Task, Teacher
+from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.interface import Ask, Episode, Task, Teacher
 from embodied.seeds import stream
 
 if TYPE_CHECKING:

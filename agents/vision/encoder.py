@@ -14,7 +14,7 @@ import safetensors.torch
 import torch
 from torch import Tensor
 
-from agents.options import SHIPPED_ENCODER
+from agents.shipped import SHIPPED_ENCODER
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise, read_weights
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from assets.cache import atomic_path

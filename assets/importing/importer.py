@@ -19,11 +19,11 @@ import numpy as np
 from PIL import Image
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
-from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
+from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import Material, MeshError, parse_mtl, parse_obj
-from assets.records import Finish, MeshPart
 from assets.importing.sh3f import IDENTITY, Pack, PackError
+from assets.records import Finish, MeshPart
 
 VERSION = 3
 """Part of every cache key; raise it when the import changes."""

@@ -13,9 +13,9 @@ from assets.cache import digest
 from assets.importing.importer import RawPart, Recipe, cached, import_model, read_obj
 from assets.importing.meshing import face_normals
 from assets.importing.obj import MeshError
+from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from assets.records import Asset, Finish
 from assets.rows import CatalogueError, check_classes, read_json, read_models
-from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 
 KINDS = (".glb", ".obj", ".sh3f")
 

@@ -38,8 +38,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
-    from embodied.datasets.matterport import export
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
+    from embodied.datasets.matterport import export
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 

@@ -70,9 +70,9 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
 def inhabited(house, catalogue, args: argparse.Namespace):
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
+    from embodied.generate.people import add_people, meet
     from embodied.language import People
     from embodied.navigation.graph import build_graph
-    from embodied.generate.people import add_people, meet
     from embodied.world import open_world
 
     graph = build_graph(house, catalogue)
@@ -86,9 +86,9 @@ def inhabited(house, catalogue, args: argparse.Namespace):
 def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.envs.make import environment_maker
+    from embodied.evaluation.rollout import play
     from embodied.language import People
     from embodied.policies.baselines import Shortest
-    from embodied.evaluation.rollout import play
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
@@ -101,15 +101,15 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
 
     Its features come from plainly drawn panoramas, the kind that its encoder learned from.
     """
-    from agents.commands import FACES
-    from agents.evaluate import hanna_policies
+    from agents.failures import hanna_policies
     from agents.hanna.agent import load_agent
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
+    from agents.vision.run import FACES
     from embodied.envs.make import environment_maker
-    from embodied.language import People
     from embodied.evaluation.rollout import play
+    from embodied.language import People
     from embodied.tasks.hanna import hanna_pool, hanna_task
     from embodied.world import open_world
 

@@ -37,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from assets.cache import write_bytes
-    from embodied.evaluation import tables
     from embodied.datasets.store import Dataset
+    from embodied.evaluation import tables
     from embodied.evaluation.evaluate import AGENTS, LOOKING, agent, evaluate
     from embodied.records import episodes_file, fingerprint, save_lines
 

@@ -12,12 +12,12 @@ from embodied.cli.common import note
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    from agents import options
+    from embodied.cli import learning
 
-    options.add_features(parser)
+    learning.add_features(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents import commands
+    from agents.vision import run as vision
 
-    return commands.run_features(args, note)
+    return vision.run_features(args, note)

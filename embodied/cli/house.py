@@ -30,9 +30,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.scene.export import export_glb, export_mjcf
-    from embodied.navigation.graph import build_graph, to_matterport
     from embodied.house.floor_plan import save_plan
+    from embodied.navigation.graph import build_graph, to_matterport
+    from embodied.scene.export import export_glb, export_mjcf
 
     catalogue, config = catalogue_of(args), read_options(args, HouseConfig)
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:

@@ -8,12 +8,12 @@ from embodied.cli.common import bar
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    from agents import options
+    from embodied.cli import learning
 
-    options.add_eval(parser)
+    learning.add_eval(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents import commands
+    from agents import judging
 
-    return commands.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))
+    return judging.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))

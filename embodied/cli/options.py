@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import dataclasses
+import inspect
+import itertools
+import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
-
-from embodied.fields import field_docs
 
 METAVARS = {int: "N", float: "X", str: "WORD"}
 
@@ -56,3 +58,13 @@ def _scalar(hint: typing.Any) -> tuple[type, str | int | None]:
         items = typing.get_args(hint)
         return items[0], "+" if Ellipsis in items else len(items)
     return hint, None
+
+
+def field_docs(kind: type) -> dict[str, str]:
+    """Field name to the docstring that stands below it in the source, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body
+    docs = {}
+    for field, doc in itertools.pairwise(body):
+        if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
+            docs[field.target.id] = " ".join(str(doc.value.value).split())
+    return docs

@@ -40,9 +40,9 @@ def run(args: argparse.Namespace) -> int:
 def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
-    from embodied.language import People
     from embodied.evaluation.metrics import PER_EPISODE
     from embodied.evaluation.rollout import play
+    from embodied.language import People
     from embodied.tasks.find import find_pool, find_task
 
     if args.episodes < 1:

@@ -15,15 +15,15 @@ from embodied.cli.common import note
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    from agents import options
+    from embodied.cli import learning
 
-    options.add_study(parser)
+    learning.add_study(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     from agents.imitation.config import SCALES
-    from agents.options import chosen
     from agents.study import Setting, run_study
+    from embodied.cli.learning import chosen
 
     setting = Setting(
         args.data, args.encoder, args.out, chosen(args, SCALES[args.scale]), args.tasks, args.judge_seed, args.device,

@@ -18,13 +18,13 @@ WATCHED = 2
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    from agents import options
+    from embodied.cli import learning
 
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     vision = kinds.add_parser("vision", help="the encoder, on renders of a data set's training houses", description=run_vision.__doc__)
-    options.add_train_vision(vision)
+    learning.add_train_vision(vision)
     hanna = kinds.add_parser("hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__)
-    options.add_train_hanna(hanna)
+    learning.add_train_hanna(hanna)
     hanna.add_argument("--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder")
 
 
@@ -34,16 +34,20 @@ def run(args: argparse.Namespace) -> int:
 
 def run_vision(args: argparse.Namespace) -> int:
     """Draw the houses of a data set, teach an encoder to name and place what is in them, and read how well it sees."""
-    from agents import commands
+    from agents.vision.config import VisionConfig
+    from agents.vision.run import run_train_vision
+    from embodied.cli.learning import chosen
 
-    return commands.run_train_vision(args, note)
+    return run_train_vision(args, chosen(args, VisionConfig()), note)
 
 
 def run_hanna(args: argparse.Namespace) -> int:
     """Teach an agent by imitation to navigate, to ask for help and to follow it, on data that `embodied features` prepared."""
-    from agents import commands
+    from agents.imitation.config import SCALES
+    from agents.imitation.run import run_train_hanna
+    from embodied.cli.learning import chosen
 
-    return commands.run_train_hanna(args, note, on_validation=_recorder(args) if args.rrd else None)
+    return run_train_hanna(args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None)
 
 
 def _recorder(args: argparse.Namespace):

@@ -20,18 +20,19 @@ from embodied.assistants.route_system import WORDINGS, route_paths, spanning_pat
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, Split, quota, scale
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.people import add_people, meet
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
-from embodied.generate.people import add_people, meet
 from embodied.records import save_lines
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
-MAKERS = ("assets", "embodied/assistants", "embodied/datasets", "embodied/generate", "embodied/language", "embodied/tasks", "embodied")
+MAKERS = ("assets", "embodied/assistants", "embodied/datasets", "embodied/generate", "embodied/house",
+          "embodied/language", "embodied/navigation", "embodied/render", "embodied/scene", "embodied/tasks", "embodied")
 """Folders of the code and the catalogue that decide what is in a data set; of the last, its own modules only."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
 SEEDS = 12

@@ -28,9 +28,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assets.cache import atomic_path, write_bytes
+from embodied.action_spaces import directions, nearest_views
 from embodied.geometry import heading_of_yaw, wrap
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Pose, Route, Task
-from embodied.action_spaces import directions, nearest_views
 from embodied.navigation.graph import to_matterport
 from embodied.teachers.vnla import VnlaTeacher
 

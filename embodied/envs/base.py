@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-
+from embodied.action_spaces import Moves, PanoramicMoves, Reach
 from embodied.interface import (
     Action,
     Ask,
@@ -29,7 +29,6 @@ from embodied.interface import (
     Stop,
     Task,
 )
-from embodied.action_spaces import Moves, PanoramicMoves, Reach
 from embodied.seeds import stream
 
 if TYPE_CHECKING:

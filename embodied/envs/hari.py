@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
 from embodied.envs.base import HelpEnv
 from embodied.interface import (
@@ -24,7 +25,6 @@ from embodied.interface import (
     Reply,
     Stop,
 )
-from embodied.action_spaces import Moves
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
-from embodied.envs.vnla import VnlaEnv
 from embodied.envs.hari import HariEnv
+from embodied.envs.vnla import VnlaEnv
 from embodied.interface import Language, Route
 from embodied.language.plain import PlainLanguage
-from embodied.action_spaces import PanoramicMoves
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:

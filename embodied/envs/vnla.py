@@ -9,7 +9,7 @@ import numpy as np
 from embodied.action_spaces import WORDS, Reach, directions
 from embodied.envs.base import HelpEnv
 from embodied.geometry import wrap
-from embodied.interface import STEP, Action, Ask, Mode, Move, Observation, Pose, Reply, Situation, Intention, Stop
+from embodied.interface import STEP, Action, Ask, Intention, Mode, Move, Observation, Pose, Reply, Situation, Stop
 from embodied.teachers.shortest import nearest
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import Row, row
 from embodied.interface import Episode, Policy, Task
-from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
 from embodied.policies.baselines import (
     Asking,
     Forward10,
@@ -20,8 +21,7 @@ from embodied.policies.baselines import (
     ask_every_5,
     never_ask,
 )
-from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Row, row
+from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from embodied.house.house import House, HouseError
-from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
 from embodied.navigation.free_space import HEAD, STEP, footprint
+from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
 """Words of object classes that are moved out of the way last."""

@@ -21,9 +21,9 @@ from embodied.generate.openings import draw_openings
 from embodied.generate.program import Space, draw_area, draw_program
 from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
+from embodied.navigation.free_space import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
-from embodied.navigation.free_space import inward
 
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""

@@ -17,12 +17,12 @@ from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
-from embodied.gym.semantic_features import FeatureTable
-from embodied.interface import FeatureSource, Observation, Task
 from embodied.evaluation.metrics import PER_EPISODE
-from embodied.house.floor_plan import draw_plan, font
 from embodied.gym.playground import make_playground
+from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
+from embodied.house.floor_plan import draw_plan, font
+from embodied.interface import FeatureSource, Observation, Task
 
 if TYPE_CHECKING:
     from embodied.world import World

@@ -20,10 +20,10 @@ from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
+from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, Task
 from embodied.language import People, PlainLanguage
-from embodied.generate.people import add_people, meet
 from embodied.world import World, open_world
 
 if TYPE_CHECKING:

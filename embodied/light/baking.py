@@ -37,9 +37,9 @@ from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
 from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import Exposure, expose
 from embodied.light.unwrap import areas_of
+from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.part import Part
-from embodied.scene.house_meshes import house_parts, owners
 
 Progress = Callable[[str, float], None]
 

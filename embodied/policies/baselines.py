@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from embodied.action_spaces import WORDS
 from embodied.interface import (
     Action,
     Ask,
@@ -27,7 +28,6 @@ from embodied.interface import (
     Thought,
 )
 from embodied.language.plain import heard_subgoal
-from embodied.action_spaces import WORDS
 from embodied.teachers.shortest import ShortestTeacher, shortest_action
 from embodied.teachers.vnla import ask_reason
 

@@ -17,11 +17,11 @@ import cv2
 import mujoco
 import numpy as np
 
+from embodied.house.house import House
 from embodied.render import visibility
 from embodied.render.camera import Camera, View, camera_at, face_cameras
-from embodied.house.house import House
-from embodied.scene.lit_pages import LitPages
 from embodied.render.panorama import Panorama
+from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
 QUALITIES = ("unlit", "baked")

@@ -23,8 +23,8 @@ import shapely
 
 from embodied.errors import UnableError
 from embodied.house.house import House
-from embodied.scene.lit_pages import LitPages
 from embodied.render.camera import Camera
+from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec
 
 EXPOSURE = 0.73

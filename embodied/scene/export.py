@@ -15,8 +15,8 @@ import trimesh
 from assets.cache import write_bytes
 from assets.records import Finish
 from embodied.house.house import House
-from embodied.scene.lit_pages import LitPages
 from embodied.scene.house_meshes import Part, house_parts
+from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec, load_texture
 
 MESHES, TEXTURES = "meshes", "textures"

@@ -19,8 +19,8 @@ from assets.records import Finish
 from embodied.house.house import House, Opening
 from embodied.scene.outdoors import facade_finish
 from embodied.scene.part import Part
-from embodied.seeds import stream
 from embodied.scene.walls import floor_turn, turned_uv
+from embodied.seeds import stream
 
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
 """Owners of an opening are '<opening>/<piece>'."""

@@ -23,10 +23,10 @@ import mujoco
 import numpy as np
 
 from assets.records import Finish, MeshPart
-from embodied.scene import collision
 from embodied.house.house import House, Placement
-from embodied.scene.lit_pages import LitPages
+from embodied.scene import collision
 from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.lit_pages import LitPages
 from embodied.scene.shell import shell_parts
 
 VISUAL, COLLISION = 2, 3

@@ -23,8 +23,8 @@ from assets.built.primitives import (
 from assets.records import Finish
 from embodied.house.house import House
 from embodied.scene.part import Part
-from embodied.seeds import stream
 from embodied.scene.walls import hole_on, room_union, wall_face
+from embodied.seeds import stream
 
 GROUND_DROP = 0.15
 """How far the ground lies below the ground floor, metres."""

@@ -15,10 +15,8 @@ import numpy as np
 
 from assets.built.primitives import Shape, flat, joined, part, quads
 from assets.records import Finish
-from embodied.scene.model import joinery
-from embodied.scene.model import outdoors
-from embodied.scene.model import stairs
 from embodied.house.house import House, Opening, Room
+from embodied.scene import joinery, outdoors, stairs
 from embodied.scene.part import Part
 from embodied.scene.walls import floor_turn, hole_on, inset, turned_uv, wall_face
 

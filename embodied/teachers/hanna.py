@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Situation, Step, Stop
 from embodied.action_spaces import PanoramicMoves
+from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Situation, Step, Stop
 from embodied.teachers.shortest import nearest, shortest_action
 
 if TYPE_CHECKING:

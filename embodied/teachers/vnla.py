@@ -11,9 +11,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.geometry import wrap
 from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Pose, Situation, Stop, Thought
-from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.teachers.shortest import nearest
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Options of the commands that learn: `embodied train vision | hanna`, `embodied features`, `embodied eval --learned`.
 
-Free of torch, so that `embodied --help` answers at once; what they do is in agents.commands.
+Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run, agents.imitation.run and agents.judging.
 """
 
 from __future__ import annotations
@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.imitation.config import SCALES, TrainingConfig
+from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import VisionConfig
 from assets.cache import default_cache
-from embodied.fields import field_docs
+from embodied.cli.options import field_docs
 
 METAVARS = {int: "N", float: "X", str: "WORD"}
-WEIGHTS = Path(__file__).resolve().parent / "weights"
-"""What this repository ships; see its README.md."""
-SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,86 @@
+"""What the commands of imitation learning do: a data set with features becomes a split, a split an agent."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import torch
+
+from agents.hanna.agent import load_agent, new_agent, take_weights
+from agents.hanna.vocabulary import Vocabulary, build_vocabulary
+from agents.imitation.checkpoint import Progress
+from agents.imitation.config import TrainingConfig
+from agents.imitation.parallel import join_launcher, one_voice
+from agents.imitation.training import Split, train
+from agents.vision.encoder import Encoder
+from agents.vision.features import feature_path, load_bank
+from agents.vision.run import encoder_of
+from embodied.datasets.store import Dataset
+from embodied.evaluation.evaluate import spread
+from embodied.interface import Episode
+from embodied.teachers.hanna import HannaTeacher
+
+Note = Callable[[str], None]
+
+
+def split_of(
+    data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None, houses: int | None = None
+) -> Split:
+    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses."""
+    names = data.names(name)[:houses]
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in names}
+    tasks = [t for t in data.tasks(name) if t.world in paths]
+    return Split(
+        data.places(name), tasks if limit is None else spread(tasks, limit), data.environment(name),
+        load_bank(paths, encoder.digest).to(device),
+    )
+
+
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+    """Words of the training split's first `houses` houses: requests and the routes that training hears."""
+    names = data.names("train")[:houses]
+    routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
+    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], least=2)
+
+
+def run_train_hanna(
+    args: argparse.Namespace, config: TrainingConfig, note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> int:
+    """Train an agent on a data set's training houses, validating on its unseen validation houses."""
+    torch.set_num_threads(args.threads)
+    train_agent(
+        Dataset(args.data), encoder_of(args), config, args.out,
+        device=join_launcher(args.device), minutes=args.minutes, begin=args.begin, note=note, on_validation=on_validation,
+    )
+    return 0
+
+
+def train_agent(
+    data: Dataset, encoder: Encoder, config: TrainingConfig, folder: Path, *, device: str = "cpu",
+    minutes: float | None = None, begin: Path | None = None, note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> Progress:
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.imitation.training.train.
+
+    Args:
+      begin: a trained agent whose weights and words a new run begins with.
+
+    Raises:
+      ValueError: `begin` has networks of other sizes, or learned from another encoder.
+    """
+    houses, note = config.training_houses or None, one_voice(note)
+    training = split_of(data, "train", encoder, device, houses=houses)
+    validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
+    other = None if begin is None else load_agent(begin)
+    agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.digest, encoder.size)
+    if other is not None:
+        take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
+        note(f"new runs begin with the weights of {begin}")
+    agent.network.to(device)
+    parameters = sum(p.numel() for p in agent.network.parameters())
+    count = len({t.world for t in training.tasks})
+    note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
+    return train(agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation)

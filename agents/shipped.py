@@ -1,0 +1,8 @@
+"""Where the weights that ship with this repository are; agents/weights/README.md says how they were made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+WEIGHTS = Path(__file__).resolve().parent / "weights"
+SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"

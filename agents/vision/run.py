@@ -1,0 +1,147 @@
+"""What the commands of the encoder do: train it, and make features with it.
+
+What belongs to viz, such as recordings, is passed in from the console command as a function.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import joblib
+import numpy as np
+import torch
+
+from agents.imitation.parallel import check_device
+from agents.vision.config import VisionConfig
+from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
+from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
+from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
+from agents.vision.probe import Labelled, read
+from agents.vision.strip import view_of_strip
+from agents.vision.training import save_training, train_encoder, trained_classes, whitened
+from assets.cache import write_json
+from assets.catalogue import load_catalogue
+from embodied.datasets.store import Dataset
+from embodied.interface import VIEWS
+
+Note = Callable[[str], None]
+FACES = 192
+"""Side of the cube faces from which features are made: the strip's resolution."""
+
+
+def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note = print) -> int:
+    """Render strips of all houses, train on the training houses, judge on the others, save.
+
+    What is there already, strips or an encoder of the same settings, is not made again.
+    """
+    torch.set_num_threads(args.threads)
+    data = Dataset(args.data)
+    train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
+    train_names = train_names[: config.training_houses or None]
+    missing = [n for n in (*train_names, *test_names) if not _strips_path(args, n).exists()]
+    jobs = (joblib.delayed(_draw_strips)(data, n, args) for n in missing)
+    for name in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
+        note(f"drawn: {name}")
+    strips = {n: HouseStrips.load(_strips_path(args, n)) for n in (*train_names, *test_names)}
+    seen = [strips[n] for n in train_names]
+    classes = trained_classes(args.out, config)
+    if classes is None:
+        encoder, heads, classes = train_encoder(seen, config, note=note)
+        save_training(whitened(encoder, seen), heads, classes, config, args.out)
+    encoder = load_encoder(args.out / "encoder.safetensors")
+    untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
+    numbers = {}
+    for name, who, alone in (("trained", encoder, False), ("trained, each view alone", encoder, True), ("random", untrained, False)):
+        began = time.perf_counter()
+        halves = [labelled(data, [strips[n] for n in names], who, classes, alone=alone) for names in (train_names, test_names)]
+        spent = time.perf_counter() - began
+        reading = read(*halves, seed=config.seed)
+        numbers[name] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
+        numbers[name]["nodes per second"] = sum(len(h.room) for h in halves) / spent
+        numbers[name]["ap by class"] = dict(zip(classes, reading.ap, strict=True))
+        note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
+    write_json(args.out / "readings.json", numbers, indent=1)
+    return 0
+
+
+def labelled(
+    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str], *, alone: bool = False
+) -> Labelled:
+    """Features of houses and what a linear reader should read from them.
+
+    Args:
+      alone: the network looks at each of the 36 views by itself, four times the work, instead of
+        once at the strip that they overlap in.
+    """
+    columns = [houses[0].classes.index(c) for c in classes]
+    encode = encoder.encode_strips
+    if alone:
+        encode = lambda strips: encoder.encode_views(
+            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips]))
+    features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
+    return Labelled(
+        np.concatenate(features), np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
+        np.concatenate([h.room for h in houses]).astype(np.int64),
+        np.concatenate([mean_log_depth_of_views(h.log_depth) for h in houses]),
+        np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
+        np.concatenate([data.place(h.name).graph.positions for h in houses]),
+    )
+
+
+def _strips_path(args: argparse.Namespace, name: str) -> Path:
+    return args.out / "strips" / f"{name}.npz"
+
+
+def _draw_strips(data: Dataset, name: str, args: argparse.Namespace) -> str:
+    catalogue = load_catalogue(args.cache)
+    with data.open_world(name, catalogue, args.cache, size=FACES) as world:
+        look(world, all_classes(catalogue)).save(_strips_path(args, name))
+    return name
+
+
+def _houses(data: Dataset, splits: Sequence[str]) -> list[str]:
+    return list(dict.fromkeys(n for s in splits for n in data.names(s)))
+
+
+# Features ----------------------------------------------------------------------------------------
+
+def encoder_of(args: argparse.Namespace) -> Encoder:
+    """The encoder that --encoder and --network describe."""
+    if args.network == "random":
+        return random_encoder(seed=0)
+    return imagenet_encoder(args.network, args.encoder) if args.network else load_encoder(args.encoder)
+
+
+def run_features(args: argparse.Namespace, note: Note = print) -> int:
+    """Features of every house of a data set; houses that have them are skipped."""
+    check_device(args.device)
+    data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
+    missing = [n for n in _houses(data, data.splits) if not _has_features(data, n, encoder)]
+    jobs = (joblib.delayed(_make_features)(data, n, encoder, args) for n in missing)
+    for line in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
+        note(line)
+    note(f"{len(missing)} houses made, encoder {encoder.digest[:16]}")
+    return 0
+
+
+def _has_features(data: Dataset, name: str, encoder: Encoder) -> bool:
+    """False: missing, damaged, or of another house."""
+    path = feature_path(data.folder / "features", encoder.digest, name)
+    try:
+        load_features(path, encoder=encoder.digest, source=data.place(name).house.digest)
+        return True
+    except (FileNotFoundError, ValueError):
+        return False
+
+
+def _make_features(data: Dataset, name: str, encoder: Encoder, args: argparse.Namespace) -> str:
+    torch.set_num_threads(args.threads)
+    with data.open_world(name, load_catalogue(args.cache), args.cache, size=FACES, quality=args.quality) as world:
+        panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
+        path = feature_path(data.folder / "features", encoder.digest, name)
+        save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest)
+        return f"{name}: {len(world.graph.positions)} nodes"
