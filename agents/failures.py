@@ -65,9 +65,7 @@ def failures(episodes: Sequence[Episode], worlds: dict[str, World]) -> Failures:
     left, wrong = 0, 0
     for e in episodes:
         graph = worlds[e.task.world].graph
-        near = [
-            graph.distance[v, nearest(graph, v, e.task.goal_nodes)] <= e.task.radius + 1e-9 for v in e.nodes
-        ]
+        near = [graph.distance[v, nearest(graph, v, e.task.goal_nodes)] <= e.task.radius + 1e-9 for v in e.nodes]
         if not near[-1]:
             out["limit" if e.ended == "limit" else "stop"] += 1
             out["passed"] += any(near)
@@ -114,8 +112,13 @@ def predictions(episodes: Sequence[Episode], worlds: dict[str, World]) -> tuple[
     share = lambda hit, of: float(hit[of].mean()) if of.any() else float("nan")
     return tuple(
         Prediction(
-            name, float((t[:, i] == s[:, i]).mean()), share(t[:, i], s[:, i]), share(s[:, i], t[:, i]),
-            float(t[:, i].mean()), float(s[:, i].mean()), len(t),
+            name,
+            float((t[:, i] == s[:, i]).mean()),
+            share(t[:, i], s[:, i]),
+            share(s[:, i], t[:, i]),
+            float(t[:, i].mean()),
+            float(s[:, i].mean()),
+            len(t),
         )
         for i, name in enumerate(REASONS)
     )
@@ -125,5 +128,3 @@ def request_share(episodes: Sequence[Episode]) -> float:
     """Share of all steps at which help was asked for (Figure D.1a)."""
     kinds = [type(s.action) for e in episodes for s in e.steps]
     return kinds.count(Ask) / max(1, len(kinds))
-
-

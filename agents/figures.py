@@ -30,8 +30,12 @@ def requests_figure(behaviour: Mapping[str, Any], path: Path) -> None:
 def conditions_figure(behaviour: Mapping[str, Any], path: Path) -> None:
     """Figure D.2: accuracy, precision, recall and F1 of the predicted conditions."""
     figure = Figure(figsize=(8, 3), layout="constrained")
-    _pairs(figure.subplots(), behaviour["conditions"], ("accuracy", "precision", "recall", "f1"),
-           ("accuracy", "precision", "recall", "F1"))
+    _pairs(
+        figure.subplots(),
+        behaviour["conditions"],
+        ("accuracy", "precision", "recall", "f1"),
+        ("accuracy", "precision", "recall", "F1"),
+    )
     _save(figure, path)
 
 
@@ -40,8 +44,14 @@ def houses_figure(curves: Mapping[str, Sequence[tuple[int, Estimate]]], path: Pa
     figure = Figure(figsize=(5, 3.4), layout="constrained")
     axes = figure.subplots()
     for split, points in curves.items():
-        axes.errorbar([n for n, _ in points], [100 * e.mean for _, e in points], [100 * e.half for _, e in points],
-                      marker="o", capsize=3, label=split)
+        axes.errorbar(
+            [n for n, _ in points],
+            [100 * e.mean for _, e in points],
+            [100 * e.half for _, e in points],
+            marker="o",
+            capsize=3,
+            label=split,
+        )
     axes.set_xscale("log", base=2)
     ticks = sorted({n for points in curves.values() for n, _ in points})
     axes.set_xticks(ticks, [str(n) for n in ticks])

@@ -27,7 +27,9 @@ WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpreta
 """Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
 
 
-def run_eval(args: argparse.Namespace, note: Note = print, watch: Callable[[Iterable[str]], Iterable[str]] = iter) -> int:
+def run_eval(
+    args: argparse.Namespace, note: Note = print, watch: Callable[[Iterable[str]], Iterable[str]] = iter
+) -> int:
     """Tables 4.3 to 4.5 for one agent and the agents without learning, and why its episodes fail.
 
     Args:
@@ -50,14 +52,33 @@ def run_eval(args: argparse.Namespace, note: Note = print, watch: Callable[[Iter
                 extra[split] = about(episodes, worlds)
 
         rows += evaluate(
-            data, split, {n: judged[n] for n in names}, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep,
+            data,
+            split,
+            {n: judged[n] for n in names},
+            seed=args.seed,
+            limit=args.tasks,
+            batch=args.batch,
+            keep=keep,
             watch=watch,
         )
     facts = {"rows": json.loads(as_json(rows)), "behaviour": extra}
     if args.json:
         note(json.dumps(facts, indent=1))
     else:
-        note(markdown(rows, ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")))
+        note(
+            markdown(
+                rows,
+                (
+                    "success",
+                    "spl",
+                    "navigation error",
+                    "requests",
+                    "oracle success",
+                    "mistake repeat",
+                    "request repeat",
+                ),
+            )
+        )
         note(json.dumps(extra, indent=1))
     if args.out:
         save(rows, args.out, "table")
@@ -75,5 +96,7 @@ def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:
     return {
         "request share": request_share(episodes),
         "failures": {k: float(v) for k, v in dataclasses.asdict(failures(episodes, worlds)).items()},
-        "conditions": [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in c.items()} for c in conditions],  # NaN is no JSON
+        "conditions": [
+            {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in c.items()} for c in conditions
+        ],  # NaN is no JSON
     }

@@ -85,39 +85,148 @@ def _line(label: str, variant: str, played: str = "learned", **printed: Sequence
 TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
 FULL = ("success", "spl", "navigation error", "requests")
 TABLES: Mapping[str, Table] = {
-    "4.3": Table("Results on the test splits", TEST, FULL, (
-        _line("Random walk", "", "random walk", success=(0.54, 0.46), spl=(0.33, 0.23), navigation_error=(15.38, 15.34), requests=(0, 0)),
-        _line("Forward 10", "", "forward 10", success=(5.98, 6.36), spl=(4.19, 4.78), navigation_error=(14.61, 13.81), requests=(0, 0)),
-        _line("No assistance", "no ask", success=(17.21, 8.10), spl=(13.76, 4.23), navigation_error=(11.48, 13.22), requests=(0, 0)),
-        _line("Learn to interpret assistance", "final", success=(86.67, 45.43), spl=(63.27, 25.02), navigation_error=(1.63, 8.04), requests=(2.7, 4.4)),
-        _line("Shortest", "", "shortest", success=(100, 100), spl=(100, 100), navigation_error=(0, 0), requests=(0, 0)),
-        _line("Perfect assistance interpretation", "final", "learned, perfect interpretation", success=(90.19, 79.01), spl=(68.76, 54.86), navigation_error=(1.16, 2.65), requests=(2.4, 3.0)),
-    )),
-    "4.4": Table("Types of assistance", TEST, ("success",), (
-        _line("Target image only", "target image only", success=(84.29, 29.91)),
-        _line("+ language instruction", "final", success=(86.67, 45.43)),
-    )),
-    "4.5": Table("Help-request policies", TEST, ("success", "requests"), (
-        _line("No ask", "no ask", success=(17.21, 8.10), requests=(0, 0)),
-        _line("Random ask", "random ask", success=(78.40, 35.97), requests=(4.1, 6.6)),
-        _line("Ask every 5", "ask every 5", success=(86.63, 33.62), requests=(3.5, 7.1)),
-        _line("Learned", "final", success=(86.67, 45.43), requests=(2.7, 4.4)),
-    )),
-    "4.6": Table("Model and curiosity", ("test_unseen",), ("success", "mistake repeat", "request repeat"), (
-        _line("LSTM encoder-decoder", "lstm", success=(19.25,), mistake_repeat=(31.09,), request_repeat=(49.37,)),
-        _line("Our model, alpha = 0", "no curiosity", success=(41.92,), mistake_repeat=(25.20,), request_repeat=(39.85,)),
-        _line("Our model, alpha = 1", "final", success=(45.43,), mistake_repeat=(20.53,), request_repeat=(10.80,)),
-    )),
-    "D.2": Table("Ablations", VALIDATION, FULL, (
-        _line("Final agent", "final", success=(86.06, 45.39), spl=(62.49, 23.33), navigation_error=(1.48, 8.21), requests=(2.7, 4.5)),
-        _line("No inter-task reset", "no reset", success=(83.62, 40.60), spl=(60.44, 19.89), navigation_error=(1.44, 8.26), requests=(3.2, 7.3)),
-        _line("No condition prediction", "no conditions", success=(69.51, 45.72), spl=(44.87, 23.35), navigation_error=(3.11, 6.56), requests=(4.7, 8.1)),
-        _line("No cosine-similarity attention", "no similarity", success=(80.44, 38.69), spl=(56.63, 19.86), navigation_error=(1.89, 8.81), requests=(3.7, 8.5)),
-        _line("No curiosity loss", "no curiosity", success=(86.66, 39.92), spl=(69.66, 21.33), navigation_error=(1.28, 8.66), requests=(2.0, 7.7)),
-    )),
-    "houses": Table("Success and the number of training houses (no counterpart in the dissertation)", TEST, FULL, (
-        *(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)), _line("all houses", "final"),
-    )),
+    "4.3": Table(
+        "Results on the test splits",
+        TEST,
+        FULL,
+        (
+            _line(
+                "Random walk",
+                "",
+                "random walk",
+                success=(0.54, 0.46),
+                spl=(0.33, 0.23),
+                navigation_error=(15.38, 15.34),
+                requests=(0, 0),
+            ),
+            _line(
+                "Forward 10",
+                "",
+                "forward 10",
+                success=(5.98, 6.36),
+                spl=(4.19, 4.78),
+                navigation_error=(14.61, 13.81),
+                requests=(0, 0),
+            ),
+            _line(
+                "No assistance",
+                "no ask",
+                success=(17.21, 8.10),
+                spl=(13.76, 4.23),
+                navigation_error=(11.48, 13.22),
+                requests=(0, 0),
+            ),
+            _line(
+                "Learn to interpret assistance",
+                "final",
+                success=(86.67, 45.43),
+                spl=(63.27, 25.02),
+                navigation_error=(1.63, 8.04),
+                requests=(2.7, 4.4),
+            ),
+            _line(
+                "Shortest", "", "shortest", success=(100, 100), spl=(100, 100), navigation_error=(0, 0), requests=(0, 0)
+            ),
+            _line(
+                "Perfect assistance interpretation",
+                "final",
+                "learned, perfect interpretation",
+                success=(90.19, 79.01),
+                spl=(68.76, 54.86),
+                navigation_error=(1.16, 2.65),
+                requests=(2.4, 3.0),
+            ),
+        ),
+    ),
+    "4.4": Table(
+        "Types of assistance",
+        TEST,
+        ("success",),
+        (
+            _line("Target image only", "target image only", success=(84.29, 29.91)),
+            _line("+ language instruction", "final", success=(86.67, 45.43)),
+        ),
+    ),
+    "4.5": Table(
+        "Help-request policies",
+        TEST,
+        ("success", "requests"),
+        (
+            _line("No ask", "no ask", success=(17.21, 8.10), requests=(0, 0)),
+            _line("Random ask", "random ask", success=(78.40, 35.97), requests=(4.1, 6.6)),
+            _line("Ask every 5", "ask every 5", success=(86.63, 33.62), requests=(3.5, 7.1)),
+            _line("Learned", "final", success=(86.67, 45.43), requests=(2.7, 4.4)),
+        ),
+    ),
+    "4.6": Table(
+        "Model and curiosity",
+        ("test_unseen",),
+        ("success", "mistake repeat", "request repeat"),
+        (
+            _line("LSTM encoder-decoder", "lstm", success=(19.25,), mistake_repeat=(31.09,), request_repeat=(49.37,)),
+            _line(
+                "Our model, alpha = 0",
+                "no curiosity",
+                success=(41.92,),
+                mistake_repeat=(25.20,),
+                request_repeat=(39.85,),
+            ),
+            _line("Our model, alpha = 1", "final", success=(45.43,), mistake_repeat=(20.53,), request_repeat=(10.80,)),
+        ),
+    ),
+    "D.2": Table(
+        "Ablations",
+        VALIDATION,
+        FULL,
+        (
+            _line(
+                "Final agent",
+                "final",
+                success=(86.06, 45.39),
+                spl=(62.49, 23.33),
+                navigation_error=(1.48, 8.21),
+                requests=(2.7, 4.5),
+            ),
+            _line(
+                "No inter-task reset",
+                "no reset",
+                success=(83.62, 40.60),
+                spl=(60.44, 19.89),
+                navigation_error=(1.44, 8.26),
+                requests=(3.2, 7.3),
+            ),
+            _line(
+                "No condition prediction",
+                "no conditions",
+                success=(69.51, 45.72),
+                spl=(44.87, 23.35),
+                navigation_error=(3.11, 6.56),
+                requests=(4.7, 8.1),
+            ),
+            _line(
+                "No cosine-similarity attention",
+                "no similarity",
+                success=(80.44, 38.69),
+                spl=(56.63, 19.86),
+                navigation_error=(1.89, 8.81),
+                requests=(3.7, 8.5),
+            ),
+            _line(
+                "No curiosity loss",
+                "no curiosity",
+                success=(86.66, 39.92),
+                spl=(69.66, 21.33),
+                navigation_error=(1.28, 8.66),
+                requests=(2.0, 7.7),
+            ),
+        ),
+    ),
+    "houses": Table(
+        "Success and the number of training houses (no counterpart in the dissertation)",
+        TEST,
+        FULL,
+        (*(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)), _line("all houses", "final")),
+    ),
 }
 """The studies by name. D.2 is on the validation splits, as in the dissertation."""
 
@@ -171,7 +280,9 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
 
 def _possible(table: Table, setting: Setting, houses: int) -> Table:
     """The table without agents that learn from as many training houses as there are, or more."""
-    fewer = tuple(line for line in table.lines if not line.variant or setting.config_of(line.variant).training_houses < houses)
+    fewer = tuple(
+        line for line in table.lines if not line.variant or setting.config_of(line.variant).training_houses < houses
+    )
     return dataclasses.replace(table, lines=fewer)
 
 
@@ -206,14 +317,20 @@ class _Judge:
 
     def row(self, line: Line, split: str) -> Row:
         if (line.key, split) not in self._rows:
+
             def keep(name: str, episodes: Sequence[Episode]) -> None:
                 save_lines(self.setting.out / "episodes" / episodes_file(split, line.key), episodes)
                 if line.variant and line.played == "learned":
                     self.behaviour[line.key, split] = about(episodes, self.data.places(split))
 
             (row,) = evaluate(
-                self.data, split, {line.key: self._policy(line, split)}, seed=self.setting.seed,
-                limit=self.setting.tasks, batch=32, keep=keep,
+                self.data,
+                split,
+                {line.key: self._policy(line, split)},
+                seed=self.setting.seed,
+                limit=self.setting.tasks,
+                batch=32,
+                keep=keep,
             )
             self._rows[line.key, split] = row
             self.note(f"{line.key} on {split}: success {shown('success', row.values['success'])} %")
@@ -231,7 +348,9 @@ class _Judge:
 
 def _write(setting: Setting, name: str, table: Table, judged: _Judge) -> Path:
     """One study's files; the figures go with the tables they belong to."""
-    rows = [dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines]
+    rows = [
+        dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
+    ]
     stem = f"table_{name}"
     save(rows, setting.out, stem)
     path = setting.out / f"{stem}.md"
@@ -245,16 +364,25 @@ def _write(setting: Setting, name: str, table: Table, judged: _Judge) -> Path:
     if name == "houses":
         there = len(judged.data.names("train"))
         counts = [setting.config_of(line.variant).training_houses or there for line in table.lines]
-        houses_figure({s: [(n, r.values["success"]) for n, r in zip(counts, rows[k * len(counts):], strict=False)]
-                       for k, s in enumerate(table.splits)}, setting.out / "figure_houses.png")
+        houses_figure(
+            {
+                s: [(n, r.values["success"]) for n, r in zip(counts, rows[k * len(counts) :], strict=False)]
+                for k, s in enumerate(table.splits)
+            },
+            setting.out / "figure_houses.png",
+        )
     return path
 
 
 def side_by_side(setting: Setting, name: str, table: Table, rows: Sequence[Row]) -> str:
     """The table with the dissertation's numbers in brackets, and what it was made with."""
     heads = [f"{column} {split}" for split in table.splits for column in table.columns]
-    text = [f"# {name}: {table.title}" if name == "houses" else f"# Table {name}: {table.title}", "",
-            "| agent | " + " | ".join(heads) + " |", "|" + "---|" * (1 + len(heads))]
+    text = [
+        f"# {name}: {table.title}" if name == "houses" else f"# Table {name}: {table.title}",
+        "",
+        "| agent | " + " | ".join(heads) + " |",
+        "|" + "---|" * (1 + len(heads)),
+    ]
     by = {(r.agent, r.split): r for r in rows}
     for line in table.lines:
         cells = []

@@ -150,7 +150,8 @@ def _asset(where: str, key: str, row: Mapping, shared: Mapping, pack: Mapping) -
 def _size(where: str, row: Mapping) -> tuple[float, float, float]:
     size = row.get("size")
     if (
-        not isinstance(size, list) or len(size) != 3
+        not isinstance(size, list)
+        or len(size) != 3
         or not all(isinstance(s, (int, float)) and math.isfinite(s) and 0 < s < 30 for s in size)
     ):
         raise CatalogueError(f"{where} should have a size of three lengths in metres, got {size!r}")

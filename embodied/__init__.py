@@ -36,14 +36,34 @@ if TYPE_CHECKING:
     from embodied.seeds import stream
     from embodied.world import World, open_world
 
-__all__ = ["House", "HouseConfig", "NavGraph", "Panorama", "Renderer", "World", "build_graph", "default_cache",
-           "generate_house", "load_catalogue", "open_world", "stream"]
+__all__ = [
+    "House",
+    "HouseConfig",
+    "NavGraph",
+    "Panorama",
+    "Renderer",
+    "World",
+    "build_graph",
+    "default_cache",
+    "generate_house",
+    "load_catalogue",
+    "open_world",
+    "stream",
+]
 
 HOMES = {
-    "House": "embodied.house.house", "HouseConfig": "embodied.generate", "NavGraph": "embodied.navigation.graph",
-    "Panorama": "embodied.render.panorama", "Renderer": "embodied.render.classic", "World": "embodied.world",
-    "build_graph": "embodied.navigation.graph", "default_cache": "assets.cache", "generate_house": "embodied.generate",
-    "load_catalogue": "assets.catalogue", "open_world": "embodied.world", "stream": "embodied.seeds",
+    "House": "embodied.house.house",
+    "HouseConfig": "embodied.generate",
+    "NavGraph": "embodied.navigation.graph",
+    "Panorama": "embodied.render.panorama",
+    "Renderer": "embodied.render.classic",
+    "World": "embodied.world",
+    "build_graph": "embodied.navigation.graph",
+    "default_cache": "assets.cache",
+    "generate_house": "embodied.generate",
+    "load_catalogue": "assets.catalogue",
+    "open_world": "embodied.world",
+    "stream": "embodied.seeds",
 }
 """The module behind each public name."""
 

@@ -19,7 +19,23 @@ from pathlib import Path
 from embodied.errors import UnableError
 
 BACKENDS = ("egl", "osmesa")
-ELSEWHERE = ("", "glfw", "glx", "cgl", "wgl", "enable", "enabled", "on", "true", "1", "disable", "disabled", "off", "false", "0")
+ELSEWHERE = (
+    "",
+    "glfw",
+    "glx",
+    "cgl",
+    "wgl",
+    "enable",
+    "enabled",
+    "on",
+    "true",
+    "1",
+    "disable",
+    "disabled",
+    "off",
+    "false",
+    "0",
+)
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "

@@ -30,6 +30,7 @@ VIEWS = 36
 
 # Where an agent is and what it can see ----------------------------------------------------------
 
+
 @dataclass(frozen=True, slots=True)
 class Pose:
     """(v, psi, omega) of dissertation 4.2.2. An agent knows its angles, never its node."""
@@ -105,13 +106,18 @@ class Candidates:
         return len(self.bearing)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Candidates) and self.words == other.words and all(
-            np.array_equal(getattr(self, name), getattr(other, name))
-            for name in ("bearing", "slope", "view", "allowed")
+        return (
+            isinstance(other, Candidates)
+            and self.words == other.words
+            and all(
+                np.array_equal(getattr(self, name), getattr(other, name))
+                for name in ("bearing", "slope", "view", "allowed")
+            )
         )
 
 
 # What an agent is asked to do -------------------------------------------------------------------
+
 
 @dataclass(frozen=True)
 class FindObject:
@@ -175,6 +181,7 @@ class Route:
 
 # What an agent may do ---------------------------------------------------------------------------
 
+
 class Intention(enum.Enum):
     """What a request for help asks for."""
 
@@ -228,6 +235,7 @@ Action = Move | Ask | Stop
 
 
 # What an agent is told --------------------------------------------------------------------------
+
 
 @dataclass(frozen=True, slots=True)
 class Feature:
@@ -343,6 +351,7 @@ class Situation:
 
 # What is written down ---------------------------------------------------------------------------
 
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """One step as it was taken. Everything privileged is here, pixels are not."""
@@ -385,6 +394,7 @@ class Episode:
 
 
 # Who takes part ---------------------------------------------------------------------------------
+
 
 class Assistant(Protocol):
     """Part of the world, present at test time too. Sees the situation and answers requests."""
@@ -432,8 +442,7 @@ class Policy(Protocol):
     """
 
     def act(
-        self, observations: Sequence[Observation | None], memory: object | None, *,
-        rngs: Sequence[np.random.Generator],
+        self, observations: Sequence[Observation | None], memory: object | None, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[list[Action | None], object]: ...
 
 

@@ -159,7 +159,8 @@ def _build_record(kind: type, value: object, where: str) -> typing.Any:
     names = {f.name: f for f in _fields(kind)}
     unknown = sorted(set(value) - set(names) - {"is"})
     missing = sorted(
-        n for n, f in names.items()
+        n
+        for n, f in names.items()
         if n not in value and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     )
     if unknown or missing:

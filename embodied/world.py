@@ -38,16 +38,33 @@ KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
 ROOT = Path(__file__).resolve().parent.parent
-PICTURE_SOURCES = ("assets/**/*.py", "assets/data/*.json", "embodied/light/*.py", "embodied/house/house.py",
-                   "embodied/scene/*.py", "embodied/render/*.py")
+PICTURE_SOURCES = (
+    "assets/**/*.py",
+    "assets/data/*.json",
+    "embodied/light/*.py",
+    "embodied/house/house.py",
+    "embodied/scene/*.py",
+    "embodied/render/*.py",
+)
 """Files that decide what a picture shows; a cached picture made by other versions of them is not used."""
 
 
 class World:
     """Owns, while open, a renderer (made on first need) and the panorama file (where there is one)."""
 
-    def __init__(self, house: House, catalogue: Catalogue, graph: NavGraph, cache: Path, *, size: int = 256,
-                 quality: str = "unlit", backend: str = "classic", light: str = "normal", file: Path | None = None) -> None:
+    def __init__(
+        self,
+        house: House,
+        catalogue: Catalogue,
+        graph: NavGraph,
+        cache: Path,
+        *,
+        size: int = 256,
+        quality: str = "unlit",
+        backend: str = "classic",
+        light: str = "normal",
+        file: Path | None = None,
+    ) -> None:
         """See `open_world`."""
         if quality not in QUALITIES:
             raise ValueError(f"quality {quality!r} is unknown; use one of {QUALITIES}")
@@ -79,15 +96,24 @@ class World:
     @functools.cached_property
     def _origin(self) -> dict[str, object]:
         """What the world's geometry depends on."""
-        return {"house": self.house.digest, "nodes": digest(self.graph.positions.tolist()),
-                "mujoco": importlib.metadata.version("mujoco"), "code": code_digest()}
+        return {
+            "house": self.house.digest,
+            "nodes": digest(self.graph.positions.tolist()),
+            "mujoco": importlib.metadata.version("mujoco"),
+            "code": code_digest(),
+        }
 
     @functools.cached_property
     def fingerprint(self) -> dict[str, object]:
         """All that the panoramas depend on, and what draws them."""
         light = None if self.quality == "unlit" else self.light
-        return self._origin | {"size": self.size, "quality": self.quality, "backend": self.backend, "light": light,
-                               "renderer": str(gl.info())}
+        return self._origin | {
+            "size": self.size,
+            "quality": self.quality,
+            "backend": self.backend,
+            "light": light,
+            "renderer": str(gl.info()),
+        }
 
     @functools.cached_property
     def path(self) -> Path:
@@ -105,8 +131,13 @@ class World:
         if self._renderer is None:
             baked = self.quality != "unlit"
             self._renderer = Renderer(
-                self.house, self.catalogue, quality="baked" if baked else "unlit", backend=self.backend, size=self.size,
-                lit=self._bake.lit if baked else None)
+                self.house,
+                self.catalogue,
+                quality="baked" if baked else "unlit",
+                backend=self.backend,
+                size=self.size,
+                lit=self._bake.lit if baked else None,
+            )
         return self._renderer
 
     @functools.cached_property
@@ -210,13 +241,24 @@ class World:
         table = load_table(path)
         if table is None:
             with Renderer(self.house, self.catalogue, size=FACE) as renderer:
-                table = sightings_table([renderer.seen(p, FACE) for p in self.graph.positions], len(self.house.placements))
+                table = sightings_table(
+                    [renderer.seen(p, FACE) for p in self.graph.positions], len(self.house.placements)
+                )
             save_table(path, table)
         return table
 
 
-def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: NavGraph | None = None, size: int = 256,
-               quality: str = "unlit", backend: str = "classic", light: str = "normal") -> World:
+def open_world(
+    house: House,
+    catalogue: Catalogue,
+    cache: Path,
+    *,
+    graph: NavGraph | None = None,
+    size: int = 256,
+    quality: str = "unlit",
+    backend: str = "classic",
+    light: str = "normal",
+) -> World:
     """A world over `house`; nothing is drawn until asked for.
 
     Args:
@@ -232,16 +274,33 @@ def open_world(house: House, catalogue: Catalogue, cache: Path, *, graph: NavGra
     return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light)
 
 
-def open_folder(folder: Path, catalogue: Catalogue, cache: Path, *, size: int = 256, quality: str = "unlit",
-                backend: str = "classic", light: str = "normal") -> World:
+def open_folder(
+    folder: Path,
+    catalogue: Catalogue,
+    cache: Path,
+    *,
+    size: int = 256,
+    quality: str = "unlit",
+    backend: str = "classic",
+    light: str = "normal",
+) -> World:
     """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there."""
     folder = Path(folder)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
     graph = build_graph(house, catalogue)
-    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light,
-                 file=folder / "panoramas.pano")
+    return World(
+        house,
+        catalogue,
+        graph,
+        cache,
+        size=size,
+        quality=quality,
+        backend=backend,
+        light=light,
+        file=folder / "panoramas.pano",
+    )
 
 
 @functools.cache

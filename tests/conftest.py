@@ -9,8 +9,10 @@ import pytest
 from embodied.house.house import House, Opening, Placement, Room, Storey
 
 FINISHES = {
-    "floor_finish": "oak_planks/0", "wall_finish": "paint_white/0",
-    "ceiling_finish": "paint_white/0", "skirting_finish": "paint_white/0",
+    "floor_finish": "oak_planks/0",
+    "wall_finish": "paint_white/0",
+    "ceiling_finish": "paint_white/0",
+    "skirting_finish": "paint_white/0",
 }
 
 
@@ -19,8 +21,21 @@ def two_rooms() -> House:
     living = Room("living_room_1", "living_room", ((0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0)), **FINISHES)
     bedroom = Room("bedroom_1", "bedroom", ((5.0, 0.0), (9.0, 0.0), (9.0, 4.0), (5.0, 4.0)), **FINISHES)
     openings = (
-        Opening("door_1", "door", ("bedroom_1", "living_room_1"), (5.0, 0.6), (5.0, 1.5), 0.0, 2.05, "paint_white/0", "a", 1.4),
-        Opening("front_door_1", "front_door", ("living_room_1", None), (0.0, 2.0), (0.0, 1.0), 0.0, 2.1, "paint_white/0"),
+        Opening(
+            "door_1",
+            "door",
+            ("bedroom_1", "living_room_1"),
+            (5.0, 0.6),
+            (5.0, 1.5),
+            0.0,
+            2.05,
+            "paint_white/0",
+            "a",
+            1.4,
+        ),
+        Opening(
+            "front_door_1", "front_door", ("living_room_1", None), (0.0, 2.0), (0.0, 1.0), 0.0, 2.1, "paint_white/0"
+        ),
         Opening("window_1", "window", ("living_room_1", None), (1.5, 0.0), (3.5, 0.0), 0.9, 2.1, "paint_white/0"),
         Opening("window_2", "window", ("bedroom_1", None), (7.5, 4.0), (6.0, 4.0), 0.9, 2.1, "paint_white/0"),
     )

@@ -13,7 +13,12 @@ FINISHES = ("oak_planks/0", "paint_white/0", "paint_white/0", "paint_white/0")
 
 
 def hand_graph(positions, edges, rooms) -> NavGraph:
-    return graph_of(np.asarray(positions, dtype=float), np.asarray(edges), tuple(f"n{i}" for i in range(len(positions))), tuple(rooms))
+    return graph_of(
+        np.asarray(positions, dtype=float),
+        np.asarray(edges),
+        tuple(f"n{i}" for i in range(len(positions))),
+        tuple(rooms),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +35,9 @@ def room(name: str, kind: str, x0: float, y0: float, x1: float, y1: float) -> Ro
 
 
 def thing(name: str, number: int, where: str, x: float, y: float) -> Placement:
-    return Placement(f"{name.replace(' ', '_')}_{number}", f"hand/{name}", name, where, (x, y, 0.0), 0.0, (0.2, 0.2, 0.2))
+    return Placement(
+        f"{name.replace(' ', '_')}_{number}", f"hand/{name}", name, where, (x, y, 0.0), 0.0, (0.2, 0.2, 0.2)
+    )
 
 
 def line_world() -> HandWorld:
@@ -59,9 +66,12 @@ def grid_world(side: int = 6, spacing: float = 2.0, name: str = "grid") -> HandW
         Opening("door_3", "door", ("living_room_1", "bathroom_1"), (half, high - 0.4), (half, high + 0.4), 0.0, 2.0),
     )
     things = (
-        thing("mug", 1, "kitchen_1", 1.2, 0.8), thing("mug", 2, "living_room_1", 0.8, 2 * half - 1.0),
-        thing("bed", 1, "bedroom_1", 2 * half - 1.0, 1.0), thing("towel", 1, "bathroom_1", 2 * half - 1.2, 2 * half - 0.8),
-        thing("sofa", 1, "living_room_1", half - 1.0, half + 1.0), thing("lamp", 1, "bedroom_1", half + 1.0, half - 1.0),
+        thing("mug", 1, "kitchen_1", 1.2, 0.8),
+        thing("mug", 2, "living_room_1", 0.8, 2 * half - 1.0),
+        thing("bed", 1, "bedroom_1", 2 * half - 1.0, 1.0),
+        thing("towel", 1, "bathroom_1", 2 * half - 1.2, 2 * half - 0.8),
+        thing("sofa", 1, "living_room_1", half - 1.0, half + 1.0),
+        thing("lamp", 1, "bedroom_1", half + 1.0, half - 1.0),
     )
     house = House(0, name, (Storey(0.0, 2.6),), rooms, doors, things, ())
     positions, where, edges = [], [], []
@@ -69,7 +79,10 @@ def grid_world(side: int = 6, spacing: float = 2.0, name: str = "grid") -> HandW
         for x in range(side):
             positions.append([m + x * spacing, m + y * spacing, 1.5])
             where.append(rooms[2 * (y >= side // 2) + (x >= side // 2)].id)
-    ok = {frozenset(p) for p in (("kitchen_1", "bedroom_1"), ("kitchen_1", "living_room_1"), ("living_room_1", "bathroom_1"))}
+    ok = {
+        frozenset(p)
+        for p in (("kitchen_1", "bedroom_1"), ("kitchen_1", "living_room_1"), ("living_room_1", "bathroom_1"))
+    }
     door_rows = {1, side // 2 + 1}
     for i in range(side * side):
         x, y = i % side, i // side

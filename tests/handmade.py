@@ -32,8 +32,13 @@ def box_mesh(low, high, color) -> MeshPart:
             faces.append(np.array(order).reshape(2, 3) + len(vertices) * 4)
             vertices.append(quad)
             normals.append(np.tile(np.eye(3)[axis] * (1 if side else -1), (4, 1)))
-    return MeshPart(np.concatenate(vertices).astype(np.float32), np.concatenate(faces).astype(np.int32),
-                    np.concatenate(normals).astype(np.float32), np.zeros((24, 2), np.float32), Finish(color))
+    return MeshPart(
+        np.concatenate(vertices).astype(np.float32),
+        np.concatenate(faces).astype(np.int32),
+        np.concatenate(normals).astype(np.float32),
+        np.zeros((24, 2), np.float32),
+        Finish(color),
+    )
 
 
 def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=()) -> Asset:
@@ -44,13 +49,23 @@ def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=(
 class HandCatalogue:
     """Quacks like assets.catalogue.Catalogue as far as a scene needs it."""
 
-    assets: Mapping[str, Asset] = field(default_factory=lambda: {a.key: a for a in (
-        _asset("hand/red_box", "red box", (0.5, 0.5, 0.8)),
-        _asset("hand/flag", "flag", (0.6, 0.1, 1.0)),
-        _asset("hand/table", "table", (1.2, 0.8, 0.75), surfaces=(SupportSurface("top", 0.75, -0.6, -0.4, 0.6, 0.4, 9.0),)),
-        _asset("hand/mug", "mug", (0.08, 0.08, 0.1), "surface"),
-        _asset("built/rug", "rug", (2.0, 1.4, 0.012)),
-    )})
+    assets: Mapping[str, Asset] = field(
+        default_factory=lambda: {
+            a.key: a
+            for a in (
+                _asset("hand/red_box", "red box", (0.5, 0.5, 0.8)),
+                _asset("hand/flag", "flag", (0.6, 0.1, 1.0)),
+                _asset(
+                    "hand/table",
+                    "table",
+                    (1.2, 0.8, 0.75),
+                    surfaces=(SupportSurface("top", 0.75, -0.6, -0.4, 0.6, 0.4, 9.0),),
+                ),
+                _asset("hand/mug", "mug", (0.08, 0.08, 0.1), "surface"),
+                _asset("built/rug", "rug", (2.0, 1.4, 0.012)),
+            )
+        }
+    )
 
     def mesh(self, key: str, size, params=()) -> tuple[MeshPart, ...]:
         w, d, h = size
@@ -58,8 +73,11 @@ class HandCatalogue:
             half = box_mesh((-w / 2, -d / 2, 0), (0, d / 2, h), GREEN)
             return half, box_mesh((0, -d / 2, 0), (w / 2, d / 2, h), BLUE)
         if key == "hand/table":
-            legs = [box_mesh((x - 0.03, y - 0.03, 0), (x + 0.03, y + 0.03, h - 0.04), WOOD)
-                    for x in (-w / 2 + 0.05, w / 2 - 0.05) for y in (-d / 2 + 0.05, d / 2 - 0.05)]
+            legs = [
+                box_mesh((x - 0.03, y - 0.03, 0), (x + 0.03, y + 0.03, h - 0.04), WOOD)
+                for x in (-w / 2 + 0.05, w / 2 - 0.05)
+                for y in (-d / 2 + 0.05, d / 2 - 0.05)
+            ]
             return (box_mesh((-w / 2, -d / 2, h - 0.04), (w / 2, d / 2, h), WOOD), *legs)
         color = {"hand/red_box": RED, "hand/mug": BLUE}.get(key, WOOD)
         return (box_mesh((-w / 2, -d / 2, 0), (w / 2, d / 2, h), color),)
@@ -77,7 +95,9 @@ def furnished(house: House) -> House:
         Placement("red_box_1", "hand/red_box", "red box", "living_room_1", (4.4, 2.6, 0.0), 0.0, (0.5, 0.5, 0.8)),
         Placement("flag_1", "hand/flag", "flag", "living_room_1", (2.0, 3.8, 0.0), 0.0, (0.6, 0.1, 1.0)),
         Placement("table_1", "hand/table", "table", "living_room_1", (1.2, 0.9, 0.0), 0.3, (1.2, 0.8, 0.75)),
-        Placement("mug_1", "hand/mug", "mug", "living_room_1", (1.3, 1.0, 0.75), 1.0, (0.08, 0.08, 0.1), "table_1", "top"),
+        Placement(
+            "mug_1", "hand/mug", "mug", "living_room_1", (1.3, 1.0, 0.75), 1.0, (0.08, 0.08, 0.1), "table_1", "top"
+        ),
         Placement("red_box_2", "hand/red_box", "red box", "bedroom_1", (8.5, 3.4, 0.0), 0.0, (0.5, 0.5, 0.8)),
     )
     return dataclasses.replace(house, placements=(*house.placements, *things))
@@ -88,10 +108,20 @@ def painted(house: House, catalogue) -> LitPages:
     parts = [p for p in house_parts(house, catalogue) if len(p.mesh.faces)]
     page, meshes = np.zeros((8, 8 * len(parts), 3), np.uint8), []
     for i, part in enumerate(parts):
-        page[:, 8 * i:8 * i + 8] = np.rint(255 * np.array(part.mesh.finish.color[:3]))
+        page[:, 8 * i : 8 * i + 8] = np.rint(255 * np.array(part.mesh.finish.color[:3]))
         turned = part.mesh.vertices.copy()
         turned[:, :2] = turned[:, :2] @ rotation(part.yaw).T
         uv = np.full((len(turned), 2), [(i + 0.5) / len(parts), 0.5], np.float32)
-        meshes.append(LitMesh(part.owner, part.kind, part.room, 0, (turned + part.position).astype(np.float32), part.mesh.faces,
-                              uv, float(part.mesh.finish.color[3])))
+        meshes.append(
+            LitMesh(
+                part.owner,
+                part.kind,
+                part.room,
+                0,
+                (turned + part.position).astype(np.float32),
+                part.mesh.faces,
+                uv,
+                float(part.mesh.finish.color[3]),
+            )
+        )
     return LitPages(tuple(meshes), (page,), "painted")

@@ -22,7 +22,14 @@ HOMES = {
     "rerun": ("viz/",),
     "mitsuba": ("embodied/light/",),
     "drjit": ("embodied/light/",),
-    "mujoco": ("embodied/gl.py", "embodied/scene/", "embodied/render/", "embodied/envs/driven.py", "embodied/light/", "embodied/bench/"),
+    "mujoco": (
+        "embodied/gl.py",
+        "embodied/scene/",
+        "embodied/render/",
+        "embodied/envs/driven.py",
+        "embodied/light/",
+        "embodied/bench/",
+    ),
     "dm_control": ("embodied/envs/driven.py",),
     "OpenGL": ("embodied/gl.py", "embodied/render/"),
     "gymnasium": ("embodied/gym/", "agents/"),
@@ -88,6 +95,13 @@ def test_only_the_command_line_composes_agents_and_viz():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_folder_with_code_is_a_package_of_the_wheel(package):
-    found = set(find_packages(str(ROOT), include=tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]["find"]["include"]))
+    found = set(
+        find_packages(
+            str(ROOT),
+            include=tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]["find"][
+                "include"
+            ],
+        )
+    )
     on_disk = {p.parent.relative_to(ROOT).as_posix().replace("/", ".") for p in (ROOT / package).rglob("*.py")}
     assert on_disk <= found, f"add an __init__.py to {sorted(on_disk - found)}"

@@ -22,8 +22,15 @@ from assets.records import ROOM_KINDS, SUPPORTS
 from assets.rows import CatalogueError
 
 SOME = (
-    "scopia/bed1", "blendswap-cc-0/oakTable", "blendswap-cc-by/bookcase", "scopia/tubular_chair", "scopia/toaster",
-    "katorlegaz/office-chair", "blendswap-cc-by/beer_bottle", "scopia/saloon_lamp", "scopia/table4+console",
+    "scopia/bed1",
+    "blendswap-cc-0/oakTable",
+    "blendswap-cc-by/bookcase",
+    "scopia/tubular_chair",
+    "scopia/toaster",
+    "katorlegaz/office-chair",
+    "blendswap-cc-by/beer_bottle",
+    "scopia/saloon_lamp",
+    "scopia/table4+console",
 )
 """A handful of models to import; every one would take minutes."""
 
@@ -45,7 +52,9 @@ def catalogue(cache):
 
 
 def write_pack(path: Path, entries: dict[str, str | bytes], model: str = "mine/box/box.obj") -> Path:
-    rows = f"license=CC0-1.0\nid#1=box\nname#1=Box\nmodel#1=/{model}\nwidth#1=40\ndepth#1=30\nheight#1=20\ncreator#1=Me\n"
+    rows = (
+        f"license=CC0-1.0\nid#1=box\nname#1=Box\nmodel#1=/{model}\nwidth#1=40\ndepth#1=30\nheight#1=20\ncreator#1=Me\n"
+    )
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as z:
         z.writestr("PluginFurnitureCatalog.properties", rows)
         for name, data in entries.items():
@@ -61,6 +70,7 @@ def write_own(folder: Path, models: dict, classes: dict | None = None) -> Path:
 
 
 # the reviewed catalogue
+
 
 def test_catalogue_has_enough_classes_and_models():
     pack = [a for a in load_catalogue().assets.values() if not a.key.startswith("built/")]
@@ -115,6 +125,7 @@ def test_attribution_file_is_up_to_date(catalogue):
 
 # import
 
+
 @pytest.mark.parametrize("key", SOME)
 def test_imported_models_have_the_size_of_the_catalogue(catalogue, key):
     low, high = bounds(catalogue.mesh(key))
@@ -160,8 +171,9 @@ def test_import_is_the_same_every_time(catalogue, tmp_path):
             np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
-@pytest.mark.parametrize("damage", [lambda p: p.write_bytes(p.read_bytes()[:-100]), lambda p: p.unlink(),
-                                    lambda p: p.write_bytes(b"x" * 50)])
+@pytest.mark.parametrize(
+    "damage", [lambda p: p.write_bytes(p.read_bytes()[:-100]), lambda p: p.unlink(), lambda p: p.write_bytes(b"x" * 50)]
+)
 @pytest.mark.parametrize("suffix", ["npz", "json", "png"])
 def test_a_damaged_cache_is_repaired(tmp_path, damage, suffix):
     key = "scopia/toaster"
@@ -189,6 +201,7 @@ def test_an_unknown_asset_is_named(catalogue):
 
 # polygons
 
+
 def test_a_concave_polygon_is_filled_exactly():
     u = "v 0 0 0\nv 3 0 0\nv 3 0 3\nv 2 0 3\nv 2 0 1\nv 1 0 1\nv 1 0 3\nv 0 0 3\nf 8 7 6 5 4 3 2 1"
     obj = parse_obj(u, "u")
@@ -201,7 +214,10 @@ def test_a_concave_polygon_is_filled_exactly():
 def test_front_and_up_follow_sweet_home_3d():
     """+z of the file becomes the front, -y; +y becomes up."""
     marker = "v 0 0 1\nv 1 0 1\nv 0 2 1\nv 0 0 0\nf 1 2 3\nf 1 3 4\nf 4 2 1"
-    parts = [p for p, _ in finish_parts(read_obj({"m.obj": marker.encode()}.__getitem__, "m.obj", "m"), Recipe("m", (1, 1, 2)))]
+    parts = [
+        p
+        for p, _ in finish_parts(read_obj({"m.obj": marker.encode()}.__getitem__, "m.obj", "m"), Recipe("m", (1, 1, 2)))
+    ]
     low, high = bounds(parts)
     top = parts[0].vertices[parts[0].vertices[:, 2].argmax()]
     np.testing.assert_allclose(top, [-0.5, -0.5, 2.0], atol=1e-5)
@@ -219,7 +235,10 @@ def test_surfaces_of_a_cube_are_its_top(tmp_path):
 
 # hostile and broken packs
 
-@pytest.mark.parametrize("name", ["../evil.obj", "/etc/evil.obj", "mine\\..\\evil.obj", "a/../../evil.obj", "C:evil.obj"])
+
+@pytest.mark.parametrize(
+    "name", ["../evil.obj", "/etc/evil.obj", "mine\\..\\evil.obj", "a/../../evil.obj", "C:evil.obj"]
+)
 def test_a_pack_whose_names_climb_out_is_refused(tmp_path, name):
     path = write_pack(tmp_path / "evil.sh3f", {"mine/box/box.obj": CUBE})
     with zipfile.ZipFile(path, "a") as z:
@@ -239,14 +258,22 @@ def test_an_entry_that_lies_about_its_size_is_cut_off(tmp_path):
     path = write_pack(tmp_path / "liar.sh3f", {"mine/box/box.obj": np.random.default_rng(0).bytes(4096)})
     data = bytearray(path.read_bytes())
     at = data.rindex(b"PK\x01\x02")
-    data[at + 24:at + 28] = struct.pack("<I", 100)
+    data[at + 24 : at + 28] = struct.pack("<I", 100)
     path.write_bytes(data)
     with pytest.raises(PackError, match="cannot be read"):
         open_pack(path).read("mine/box/box.obj")
 
 
-@pytest.mark.parametrize("obj", [CUBE.replace("v 1 1 1", "v nan 1 1"), CUBE.replace("v 1 1 1", "v 1e999 1 1"),
-                                 CUBE.replace("f 1 3 4 2", "f 1 3 99 2"), "v 0 0 0\n", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3"])
+@pytest.mark.parametrize(
+    "obj",
+    [
+        CUBE.replace("v 1 1 1", "v nan 1 1"),
+        CUBE.replace("v 1 1 1", "v 1e999 1 1"),
+        CUBE.replace("f 1 3 4 2", "f 1 3 99 2"),
+        "v 0 0 0\n",
+        "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3",
+    ],
+)
 def test_a_broken_mesh_is_refused(tmp_path, obj):
     own = write_own(tmp_path / "own", {"box": {"file": "box.sh3f", "model": "mine/box", "class": "cardboard box"}})
     write_pack(own / "box.sh3f", {"mine/box/box.obj": obj})
@@ -267,11 +294,16 @@ def test_a_file_that_is_no_pack_is_refused(tmp_path):
 
 # a user's own models
 
+
 def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
     row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
     own = write_own(
         tmp_path / "own",
-        {"a": {"file": "a.obj", **row}, "b": {"file": "b.glb", **row}, "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"}},
+        {
+            "a": {"file": "a.obj", **row},
+            "b": {"file": "b.glb", **row},
+            "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"},
+        },
         {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}},
     )
     (own / "a.obj").write_text(CUBE)
@@ -286,7 +318,12 @@ def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
 
 
 def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
-    base = {"file": "a.obj", "class": "side table", "size": [0.4, 0.3, 0.2], "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]]}
+    base = {
+        "file": "a.obj",
+        "class": "side table",
+        "size": [0.4, 0.3, 0.2],
+        "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]],
+    }
     red = {"of": "a", "class": "coffee table", "size": [0.8, 0.3, 0.1], "looks": {"": "#ff0000"}}
     own = write_own(tmp_path / "own", {"a": base, "red": red})
     (own / "a.obj").write_text(CUBE)
@@ -298,16 +335,19 @@ def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
     assert (top.x0, top.x1, top.z) == pytest.approx((-0.4, 0.4, 0.1))
 
 
-@pytest.mark.parametrize(("row", "match"), [
-    ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
-    ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
-    ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
-    ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
-    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "of": "nothing"}, "variant"),
-    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
-    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "unknown support"),
-    ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
-])
+@pytest.mark.parametrize(
+    ("row", "match"),
+    [
+        ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
+        ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
+        ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
+        ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "of": "nothing"}, "variant"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "unknown support"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
+    ],
+)
 def test_a_wrong_own_catalogue_says_what_is_wrong(tmp_path, row, match):
     own = write_own(tmp_path / "own", {"box": row})
     (own / "box.obj").write_text(CUBE)

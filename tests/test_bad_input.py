@@ -45,23 +45,26 @@ def said(capsys, *words: str) -> str:
     return err
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (("house", "--area", "5", "10", "--out", "x"), "area should be"),
-    (("house", "--area", "nan", "nan", "--out", "x"), "area should be"),
-    (("house", "--style", "nope", "--out", "x"), "style should be one of"),
-    (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
-    (("render", "/nowhere"), "make one with `embodied house"),
-    (("light", "/nowhere"), "make one with `embodied house"),
-    (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
-    (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
-    (("bench", "nothing"), "unknown benchmark"),
-    (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),
-    (("nonsense",), "invalid choice: 'nonsense'"),
-    (("rollout", "--seed", "3", "--size", "0"), "a cube face needs 8 to 4096"),
-    (("train", "hanna", "--data", "x", "--out", "y", "--nothing"), "`embodied --help` explains"),
-    (("dataset", "find", "--out", "x", "--area", "5", "10"), "area should be"),
-    (("dataset", "find", "--out", "x", "--workers", "0"), "--workers should be at least 1"),
-])
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("house", "--area", "5", "10", "--out", "x"), "area should be"),
+        (("house", "--area", "nan", "nan", "--out", "x"), "area should be"),
+        (("house", "--style", "nope", "--out", "x"), "style should be one of"),
+        (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
+        (("render", "/nowhere"), "make one with `embodied house"),
+        (("light", "/nowhere"), "make one with `embodied house"),
+        (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
+        (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
+        (("bench", "nothing"), "unknown benchmark"),
+        (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),
+        (("nonsense",), "invalid choice: 'nonsense'"),
+        (("rollout", "--seed", "3", "--size", "0"), "a cube face needs 8 to 4096"),
+        (("train", "hanna", "--data", "x", "--out", "y", "--nothing"), "`embodied --help` explains"),
+        (("dataset", "find", "--out", "x", "--area", "5", "10"), "area should be"),
+        (("dataset", "find", "--out", "x", "--workers", "0"), "--workers should be at least 1"),
+    ],
+)
 def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert message in said(capsys, *words)
@@ -74,31 +77,52 @@ def edited(change) -> str:
     return json.dumps(body)
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    (lambda h: h.update(schema=99), "this version reads 1"),
-    (lambda h: h.update(openings=h["openings"][1:]), "has no door"),
-    (lambda h: h["rooms"][0].update(kind="dungeon"), "unknown kind 'dungeon'"),
-    (lambda h: h["rooms"][0].update(id="../up"), "an id is made of"),
-    (lambda h: h["rooms"][0].update(polygon=[[0, 0]]), "simple counter-clockwise polygon"),
-    (lambda h: h["rooms"][0].update(accent_wall=9), "its walls are 0 to 3"),
-    (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "finite number"),
-    (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "finite number"),
-    (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
-    (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
-    (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
-    (lambda h: h["placements"][0].update(yaw="north"), "should be float"),
-    (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
-    (lambda h: h.update(disorder=7.0), "disorder"),
-    (lambda h: h.update(stairs=[{"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}]), "stair 's'"),
-    (lambda h: h.update(lights=[{"id": "l", "room": "bedroom_1", "placement": "ghost", "position": [7, 2, 2],
-                                 "color": [1, 1, 1], "power": 100}]), "unknown object 'ghost'"),
-])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda h: h.update(schema=99), "this version reads 1"),
+        (lambda h: h.update(openings=h["openings"][1:]), "has no door"),
+        (lambda h: h["rooms"][0].update(kind="dungeon"), "unknown kind 'dungeon'"),
+        (lambda h: h["rooms"][0].update(id="../up"), "an id is made of"),
+        (lambda h: h["rooms"][0].update(polygon=[[0, 0]]), "simple counter-clockwise polygon"),
+        (lambda h: h["rooms"][0].update(accent_wall=9), "its walls are 0 to 3"),
+        (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "finite number"),
+        (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "finite number"),
+        (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
+        (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
+        (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
+        (lambda h: h["placements"][0].update(yaw="north"), "should be float"),
+        (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
+        (lambda h: h.update(disorder=7.0), "disorder"),
+        (
+            lambda h: h.update(stairs=[{"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}]),
+            "stair 's'",
+        ),
+        (
+            lambda h: h.update(
+                lights=[
+                    {
+                        "id": "l",
+                        "room": "bedroom_1",
+                        "placement": "ghost",
+                        "position": [7, 2, 2],
+                        "color": [1, 1, 1],
+                        "power": 100,
+                    }
+                ]
+            ),
+            "unknown object 'ghost'",
+        ),
+    ],
+)
 def test_a_house_edited_into_nonsense_is_refused(change, message):
     with pytest.raises(HouseError, match=message):
         House.from_json(edited(change))
 
 
-@pytest.mark.parametrize("data", [b"", b"\xff\xfe\x00", b"[" * 100_000, b'{"schema":1,"seed":' + b"9" * 6000 + b"}", b"null"])
+@pytest.mark.parametrize(
+    "data", [b"", b"\xff\xfe\x00", b"[" * 100_000, b'{"schema":1,"seed":' + b"9" * 6000 + b"}", b"null"]
+)
 def test_a_house_file_that_is_no_house_is_named(data, tmp_path):
     path = tmp_path / "house.json"
     path.write_bytes(data)
@@ -164,19 +188,34 @@ def test_a_flipped_byte_in_a_panorama_file_is_found(tmp_path):
 
 
 def test_no_opengl_is_one_line():
-    for environment, message in (({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
-                                 ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL")):
+    for environment, message in (
+        ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
+        ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL"),
+    ):
         code = "from embodied import cli\nfrom embodied.cli import doctor\ndoctor.run = lambda a: __import__('embodied.gl').gl.info()\n"
-        done = subprocess.run([sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"], check=False,
-                              capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
+        done = subprocess.run(
+            [sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env={**os.environ, **environment},
+        )
         assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
-@pytest.mark.parametrize(("error", "status", "message"), [
-    (OSError(errno.ENOSPC, "No space left on device", "/x/y"), 2, "/x/y: No space left on device: the disk is full; free"),
-    (UnableError("no light;\nuse unlit"), 2, "error: no light; use unlit"),
-    (KeyboardInterrupt(), 130, "the same command goes on from there"),
-])
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device", "/x/y"),
+            2,
+            "/x/y: No space left on device: the disk is full; free",
+        ),
+        (UnableError("no light;\nuse unlit"), 2, "error: no light; use unlit"),
+        (KeyboardInterrupt(), 130, "the same command goes on from there"),
+    ],
+)
 def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys, monkeypatch):
     from embodied.cli import doctor
 
@@ -191,8 +230,10 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
 
 def test_an_optimiser_can_be_made_after_drawing():
     """PyTorch's CUDA build imports triton then, whose LLVM does not get on with that of Mesa's software OpenGL."""
-    code = ("from embodied import gl; gl.info(); import torch\n"
-            "torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))]); print('made')")
+    code = (
+        "from embodied import gl; gl.info(); import torch\n"
+        "torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))]); print('made')"
+    )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "made", (done.returncode, done.stderr)
 
@@ -221,9 +262,13 @@ def test_a_full_disk_leaves_no_file(tmp_path):
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
-    code = ("import sys, signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.__main__ import start\n"
-            "print('go', flush=True); sys.exit(start())")
-    process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    code = (
+        "import sys, signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.__main__ import start\n"
+        "print('go', flush=True); sys.exit(start())"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     process.stdout.readline()
     time.sleep(0.01 + seconds)
     process.send_signal(signal.SIGINT)
@@ -233,8 +278,10 @@ def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
 
 
 def test_help_imports_no_subcommand_and_import_embodied_is_light():
-    code = ("import sys, embodied, embodied.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
-            "print([m for m in ('numpy', 'shapely', 'mujoco', 'torch', 'embodied.cli.house') if m in sys.modules])")
+    code = (
+        "import sys, embodied, embodied.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy', 'shapely', 'mujoco', 'torch', 'embodied.cli.house') if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert done.stdout.splitlines()[-1] == "[]"
 

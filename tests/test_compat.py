@@ -42,7 +42,9 @@ def test_the_action_list_of_a_node_on_the_line():
     assert east["rel_heading"] == pytest.approx(np.pi / 2) and (east["absViewIndex"], east["relViewIndex"]) == (15, 15)
     assert west["rel_heading"] == pytest.approx(-np.pi / 2) and west["absViewIndex"] == 21
     turned = action_list(line_world().graph, 1, 3)[1]
-    assert (turned["nextViewpointId"], turned["relViewIndex"], turned["absViewIndex"]) == ("n2", 12, 15), "straight ahead"
+    assert (turned["nextViewpointId"], turned["relViewIndex"], turned["absViewIndex"]) == ("n2", 12, 15), (
+        "straight ahead"
+    )
 
 
 def test_hannas_files_hold_together(tmp_path):
@@ -92,7 +94,7 @@ def test_vnla_trajectories_end_with_stop_and_walk_the_path(tmp_path):
 def test_feature_files_survive(tmp_path):
     features = np.random.default_rng(0).normal(size=(36, 5)).astype(np.float32)
     write_features(tmp_path / "f.tsv", [("test_0001", "v000", features)])
-    (key, again), = read_features(tmp_path / "f.tsv").items()
+    ((key, again),) = read_features(tmp_path / "f.tsv").items()
     assert key == ("test0001", "v000") and (again == features).all()
     assert (in_matterport_order(features)[12] == features[15]).all(), "viewIndex 12 looks along +y, our view 15"
 

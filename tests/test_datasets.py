@@ -95,8 +95,12 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
 
 def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache", "hari")
-    for split, room, held in (("train", None, None), ("pretrain", None, None), ("val_unseen_start", "val", None),
-                               ("test_unseen_object", None, "test")):
+    for split, room, held in (
+        ("train", None, None),
+        ("pretrain", None, None),
+        ("val_unseen_start", "val", None),
+        ("test_unseen_object", None, "test"),
+    ):
         for t in data.tasks(split):
             place = data.place(t.world)
             assert room_part(place, place.graph.room_of_node[t.start.node], seed=4) == room, split

@@ -84,7 +84,12 @@ def test_impossible_actions_are_refused_and_change_nothing():
     env = HelpEnv({"line": world}, moves=MonocularMoves())
     task = dataclasses.replace(find_tasks(world)[0], start=Pose(0, 6))
     first = env.reset(task)
-    for wrong, words in ((Move(9), "does not exist"), (Move(0), "masked"), (Ask(), "can_ask"), ("left", "expected Move")):
+    for wrong, words in (
+        (Move(9), "does not exist"),
+        (Move(0), "masked"),
+        (Ask(), "can_ask"),
+        ("left", "expected Move"),
+    ):
         with pytest.raises(ActionError, match=words):
             env.step(wrong)
     assert env.observation == first
@@ -114,7 +119,9 @@ def test_moving_looks_where_the_candidate_was():
     assert {p.node for p in poses} == {0, 2}
     east = next(p for p in poses if p.node == 2)
     assert (east.turn, east.tilt) == (0, 0)
-    assert candidates.bearing == pytest.approx([-np.pi / 2, np.pi / 2]) or candidates.bearing == pytest.approx([np.pi / 2, -np.pi / 2])
+    assert candidates.bearing == pytest.approx([-np.pi / 2, np.pi / 2]) or candidates.bearing == pytest.approx(
+        [np.pi / 2, -np.pi / 2]
+    )
 
 
 def test_the_nearest_view_of_a_view_centre_is_itself():

@@ -45,7 +45,10 @@ def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
     data = build(tmp_path / "d", tmp_path / "c", kind)
     split = "test_unseen_env" if kind == "hari" else "test_unseen"
-    rows = {r.agent: r.values for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind] if n not in LOOKING}, limit=8)}
+    rows = {
+        r.agent: r.values
+        for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind] if n not in LOOKING}, limit=8)
+    }
     assert rows["shortest"]["success"].mean == 1
     assert rows["random walk"]["success"].mean < 0.5
     if kind == "hanna":
@@ -60,7 +63,10 @@ def test_the_rows_come_out_as_they_should(kind, tmp_path):
 def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     data = build(tmp_path / "d", tmp_path / "c")
     out = tmp_path / "out"
-    assert main(["eval", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)]) == 0
+    assert (
+        main(["eval", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "| shortest | test_unseen | 100.0 ± 0.0 | 100.0 ± 0.0 | 0.00 ± 0.00 |" in printed
     assert (out / "table.md").read_text().startswith("| agent | split | success (%)")

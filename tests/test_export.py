@@ -45,12 +45,25 @@ def test_a_free_export_has_joints_and_settles(house, tmp_path):
 def test_textures_travel_with_the_folder(house, tmp_path):
     page = np.random.default_rng(0).integers(0, 255, (16, 32, 3), dtype=np.uint8)
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1]], np.float32)
-    lit = LitPages((LitMesh("rug_1", "object", "living_room_1", 0, corners, np.array([[0, 1, 2]], np.int32),
-                            np.zeros((3, 2), np.float32)),), (page,), "x")
+    lit = LitPages(
+        (
+            LitMesh(
+                "rug_1",
+                "object",
+                "living_room_1",
+                0,
+                corners,
+                np.array([[0, 1, 2]], np.int32),
+                np.zeros((3, 2), np.float32),
+            ),
+        ),
+        (page,),
+        "x",
+    )
     model = mujoco.MjModel.from_xml_path(str(export_mjcf(house, HandCatalogue(), tmp_path, lit=lit)))
     texture = model.texture("page_0")
     start = int(texture.adr[0])
-    assert np.array_equal(model.tex_data[start:start + page.size].reshape(page.shape), page)
+    assert np.array_equal(model.tex_data[start : start + page.size].reshape(page.shape), page)
 
 
 def test_the_glb_holds_every_owner_upright(house, tmp_path):

@@ -50,8 +50,9 @@ def test_back_ends_agree(house, lit):
 
 def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
     """Only the floor changes, nowhere darker; where one looks along it, it takes on what stands behind (Fresnel)."""
-    shiny = dataclasses.replace(lit, meshes=tuple(
-        dataclasses.replace(m, gloss=(0.05, 0.5)) if "/floor" in m.owner else m for m in lit.meshes))
+    shiny = dataclasses.replace(
+        lit, meshes=tuple(dataclasses.replace(m, gloss=(0.05, 0.5)) if "/floor" in m.owner else m for m in lit.meshes)
+    )
     shots = []
     for pages in (lit, shiny):
         with Renderer(house, HandCatalogue(), size=96, quality="baked", lit=pages, backend="filament") as r:
@@ -59,7 +60,13 @@ def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
     floors = np.array([i + 1 for i, o in enumerate(lit.owners or owners(house)) if "/floor" in o])
     on_floor = np.isin(shots[0].ids, floors)
     gain = shots[1].rgb.astype(int) - shots[0].rgb
-    inside = on_floor & np.roll(on_floor, 1, 0) & np.roll(on_floor, -1, 0) & np.roll(on_floor, 1, 1) & np.roll(on_floor, -1, 1)
+    inside = (
+        on_floor
+        & np.roll(on_floor, 1, 0)
+        & np.roll(on_floor, -1, 0)
+        & np.roll(on_floor, 1, 1)
+        & np.roll(on_floor, -1, 1)
+    )
     assert np.abs(gain[~on_floor]).mean() < 1 and np.median(gain[inside].max(-1)) >= 2 and gain[inside].min() > -4
 
 

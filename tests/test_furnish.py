@@ -28,11 +28,28 @@ TOUCH = 2e-3
 """Overlap of two boxes that is still a touch, metres: rounding of positions and yaws."""
 
 SIZES = {  # typical inner widths and depths, metres
-    "living_room": (6.0, 4.6), "kitchen": (4.0, 3.2), "dining_room": (4.4, 3.6), "main_bedroom": (4.6, 4.0),
-    "bedroom": (3.8, 3.2), "kids_room": (3.8, 3.2), "guest_room": (3.8, 3.2), "bathroom": (3.0, 2.4),
-    "toilet": (1.2, 2.0), "hall": (3.0, 2.6), "corridor": (6.0, 1.3), "study": (3.6, 3.0), "laundry_room": (3.0, 2.2),
-    "pantry": (2.0, 1.6), "closet": (2.6, 2.2), "library": (5.0, 4.0), "playroom": (5.0, 4.0), "gym": (5.0, 4.0),
-    "garage": (6.0, 4.0), "family_room": (5.4, 4.4), "sun_room": (4.4, 3.4), "workshop": (4.6, 3.6),
+    "living_room": (6.0, 4.6),
+    "kitchen": (4.0, 3.2),
+    "dining_room": (4.4, 3.6),
+    "main_bedroom": (4.6, 4.0),
+    "bedroom": (3.8, 3.2),
+    "kids_room": (3.8, 3.2),
+    "guest_room": (3.8, 3.2),
+    "bathroom": (3.0, 2.4),
+    "toilet": (1.2, 2.0),
+    "hall": (3.0, 2.6),
+    "corridor": (6.0, 1.3),
+    "study": (3.6, 3.0),
+    "laundry_room": (3.0, 2.2),
+    "pantry": (2.0, 1.6),
+    "closet": (2.6, 2.2),
+    "library": (5.0, 4.0),
+    "playroom": (5.0, 4.0),
+    "gym": (5.0, 4.0),
+    "garage": (6.0, 4.0),
+    "family_room": (5.4, 4.4),
+    "sun_room": (4.4, 3.4),
+    "workshop": (4.6, 3.6),
     "stairwell": (3.0, 3.0),
 }
 
@@ -60,8 +77,11 @@ def one_room(kind: str, seed: int = 0) -> House:
     side = min(0.9, w - 0.4)
     openings = [Opening("door_1", "door", (room.id, None), (0.2, 0.0), (0.2 + side, 0.0), 0.0, 2.05, "paint_white/0")]
     if w > 2.2:
-        openings.append(Opening("window_1", "window", (room.id, None), (w / 2 + 0.6, d), (w / 2 - 0.6, d), 0.95, 2.1,
-                                "paint_white/0"))
+        openings.append(
+            Opening(
+                "window_1", "window", (room.id, None), (w / 2 + 0.6, d), (w / 2 - 0.6, d), 0.95, 2.1, "paint_white/0"
+            )
+        )
     draft = House(seed, kind, (Storey(0.0, 2.6),), (room,), tuple(openings), (), ())
     return furnish(draft, catalogue(), seed=seed)
 
@@ -111,8 +131,11 @@ def test_what_has_no_parent_stands_on_the_floor_hangs_on_a_wall_or_under_the_cei
             z = p.position[2] - storey.elevation
             if abs(z) < 1e-3 or abs(z + p.size[2] - storey.height) < 2e-3:
                 continue
-            if any(f.position[2] + f.size[2] == pytest.approx(p.position[2], abs=1e-3) and f.size[2] < 0.03
-                   for f in house.placements if f.room == p.room):
+            if any(
+                f.position[2] + f.size[2] == pytest.approx(p.position[2], abs=1e-3) and f.size[2] < 0.03
+                for f in house.placements
+                if f.room == p.room
+            ):
                 continue  # a toy on a rug
             back = np.array(p.position[:2]) + np.array([-math.sin(p.yaw), math.cos(p.yaw)]) * p.size[1] / 2
             gap = house.floor(room).exterior.distance(shapely.Point(back))
@@ -120,8 +143,17 @@ def test_what_has_no_parent_stands_on_the_floor_hangs_on_a_wall_or_under_the_cei
 
 
 def test_objects_do_not_interpenetrate():
-    chairs_under = ("dining table", "bistro table", "desk", "office table", "child table", "kitchen island",
-                    "dressing table", "drafting table", "bar table")
+    chairs_under = (
+        "dining table",
+        "bistro table",
+        "desk",
+        "office table",
+        "child table",
+        "kitchen island",
+        "dressing table",
+        "drafting table",
+        "bar table",
+    )
     for house in houses():
         for room in house.rooms:
             things = [p for p in house.placements if p.room == room.id and not (p.size[2] <= 0.03 and not p.parent)]
@@ -153,13 +185,18 @@ def test_nothing_stands_in_a_doorway_or_before_a_window():
                     x, y = wall.point((s0 + s1) / 2, depth / 2)
                     free = box(x, y, s1 - s0, depth, wall.yaw, z0 + 0.05, o.head - 0.05)
                     for p in house.placements:
-                        if p.room == room.id and p.parent is None and p.object_class not in ("curtain", "window blind", "roller blind"):
+                        if (
+                            p.room == room.id
+                            and p.parent is None
+                            and p.object_class not in ("curtain", "window blind", "roller blind")
+                        ):
                             assert not overlap(free, box_of(p)), f"{p.id} blocks {o.id} in {house.seed}"
 
 
 def test_one_walks_from_every_door_of_a_room_to_every_other():
     """A raster of its own: free floor eroded by 0.2 m, furniture as it was placed."""
     from scipy import ndimage
+
     for house in houses():
         for room in house.rooms:
             floor = house.floor(room)
@@ -170,8 +207,10 @@ def test_one_walks_from_every_door_of_a_room_to_every_other():
             ]
             free = floor.buffer(-0.2).difference(shapely.union_all(blocked))
             doors = [
-                wall.point((s0 + s1) / 2, 0.32) for wall in room_space(house, room).walls
-                for s0, s1, o in wall.openings if o.kind in DOORS
+                wall.point((s0 + s1) / 2, 0.32)
+                for wall in room_space(house, room).walls
+                for s0, s1, o in wall.openings
+                if o.kind in DOORS
             ]
             x0, y0, x1, y1 = floor.bounds
             xs, ys = np.meshgrid(np.arange(x0, x1, 0.05), np.arange(y0, y1, 0.05))
@@ -196,7 +235,9 @@ def test_a_room_of_every_kind_gets_furniture_and_a_ceiling_lamp(kind):
 def test_a_kitchen_has_sink_cooker_and_fridge_and_a_bathroom_toilet_and_basin():
     for seed in range(6):
         kitchen = one_room("kitchen", seed)
-        assert of_class(kitchen, "kitchen sink") and of_class(kitchen, "cooker", "cooktop") and of_class(kitchen, "fridge")
+        assert (
+            of_class(kitchen, "kitchen sink") and of_class(kitchen, "cooker", "cooktop") and of_class(kitchen, "fridge")
+        )
         bathroom = one_room("bathroom", seed)
         assert of_class(bathroom, "toilet") and of_class(bathroom, *BASINS)
         assert of_class(bathroom, "bathtub", "shower", "corner bathtub")
@@ -224,9 +265,15 @@ def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monk
     house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=room)
     assert first == [0, 1, 2, 3, 4]
     monkeypatch.setattr(stages, "lacking", lambda house: ())
-    assert house.digest == generate_house(
-        7, HouseConfig(area=(38.0, 46.0)), catalogue(),
-        stages={**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, first=1))}).digest
+    assert (
+        house.digest
+        == generate_house(
+            7,
+            HouseConfig(area=(38.0, 46.0)),
+            catalogue(),
+            stages={**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, first=1))},
+        ).digest
+    )
 
 
 def test_worktops_of_all_kitchens_are_in_use():
@@ -242,8 +289,11 @@ def test_worktops_of_all_kitchens_are_in_use():
 def test_no_picture_hangs_twice_while_there_are_others():
     """The framed print and the poster of one image are the same picture."""
     for house in houses():
-        hung = [p.asset.rsplit("/", 1)[-1].removeprefix("paper_") for p in house.placements
-                if p.object_class in ("picture", "painting", "poster")]
+        hung = [
+            p.asset.rsplit("/", 1)[-1].removeprefix("paper_")
+            for p in house.placements
+            if p.object_class in ("picture", "painting", "poster")
+        ]
         rooms = [p.room for p in house.placements if p.object_class in ("picture", "painting", "poster")]
         assert len(set(zip(rooms, hung))) == len(hung), house.seed
         assert max(map(hung.count, hung)) == 1 or len(hung) > 60, house.seed
@@ -301,7 +351,13 @@ def test_the_same_seed_gives_the_same_house_in_another_process():
         "from embodied.generate.furnish import furnish;"
         "print(furnish(two_rooms(), load_catalogue(), seed=3).digest)"
     )
-    there = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
-                           cwd=__file__.rsplit("/", 1)[0], env={"PYTHONHASHSEED": "7", "PYTHONPATH": "..:."})
+    there = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=__file__.rsplit("/", 1)[0],
+        env={"PYTHONHASHSEED": "7", "PYTHONPATH": "..:."},
+    )
     assert there.stdout.strip() == furnish(two_rooms(), catalogue(), seed=3).digest
     assert furnish(two_rooms(), catalogue(), seed=4).digest != there.stdout.strip()

@@ -147,8 +147,14 @@ def test_sizes_fit_the_table_of_usual_rooms():
     for house in houses():
         for r in house.rooms:
             areas.setdefault(r.kind, []).append(polygon(r).area)
-    for kind, low, high in (("living_room", 14, 40), ("kitchen", 6, 18), ("main_bedroom", 10, 22), ("bedroom", 8, 15),
-                            ("bathroom", 3.8, 9), ("toilet", 1.4, 3.6)):
+    for kind, low, high in (
+        ("living_room", 14, 40),
+        ("kitchen", 6, 18),
+        ("main_bedroom", 10, 22),
+        ("bedroom", 8, 15),
+        ("bathroom", 3.8, 9),
+        ("toilet", 1.4, 3.6),
+    ):
         assert low < np.median(areas[kind]) < high, kind
 
 
@@ -159,7 +165,9 @@ def test_at_least_sixteen_room_kinds_occur_and_all_are_known():
 
 
 def test_wide_houses_are_not_all_rectangles():
-    corners = [len(shapely.union_all([polygon(r) for r in h.rooms]).simplify(1e-6).exterior.coords) - 1 for h in houses()]
+    corners = [
+        len(shapely.union_all([polygon(r) for r in h.rooms]).simplify(1e-6).exterior.coords) - 1 for h in houses()
+    ]
     assert 4 in corners and 6 in corners and 8 in corners
 
 
@@ -211,9 +219,12 @@ def test_an_accent_wall_has_neither_door_nor_window():
         for r in house.rooms:
             if r.accent_wall is not None:
                 corners = [*r.polygon, r.polygon[0]]
-                wall = shapely.LineString(corners[r.accent_wall:r.accent_wall + 2])
-                assert all(wall.distance(shapely.Point((np.add(o.a, o.b)) / 2)) > 0.1
-                           for o in house.openings if r.id in o.rooms)
+                wall = shapely.LineString(corners[r.accent_wall : r.accent_wall + 2])
+                assert all(
+                    wall.distance(shapely.Point((np.add(o.a, o.b)) / 2)) > 0.1
+                    for o in house.openings
+                    if r.id in o.rooms
+                )
 
 
 def test_fixed_sky_and_disorder_are_kept():
@@ -221,20 +232,35 @@ def test_fixed_sky_and_disorder_are_kept():
     assert (house.sky.hour, house.sky.weather, house.disorder, house.style) == (7.5, "overcast", 0.9, "classic")
 
 
-@pytest.mark.parametrize("options, message", [
-    ({"area": (10, 20)}, "area"), ({"rooms": 30}, "rooms"), ({"shape": "star"}, "shape"), ({"storeys": 2}, "storeys"),
-    ({"hour": 25.0}, "hour"), ({"weather": "snow"}, "weather"), ({"disorder": 2.0}, "disorder"), ({"style": "rococo"}, "style"),
-    ({"rooms": 3, "bedrooms": 3}, "bedrooms"), ({"rooms": 20, "bedrooms": 2}, "to invent"), ({"rooms": 12, "area": (40, 60)}, "need at least"),
-    ({"rooms": 2, "area": (400, 500)}, "fill at most"), ({"area": (200, 100)}, "area"), ({"shape": "U", "area": (40, 60)}, "U"),
-])
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"area": (10, 20)}, "area"),
+        ({"rooms": 30}, "rooms"),
+        ({"shape": "star"}, "shape"),
+        ({"storeys": 2}, "storeys"),
+        ({"hour": 25.0}, "hour"),
+        ({"weather": "snow"}, "weather"),
+        ({"disorder": 2.0}, "disorder"),
+        ({"style": "rococo"}, "style"),
+        ({"rooms": 3, "bedrooms": 3}, "bedrooms"),
+        ({"rooms": 20, "bedrooms": 2}, "to invent"),
+        ({"rooms": 12, "area": (40, 60)}, "need at least"),
+        ({"rooms": 2, "area": (400, 500)}, "fill at most"),
+        ({"area": (200, 100)}, "area"),
+        ({"shape": "U", "area": (40, 60)}, "U"),
+    ],
+)
 def test_impossible_wishes_are_refused_at_once(options, message):
     with pytest.raises(HouseError, match=message):
         HouseConfig(**options)
 
 
 def test_the_same_seed_gives_the_same_house_in_another_process():
-    code = ("from embodied.generate import *; print(*(generate_house(s, stages={k: v for k, v in STAGES.items() "
-            "if k not in ('furnish', 'clear')}).digest for s in (3, 17)))")
+    code = (
+        "from embodied.generate import *; print(*(generate_house(s, stages={k: v for k, v in STAGES.items() "
+        "if k not in ('furnish', 'clear')}).digest for s in (3, 17)))"
+    )
     env = {"PYTHONHASHSEED": "4711", "PATH": ""}
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
     assert out.stdout.split() == [houses()[3].digest, houses()[17].digest]
@@ -247,8 +273,14 @@ def test_different_seeds_give_different_houses():
 def test_a_stage_can_be_replaced():
     def square(draft: Draft) -> Draft:
         rng = stream(draft.seed, "mine")
-        return Draft(draft.seed, draft.config, draft.catalogue, 100.0, "rectangle",
-                     tuple(draw_footprint(100.0, "rectangle", rng=rng) for _ in range(10)))
+        return Draft(
+            draft.seed,
+            draft.config,
+            draft.catalogue,
+            100.0,
+            "rectangle",
+            tuple(draw_footprint(100.0, "rectangle", rng=rng) for _ in range(10)),
+        )
 
     house = generate_house(2, stages={**BARE, "footprint": square})
     assert house.area == pytest.approx(100, rel=0.05)

@@ -37,9 +37,7 @@ def tmp(tmp_path) -> str:
 def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make(
-            f"embodied/{IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array"
-        )
+        env = gym.make(f"embodied/{IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array")
         check_env(env.unwrapped, skip_render_check=False)
 
 
@@ -48,11 +46,18 @@ def test_all_are_registered():
         assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym.env:make"
 
 
-@pytest.mark.parametrize("imports", ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"])
+@pytest.mark.parametrize(
+    "imports",
+    ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"],
+)
 def test_import_embodied_registers_in_any_order(imports):
-    code = (f"import {imports}; import gymnasium; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
-            "('Find', 'VLN', 'VNLA', 'HANNA', 'HARI')], sys.modules.keys() & {'mujoco', 'torch', 'embodied.gym.env'})")
-    done = subprocess.run([sys.executable, "-c", f"import sys; {code}"], check=True, capture_output=True, text=True, timeout=120)
+    code = (
+        f"import {imports}; import gymnasium; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
+        "('Find', 'VLN', 'VNLA', 'HANNA', 'HARI')], sys.modules.keys() & {'mujoco', 'torch', 'embodied.gym.env'})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; {code}"], check=True, capture_output=True, text=True, timeout=120
+    )
     assert done.stdout.strip() == f"{[{'kind': kind} for kind in KINDS]} set()"
 
 
@@ -84,7 +89,9 @@ def test_the_same_seed_plays_the_same_episode(tmp):
         observation, _ = env.reset(seed=11)
         rng = np.random.default_rng(0)
         for _ in range(30):
-            observation, reward, terminated, truncated, _ = env.step(int(rng.choice(np.flatnonzero(observation["action_mask"]))))
+            observation, reward, terminated, truncated, _ = env.step(
+                int(rng.choice(np.flatnonzero(observation["action_mask"])))
+            )
             total.append(reward)
             if terminated or truncated:
                 break

@@ -52,13 +52,7 @@ from embodied.policies.baselines import (
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
 from embodied.tasks.hanna import hanna_pool, hanna_task
-from embodied.teachers.hanna import (
-    HannaTeacher,
-    base37_entropy,
-    lost_as_programmed,
-    lost_as_written,
-    segments,
-)
+from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, lost_as_written, segments
 
 LINE_TASK = Task(
     "line/hanna/0", "hanna", "line", Pose(0), FindObject("mug", None, ("mug_1",)), (3,), "find a mug", 0.0, 20
@@ -133,8 +127,11 @@ def test_brute_force_agrees_with_equations_4_4_to_4_7():
             continue
         reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
         v = task.start.node
-        zone = [r for r in routes if r.path[0] == v or (
-            r.path[0] in world.graph.neighbours(v) and distance[v, r.path[0]] <= 2.0)]
+        zone = [
+            r
+            for r in routes
+            if r.path[0] == v or (r.path[0] in world.graph.neighbours(v) and distance[v, r.path[0]] <= 2.0)
+        ]
         best = min(distance[u, g] for r in zone for u in r.path for g in task.goal_nodes)
         assert distance[reply.subtask.target, reply.subtask.goal] == pytest.approx(best)
 
@@ -152,7 +149,9 @@ def test_an_episode_follows_algorithm_7_line_by_line():
     o = env.step(Move(env.situation.candidate_nodes.index(2)))
     assert (o.mode, o.time_on_task, env.pose.node) == (Mode.SUB, 1, 2)
     o = env.step(Stop())
-    assert (o.mode, o.instruction, o.target) == (Mode.MAIN, "find a mug", Sight("line", 3)), "departed early: image of g*"
+    assert (o.mode, o.instruction, o.target) == (Mode.MAIN, "find a mug", Sight("line", 3)), (
+        "departed early: image of g*"
+    )
     assert (env.pose.node, o.time, o.time_on_task, env.situation.targets) == (2, 3, 0, (3,))
     o = env.step(Move(env.situation.candidate_nodes.index(3)))
     assert env.step(Stop()) is None
@@ -200,8 +199,10 @@ def test_teacher_navigation_solves_everything_however_it_asks():
 
 def test_perfect_interpretation_beats_chance_by_far():
     world, _, tasks, make = grid_setup(60)
-    rates = [np.mean([metrics.success(e, world.graph) for e in play(make, p, tasks, seed=0)])
-             for p in (PerfectInterpreter(), RandomWalk())]
+    rates = [
+        np.mean([metrics.success(e, world.graph) for e in play(make, p, tasks, seed=0)])
+        for p in (PerfectInterpreter(), RandomWalk())
+    ]
     assert rates[0] > 0.7 and rates[1] < 0.2
 
 

@@ -25,8 +25,15 @@ from agents.hanna.percept import (
 )
 
 SMALL = HannaConfig(
-    words=12, feature_size=6, hidden_size=16, navigation_embedding=8, ask_embedding=4, self_heads=2, text_heads=2,
-    dropout=0.0, orientation_copies=2,
+    words=12,
+    feature_size=6,
+    hidden_size=16,
+    navigation_embedding=8,
+    ask_embedding=4,
+    self_heads=2,
+    text_heads=2,
+    dropout=0.0,
+    orientation_copies=2,
 )
 
 
@@ -40,14 +47,19 @@ def percepts(steps: int, agents: int, *, seed: int, actions: int = 4, words: int
         embedded[:, 0] = 0
         slots = torch.from_numpy(rng.integers(0, 36, (agents, actions)))
         slots[:, 0] = SLOTS - 1
-        out.append(Percept(
-            tokens=torch.from_numpy(rng.integers(1, 12, (agents, words))),
-            new_task=torch.from_numpy(rng.random(agents) < (1.0 if t == 0 else 0.3)),
-            current=normal(agents, 36, 6), target=normal(agents, 36, 6), actions=embedded,
-            action_mask=torch.ones(agents, actions, dtype=torch.bool), action_slots=slots,
-            previous_action=normal(agents, SMALL.action_size),
-            previous_ask=torch.from_numpy(rng.integers(0, 2, agents)) if t else torch.full((agents,), START),
-        ))
+        out.append(
+            Percept(
+                tokens=torch.from_numpy(rng.integers(1, 12, (agents, words))),
+                new_task=torch.from_numpy(rng.random(agents) < (1.0 if t == 0 else 0.3)),
+                current=normal(agents, 36, 6),
+                target=normal(agents, 36, 6),
+                actions=embedded,
+                action_mask=torch.ones(agents, actions, dtype=torch.bool),
+                action_slots=slots,
+                previous_action=normal(agents, SMALL.action_size),
+                previous_ask=torch.from_numpy(rng.integers(0, 2, agents)) if t else torch.full((agents,), START),
+            )
+        )
     return out
 
 
@@ -187,11 +199,15 @@ def test_padding_of_words_and_actions_is_never_looked_at(kind):
     padded = []
     for p in steps:
         mask = torch.cat([p.action_mask, torch.zeros(2, 3, dtype=torch.bool)], 1)
-        padded.append(dataclasses.replace(
-            p, tokens=torch.cat([p.tokens, torch.zeros(2, 4, dtype=torch.long)], 1), action_mask=mask,
-            actions=torch.cat([p.actions, 100 * torch.ones(2, 3, SMALL.action_size)], 1),
-            action_slots=torch.cat([p.action_slots, torch.zeros(2, 3, dtype=torch.long)], 1),
-        ))
+        padded.append(
+            dataclasses.replace(
+                p,
+                tokens=torch.cat([p.tokens, torch.zeros(2, 4, dtype=torch.long)], 1),
+                action_mask=mask,
+                actions=torch.cat([p.actions, 100 * torch.ones(2, 3, SMALL.action_size)], 1),
+                action_slots=torch.cat([p.action_slots, torch.zeros(2, 3, dtype=torch.long)], 1),
+            )
+        )
     for a, b in zip(play(net, steps), play(net, padded), strict=True):
         assert torch.allclose(a.navigation, b.navigation[:, :4], atol=1e-5)
         assert torch.allclose(a.ask, b.ask, atol=1e-5)
@@ -199,8 +215,9 @@ def test_padding_of_words_and_actions_is_never_looked_at(kind):
 
 def changed_history(steps: list[Percept]) -> list[Percept]:
     """The same steps, but the agent saw other views before the last two."""
-    return [dataclasses.replace(p, current=p.current.roll(1, 2)) if t < len(steps) - 2 else p
-            for t, p in enumerate(steps)]
+    return [
+        dataclasses.replace(p, current=p.current.roll(1, 2)) if t < len(steps) - 2 else p for t, p in enumerate(steps)
+    ]
 
 
 def test_a_new_task_wipes_the_inter_task_state_and_nothing_else():
@@ -250,7 +267,11 @@ def test_the_gate_subtracts_what_was_thought_in_the_same_situation():
     blind = network(similarity_attention=False)
     blind.load_state_dict(net.state_dict())
     memory, reference = net.start(1, 5)[0], blind.start(1, 5)[0]
-    delta, nothing, yes = target_similarity(step.current, step.target), torch.zeros(1, 0), torch.ones(1, dtype=torch.bool)
+    delta, nothing, yes = (
+        target_similarity(step.current, step.target),
+        torch.zeros(1, 0),
+        torch.ones(1, dtype=torch.bool),
+    )
     previous = step.previous_action
     first, memory = net.navigation(memory, step, delta, previous, nothing, yes)
     tentative, reference = blind.navigation(reference, step, delta, previous, nothing, yes)
@@ -266,10 +287,15 @@ def test_the_paper_sized_model_has_about_the_fifteen_million_parameters_of_table
     assert sum(p.numel() for p in net.parameters()) == pytest.approx(15.5e6, rel=0.05)
 
 
-@pytest.mark.parametrize("change", [
-    {"reset_inter_task": False}, {"predict_reasons": False}, {"similarity_attention": False},
-    {"similarity_normaliser": "all"},
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"reset_inter_task": False},
+        {"predict_reasons": False},
+        {"similarity_attention": False},
+        {"similarity_normaliser": "all"},
+    ],
+)
 def test_every_ablation_of_table_d2_runs_and_changes_what_is_computed(change):
     steps = percepts(6, 3, seed=11)
     base, ablated = network(), network(**change)

@@ -21,7 +21,9 @@ from embodied.tasks.goals import count_hops
 from embodied.tasks.hari import hari_pool, hari_task
 
 CUR, GOAL, SUB = Intention.CUR, Intention.GOAL, Intention.SUB
-TASK = Task("line/hari/0", "hari", "line", Pose(0), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug in a hall", 0.0, 30)
+TASK = Task(
+    "line/hari/0", "hari", "line", Pose(0), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug in a hall", 0.0, 30
+)
 
 
 def line_env(**options) -> HariEnv:
@@ -58,7 +60,8 @@ def test_at_most_twenty_objects_and_none_from_behind_the_wall():
     house = dataclasses.replace(world.house, placements=many)
     assert len(Describer(()).dense(dataclasses.replace(world, house=house), 0)) == 21
     other = dataclasses.replace(
-        world.house, rooms=(*world.house.rooms, room("bedroom_1", "bedroom", 0, 2, 8, 4)),
+        world.house,
+        rooms=(*world.house.rooms, room("bedroom_1", "bedroom", 0, 2, 8, 4)),
         placements=(thing("bed", 1, "bedroom_1", 1, 2.5),),
     )
     behind = dataclasses.replace(world, house=other)

@@ -45,12 +45,16 @@ def test_floors_are_rooms_less_half_a_wall():
 
 NONSENSE = {
     "no door": lambda h: dataclasses.replace(h, openings=h.openings[1:]),
-    "overlap": lambda h: dataclasses.replace(h, rooms=(h.rooms[0], dataclasses.replace(
-        h.rooms[1], polygon=((4.0, 0.0), (9.0, 0.0), (9.0, 4.0), (4.0, 4.0))))),
-    "clockwise|counter-clockwise": lambda h: dataclasses.replace(h, rooms=(dataclasses.replace(
-        h.rooms[0], polygon=h.rooms[0].polygon[::-1]), h.rooms[1])),
+    "overlap": lambda h: dataclasses.replace(
+        h, rooms=(h.rooms[0], dataclasses.replace(h.rooms[1], polygon=((4.0, 0.0), (9.0, 0.0), (9.0, 4.0), (4.0, 4.0))))
+    ),
+    "clockwise|counter-clockwise": lambda h: dataclasses.replace(
+        h, rooms=(dataclasses.replace(h.rooms[0], polygon=h.rooms[0].polygon[::-1]), h.rooms[1])
+    ),
     "share the ids": lambda h: dataclasses.replace(h, rooms=(h.rooms[0], h.rooms[0])),
-    "unknown room": lambda h: dataclasses.replace(h, placements=(dataclasses.replace(h.placements[0], room="attic_1"),)),
+    "unknown room": lambda h: dataclasses.replace(
+        h, placements=(dataclasses.replace(h.placements[0], room="attic_1"),)
+    ),
     "outside its room": lambda h: with_thing(position=(20.0, 2.0, 0.0)),
     "not finite": lambda h: with_thing(yaw=math.nan),
     "must be positive": lambda h: with_thing(size=(1.0, 0.0, 1.0)),
@@ -58,20 +62,24 @@ NONSENSE = {
     "rests on itself": lambda h: with_thing(parent="rug_1"),
     "does not lie on a wall": lambda h: with_opening(2, a=(1.5, 1.0), b=(3.5, 1.0)),
     "behind its wall lies room": lambda h: with_opening(2, a=(5.0, 3.0), b=(5.0, 2.0)),
-    "should lead outdoors": lambda h: with_opening(
-        2, rooms=("living_room_1", "bedroom_1"), a=(5.0, 3.0), b=(5.0, 2.0)),
+    "should lead outdoors": lambda h: with_opening(2, rooms=("living_room_1", "bedroom_1"), a=(5.0, 3.0), b=(5.0, 2.0)),
     "overlap; move one": lambda h: with_opening(2, a=(0.0, 2.5), b=(0.0, 1.2)),
     "sill < head": lambda h: with_opening(2, sill=2.5),
     "its storey is": lambda h: with_opening(2, head=3.1),
     "hinge": lambda h: with_opening(0, hinge="left"),
     "wide": lambda h: with_opening(2, a=(1.5, 0.0), b=(1.6, 0.0)),
-    "cannot be reached": lambda h: dataclasses.replace(h, openings=(
-        dataclasses.replace(h.openings[0], kind="back_door", rooms=("bedroom_1", None), a=(9.0, 1.0), b=(9.0, 2.0)),
-        *h.openings[1:])),
+    "cannot be reached": lambda h: dataclasses.replace(
+        h,
+        openings=(
+            dataclasses.replace(h.openings[0], kind="back_door", rooms=("bedroom_1", None), a=(9.0, 1.0), b=(9.0, 2.0)),
+            *h.openings[1:],
+        ),
+    ),
     "storeys": lambda h: dataclasses.replace(h, storeys=(dataclasses.replace(h.storeys[0], height=1.0),)),
     "weather": lambda h: dataclasses.replace(h, sky=Sky(weather="hail")),
-    "names the unknown room": lambda h: dataclasses.replace(h, lights=(
-        Light("light_1", "attic_1", None, (1.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)),
+    "names the unknown room": lambda h: dataclasses.replace(
+        h, lights=(Light("light_1", "attic_1", None, (1.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
+    ),
 }
 
 

@@ -62,9 +62,22 @@ from embodied.teachers.hanna import HannaTeacher
 torch.set_num_threads(1)
 
 TINY = dataclasses.replace(
-    SCALES["mini"], hidden_size=32, navigation_embedding=32, ask_embedding=8, self_heads=2, text_heads=2, dropout=0.1,
-    iterations=4, batch=6, training_steps=8, evaluation_steps=12, validate_every=2, validation_tasks=6,
-    instruction_length=40, learning_rate=3e-3, cooldown=0.25,
+    SCALES["mini"],
+    hidden_size=32,
+    navigation_embedding=32,
+    ask_embedding=8,
+    self_heads=2,
+    text_heads=2,
+    dropout=0.1,
+    iterations=4,
+    batch=6,
+    training_steps=8,
+    evaluation_steps=12,
+    validate_every=2,
+    validation_tasks=6,
+    instruction_length=40,
+    learning_rate=3e-3,
+    cooldown=0.25,
 )
 
 
@@ -98,6 +111,7 @@ def run(folder, config=TINY, split=None, **options):
 
 
 # Losses ------------------------------------------------------------------------------------------
+
 
 def test_the_navigation_loss_is_that_of_equation_4_13():
     logits = torch.log(torch.tensor([[0.5, 0.2, 0.3], [0.1, 0.8, 0.1], [0.2, 0.2, 0.6]]))
@@ -146,6 +160,7 @@ def test_entropy_in_base_37_of_37_equal_actions_is_one():
 
 # Words, draws, batches ---------------------------------------------------------------------------
 
+
 def test_words_keep_their_numbers_and_strangers_are_unknown():
     words = build_vocabulary(["Find a mug.", "find a towel, please"])
     assert words.words[:6] == ("<PAD>", "<UNK>", "<EOS>", "a", "find", ",")
@@ -189,6 +204,7 @@ def test_every_pass_of_training_takes_every_task_once():
 
 
 # Play --------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("model", ["hanna", "lstm"])
 def test_an_episode_does_not_depend_on_the_batch_around_it(model):
@@ -271,7 +287,9 @@ def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
     episodes = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0).episodes
     asked = [[t for t, s in enumerate(e.steps) if isinstance(s.action, Ask)] for e in episodes]
     assert sum(map(len, asked[:half])) > 0 and not any(asked[half:])
-    assert all(first >= 4 for first, *_ in filter(None, asked)) and all(b - a >= 5 for times in asked for a, b in itertools.pairwise(times))
+    assert all(first >= 4 for first, *_ in filter(None, asked)) and all(
+        b - a >= 5 for times in asked for a, b in itertools.pairwise(times)
+    )
 
 
 def test_labels_line_up_with_what_the_networks_said():
@@ -296,6 +314,7 @@ def test_labels_line_up_with_what_the_networks_said():
 
 
 # Learning ----------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("model", ["hanna", "lstm"])
 def test_it_overfits_one_batch(model):
@@ -407,11 +426,16 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
         load_agent(path)
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    ({"model": "gpt"}, "model must be one of"), ({"ask_rule": "often"}, "ask_rule must be one of"),
-    ({"batch": 0}, "batch must be at least 1"), ({"learning_rate": 0.0}, "learning_rate must be positive"),
-    ({"alpha": -1.0}, "alpha must not be negative"),
-])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": "gpt"}, "model must be one of"),
+        ({"ask_rule": "often"}, "ask_rule must be one of"),
+        ({"batch": 0}, "batch must be at least 1"),
+        ({"learning_rate": 0.0}, "learning_rate must be positive"),
+        ({"alpha": -1.0}, "alpha must not be negative"),
+    ],
+)
 def test_impossible_settings_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         dataclasses.replace(TINY, **change)
@@ -445,8 +469,11 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     )
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
     process = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path), str(here)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, env=environment,
+        [sys.executable, "-c", code, str(tmp_path), str(here)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
     )
     assert process.stdout.readline().startswith("20/")
     process.send_signal(signal.SIGINT)

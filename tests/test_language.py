@@ -56,8 +56,18 @@ def some_phrases(lexicon, rng) -> list[Phrase]:
         return Phrase(make(lexicon.thing(word)), word)
 
     choice = lambda: kinds[int(rng.integers(len(kinds)))]
-    return [Phrase(Exit(choice())), Phrase(Turn("left")), of(To), of(lambda t: Past(t, "right")), Phrase(Turn("right", 45)),
-            Phrase(Enter(choice())), Phrase(Turn("left", 180)), Phrase(Metres(int(rng.integers(1, 9)))), of(Notice), of(StopBy)]
+    return [
+        Phrase(Exit(choice())),
+        Phrase(Turn("left")),
+        of(To),
+        of(lambda t: Past(t, "right")),
+        Phrase(Turn("right", 45)),
+        Phrase(Enter(choice())),
+        Phrase(Turn("left", 180)),
+        Phrase(Metres(int(rng.integers(1, 9)))),
+        of(Notice),
+        of(StopBy),
+    ]
 
 
 def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
@@ -72,7 +82,17 @@ def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
 
 def test_every_template_means_the_clauses_it_is_for(lexicon):
     for t in TEMPLATES:
-        text = t.text.format(side="left", room="kitchen", other="study", metres="three meters", steps="one big step", nth="second", thing="the nice red sofa", walk="make your way", soon="at once")
+        text = t.text.format(
+            side="left",
+            room="kitchen",
+            other="study",
+            metres="three meters",
+            steps="one big step",
+            nth="second",
+            thing="the nice red sofa",
+            walk="make your way",
+            soon="at once",
+        )
         assert tuple(kind_of(c) for c in parse(text, lexicon).clauses) == t.kinds, t.text
 
 
@@ -155,9 +175,36 @@ def test_speakers_have_shares_that_sum_to_one():
 
 
 def test_articles_follow_the_head_of_a_noun():
-    nouns = ("mug", "armchair", "row of books", "gloves", "stack of towels", "glass", "cactus", "utensil rack", "umbrella",
-             "butter", "adhesive tape", "tape measure", "bread box")
-    assert [with_article(n).split()[0] for n in nouns] == ["a", "an", "a", "some", "a", "a", "a", "a", "an", "some", "some", "a", "a"]
+    nouns = (
+        "mug",
+        "armchair",
+        "row of books",
+        "gloves",
+        "stack of towels",
+        "glass",
+        "cactus",
+        "utensil rack",
+        "umbrella",
+        "butter",
+        "adhesive tape",
+        "tape measure",
+        "bread box",
+    )
+    assert [with_article(n).split()[0] for n in nouns] == [
+        "a",
+        "an",
+        "a",
+        "some",
+        "a",
+        "a",
+        "a",
+        "a",
+        "an",
+        "some",
+        "some",
+        "a",
+        "a",
+    ]
 
 
 def test_a_counted_door_is_found_and_another_number_is_not(world):
@@ -171,8 +218,10 @@ def test_a_counted_door_is_found_and_another_number_is_not(world):
                     continue
                 side, nth, _ = found
                 other = "left" if side == "right" else "right"
-                right, wrong, mirrored = (count_cost(Enter("study", s, n), eyes, (a, int(b), int(c))) for s, n in (
-                    (side, nth), (side, nth + 1), (other, nth)))
+                right, wrong, mirrored = (
+                    count_cost(Enter("study", s, n), eyes, (a, int(b), int(c)))
+                    for s, n in ((side, nth), (side, nth + 1), (other, nth))
+                )
                 assert right == 0 < wrong < mirrored
                 checked += 1
     assert checked >= 2
@@ -180,10 +229,19 @@ def test_a_counted_door_is_found_and_another_number_is_not(world):
 
 def test_a_room_entered_from_its_own_kind_is_the_next_or_the_other_one(lexicon):
     speaker = SPEAKERS[0][1]
-    walk = [Phrase(Enter("corridor")), Phrase(Turn("left")), Phrase(Enter("corridor")), Phrase(Exit("corridor")), Phrase(Enter("bedroom")), Phrase(StopHere())]
+    walk = [
+        Phrase(Enter("corridor")),
+        Phrase(Turn("left")),
+        Phrase(Enter("corridor")),
+        Phrase(Exit("corridor")),
+        Phrase(Enter("bedroom")),
+        Phrase(StopHere()),
+    ]
     for seed in range(20):
         text = say(walk, speaker, rng=np.random.default_rng(seed)).lower()
-        assert len(re.findall(r"next (corridor|hallway|passage|passageway)\b", text)) == 1 and " other " not in text, text
+        assert len(re.findall(r"next (corridor|hallway|passage|passageway)\b", text)) == 1 and " other " not in text, (
+            text
+        )
         assert [kind_of(c) for c in parse(text, lexicon).clauses] == [kind_of(p.clause) for p in walk], text
 
 

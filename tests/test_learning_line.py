@@ -27,9 +27,32 @@ from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
 torch.set_num_threads(1)
-SMALL = ["--hidden-size", "16", "--navigation-embedding", "16", "--ask-embedding", "8", "--self-heads", "2", "--text-heads",
-         "2", "--batch", "4", "--training-steps", "6", "--evaluation-steps", "8", "--validation-tasks", "3",
-         "--validate-every", "1", "--threads", "1", "--network", "random"]
+SMALL = [
+    "--hidden-size",
+    "16",
+    "--navigation-embedding",
+    "16",
+    "--ask-embedding",
+    "8",
+    "--self-heads",
+    "2",
+    "--text-heads",
+    "2",
+    "--batch",
+    "4",
+    "--training-steps",
+    "6",
+    "--evaluation-steps",
+    "8",
+    "--validation-tasks",
+    "3",
+    "--validate-every",
+    "1",
+    "--threads",
+    "1",
+    "--network",
+    "random",
+]
 
 
 def train_hanna(arguments, note=print, **more):
@@ -52,7 +75,9 @@ def data(tmp_path_factory):
     for name in {n for s in data.splits for n in data.names(s)}:
         place = data.place(name)
         features = rng.normal(size=(len(place.graph.positions), 36, encoder.size))
-        save_features(feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest)
+        save_features(
+            feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest
+        )
     return data
 
 
@@ -68,8 +93,19 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
     assert len((tmp_path / "validation.jsonl").read_text().splitlines()) == 3
     said = []
     judge = parsed(
-        learning.add_eval, "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random",
-        "--tasks", 4, "--out", tmp_path / "table", "--threads", 1,
+        learning.add_eval,
+        "--data",
+        data.folder,
+        "--agent",
+        tmp_path / "best.safetensors",
+        "--network",
+        "random",
+        "--tasks",
+        4,
+        "--out",
+        tmp_path / "table",
+        "--threads",
+        1,
     )
     assert run_eval(judge, said.append) == 0
     table = (tmp_path / "table" / "table.md").read_text()
@@ -89,8 +125,14 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
     policies = hanna_policies(agent, bank)
     episodes = []
-    evaluate(data, "test_unseen", {"p": policies["learned, perfect interpretation"]}, seed=0, batch=4,
-             keep=lambda name, played: episodes.extend(played))
+    evaluate(
+        data,
+        "test_unseen",
+        {"p": policies["learned, perfect interpretation"]},
+        seed=0,
+        batch=4,
+        keep=lambda name, played: episodes.extend(played),
+    )
     worlds = data.places("test_unseen")
     assert failures(episodes, worlds).departed_wrong == 0.0
     assert request_share(episodes) > 0.2
@@ -105,7 +147,9 @@ def study(data, tmp_path):
     for name in {n for s in data.splits for n in data.names(s)}:
         place = data.place(name)
         features = stream(0, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
-        save_features(feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest)
+        save_features(
+            feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest
+        )
     config = learning.chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
     config = dataclasses.replace(config, iterations=2)
     return Setting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
@@ -116,13 +160,20 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     written = run_study(study, ["4.5", "4.6"], note=lines.append)
     assert (study.out / "figure_curves.png").read_bytes().startswith(b"\x89PNG")
     assert sorted(p.name for p in (study.out / "agents").iterdir()) == [
-        "ask_every_5", "final", "lstm", "no_ask", "no_curiosity", "random_ask"]
+        "ask_every_5",
+        "final",
+        "lstm",
+        "no_ask",
+        "no_curiosity",
+        "random_ask",
+    ]
     settings = json.loads((study.folder_of("ask every 5") / "settings.json").read_text())
     assert (settings["ask_rule"], settings["alpha"]) == ("every5", 0.5)
     table = written["4.5"].read_text()
     rows = json.loads((study.out / "table_4.5.json").read_text())
     assert [(r["agent"], r["split"]) for r in rows] == [
-        (a, s) for s in ("test_seen", "test_unseen") for a in ("No ask", "Random ask", "Ask every 5", "Learned")]
+        (a, s) for s in ("test_seen", "test_unseen") for a in ("No ask", "Random ask", "Ask every 5", "Learned")
+    ]
     assert rows[0]["values"]["requests"]["mean"] == 0.0
     assert "(86.67)" in table and "(45.43)" in table and "3 episodes in 1 houses" in table
     assert (study.out / "figure_D.1.png").stat().st_size > 5_000 and (study.out / "figure_D.2.png").exists()
@@ -160,7 +211,9 @@ def test_missing_features_and_wrong_rows_are_named(data, tmp_path):
         with pytest.raises(FileNotFoundError, match="embodied features"):
             train_hanna(arguments, lambda line: None)
     with pytest.raises(ValueError, match="unknown network 'resnet1'"):
-        encoder_of(parsed(learning.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1"))
+        encoder_of(
+            parsed(learning.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1")
+        )
 
 
 def _empty(folder):

@@ -131,7 +131,12 @@ def test_sheets_listed_once_per_side_are_unwrapped_once():
     assert len(flat.corners) == 12 and not flat.thin.any()
     from embodied.light.unwrap import face_normals
 
-    assert ((face_normals(flat.corners) * (flat.corners.mean(1) - 0.2)).sum(1)[np.abs(flat.corners.mean(1)[:, 2] - 0.2) < 0.19] > 0).all()
+    assert (
+        (face_normals(flat.corners) * (flat.corners.mean(1) - 0.2)).sum(1)[
+            np.abs(flat.corners.mean(1)[:, 2] - 0.2) < 0.19
+        ]
+        > 0
+    ).all()
 
 
 def test_packed_rectangles_do_not_overlap():
@@ -149,7 +154,9 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     own = np.where(good, 1.0, 0.1)[:, None].astype(np.float32)
     row = compose.filled(np.arange(24), own, good, (1, 24))[0, :, 0]
     assert (row[:7] == 1.0).all() and (np.diff(row) <= 0).all() and row[14:] == pytest.approx(0.1)
-    assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
+    assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(
+        0.1
+    )  # never brighter than beside it
 
 
 def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
@@ -157,7 +164,13 @@ def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
         flat = SimpleNamespace(size=np.array([side, side]))
         return Thing(name, "room", "object", flat, (), fineness, False)
 
-    things = [some("floor", 5, 10), some("small floor", 5, 5), some("rug", 4, 10), some("mirror", 8, 4), some("wall", 2, 20)]
+    things = [
+        some("floor", 5, 10),
+        some("small floor", 5, 5),
+        some("rug", 4, 10),
+        some("mirror", 8, 4),
+        some("wall", 2, 20),
+    ]
     total = lambda ts: sum(int(t.flat.size.prod()) * t.fineness**2 for t in ts)
     fineness = lambda most: [t.fineness for t in coarsened(things, most)]
     assert fineness(total(things)) == [5, 5, 4, 8, 2]
@@ -201,7 +214,9 @@ def ring(side: float, width: float) -> MeshPart:
     outer = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
     inner = side / 2 + (outer - side / 2) * (1 - 2 * width / side)
     vertices = np.concatenate([np.pad(np.concatenate([outer, inner]), ((0, 0), (0, 1)))]).astype(np.float32)
-    faces = np.array([f for k in range(4) for f in ((k, (k + 1) % 4, 4 + k), ((k + 1) % 4, 4 + (k + 1) % 4, 4 + k))], np.int32)
+    faces = np.array(
+        [f for k in range(4) for f in ((k, (k + 1) % 4, 4 + k), ((k + 1) % 4, 4 + (k + 1) % 4, 4 + k))], np.int32
+    )
     return MeshPart(vertices, faces, np.tile(np.float32([0, 0, 1]), (8, 1)), np.zeros((8, 2), np.float32), Finish())
 
 
@@ -221,7 +236,9 @@ def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
     assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
     monkeypatch.setattr(atlas, "OFFSETS", atlas.OFFSETS[:1])
     width, height = (int(x) for x in flat.size)
-    page = atlas.Page(width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part)
+    page = atlas.Page(
+        width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part
+    )
     assert len(atlas.rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
 
 
@@ -274,7 +291,11 @@ def test_arrays_without_llvm_mean_the_same():
     n /= np.linalg.norm(n, axis=0)
     n[:, :2] = [[0, 0], [0, 0], [1, -1]]
     square[:, :2] = 0.5, 0.25
-    table, index, active = rng.random(300, np.float32), rng.integers(0, 100, 999).astype(np.uint32), rng.random(999) < 0.5
+    table, index, active = (
+        rng.random(300, np.float32),
+        rng.integers(0, 100, 999).astype(np.uint32),
+        rng.random(999) < 0.5,
+    )
 
     def made(mi, dr):
         frame, u = mi.Frame3f(mi.Vector3f(*map(mi.Float, n))), mi.Point2f(*map(mi.Float, square))
@@ -296,7 +317,9 @@ def test_houses_are_lit_without_llvm():
     """The closed forms hold in Mitsuba's scalar variant, too, and a whole bake agrees with its path tracer."""
     names = ("in_a_furnace", "a_closed_box", "sky_through", "inside_out", "a_bake_agrees")
     run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__, "-k", " or ".join(names)]
-    done = subprocess.run(run, check=False, capture_output=True, text=True, env={**os.environ, "DRJIT_LIBLLVM_PATH": "/none"})
+    done = subprocess.run(
+        run, check=False, capture_output=True, text=True, env={**os.environ, "DRJIT_LIBLLVM_PATH": "/none"}
+    )
     assert done.returncode == 0, done.stdout[-3000:]
     assert "scalar variant computes the light" in done.stdout and f"{len(names)} passed" in done.stdout
 
@@ -304,8 +327,10 @@ def test_houses_are_lit_without_llvm():
 @pytest.fixture(scope="module")
 def lit(tmp_path_factory):
     """The furnished two-room house at dusk and noon light, baked tinily: house, catalogue, cache, bake."""
-    lamps = (Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
-             Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0))
+    lamps = (
+        Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
+        Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0),
+    )
     house = dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
     cache = tmp_path_factory.mktemp("light")
     return house, HandCatalogue(), cache, bake(house, HandCatalogue(), cache, TINY)
@@ -334,9 +359,13 @@ def test_windows_take_light_from_the_open_sky_on_their_outer_side_only(solved):
 def test_grain_is_evened_without_loss_and_not_across_charts():
     index = np.array([y * 20 + x for y in range(8) for x in (*range(8), *range(12, 20))])
     left = index % 20 < 8
-    values = np.where(left, 1.0, 5.0).astype(np.float32)[:, None] + np.random.default_rng(0).normal(0, 0.2, (len(index), 3)).astype(np.float32)
+    values = np.where(left, 1.0, 5.0).astype(np.float32)[:, None] + np.random.default_rng(0).normal(
+        0, 0.2, (len(index), 3)
+    ).astype(np.float32)
     out = compose.evened(values, index, (8, 20))
-    assert out[left].std() < 0.45 * values[left].std() and out[left].mean() == pytest.approx(values[left].mean(), abs=0.05)
+    assert out[left].std() < 0.45 * values[left].std() and out[left].mean() == pytest.approx(
+        values[left].mean(), abs=0.05
+    )
     assert out[left].max() < 1.5 and out[~left].min() > 4.5
 
 
@@ -345,7 +374,9 @@ def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
     assert report["luxels"] == check.LUXELS and abs(report["bias"]) < 0.1 and report["beyond"] <= 0.25
 
 
-@pytest.mark.parametrize("fault", ["all bounces a third too bright", "no bounces", "a third of the luxels dark", "lamps forgotten"])
+@pytest.mark.parametrize(
+    "fault", ["all bounces a third too bright", "no bounces", "a third of the luxels dark", "lamps forgotten"]
+)
 def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatch):
     monkeypatch.setattr(check, "AGAIN", 2)
     light = solved.light
@@ -353,7 +384,9 @@ def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatc
     broken = {
         "all bounces a third too bright": dataclasses.replace(light, indirect=light.indirect * 1.33),
         "no bounces": dataclasses.replace(light, indirect=light.indirect * 0),
-        "a third of the luxels dark": dataclasses.replace(light, direct=light.direct * third, indirect=light.indirect * third),
+        "a third of the luxels dark": dataclasses.replace(
+            light, direct=light.direct * third, indirect=light.indirect * third
+        ),
         "lamps forgotten": dataclasses.replace(light, direct=light.direct * 0),
     }[fault]
     with pytest.raises(LightError, match="disagrees with the path tracer.*worst at"):
@@ -374,7 +407,10 @@ def test_another_look_of_a_material_makes_another_bake(lit):
 
     class Repainted(HandCatalogue):
         def mesh(self, *args):
-            return tuple(dataclasses.replace(m, finish=dataclasses.replace(m.finish, color=(0.1, 0.2, 0.9, 1.0))) for m in super().mesh(*args))
+            return tuple(
+                dataclasses.replace(m, finish=dataclasses.replace(m.finish, color=(0.1, 0.2, 0.9, 1.0)))
+                for m in super().mesh(*args)
+            )
 
     assert baking.key_of(house, catalogue, TINY) == baked.folder.name != baking.key_of(house, Repainted(), TINY)
     assert baking.key_of(house, HandCatalogue(), TINY) == baked.folder.name
@@ -462,7 +498,9 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
     with Renderer(house, catalogue, quality="baked", lit=baked.lit, size=96) as renderer:
         view = renderer.view(at, yaw, pitch, vfov, size)
     camera = camera_at(at, yaw, pitch, vfov)
-    traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(at, camera.forward, camera.up, vfov, size)
+    traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(
+        at, camera.forward, camera.up, vfov, size
+    )
     a, b = (cv2.GaussianBlur(x, (0, 0), 1).astype(float) for x in (view.rgb, traced))
     psnr = 10 * np.log10(255**2 / np.mean((a - b) ** 2))
     assert psnr > 28 and abs((a - b).mean()) < 6
@@ -474,5 +512,7 @@ def test_windows_are_portals_that_look_into_their_room():
     house = two_rooms()
     portals = {p.id: p for p in portals_of(house)}
     assert sorted(portals) == ["window_1", "window_2"]
-    assert portals["window_1"].normal == pytest.approx([0, 1, 0]) and portals["window_2"].normal == pytest.approx([0, -1, 0])
+    assert portals["window_1"].normal == pytest.approx([0, 1, 0]) and portals["window_2"].normal == pytest.approx(
+        [0, -1, 0]
+    )
     assert portals["window_1"].area == pytest.approx(2.0 * 1.2)

@@ -51,7 +51,9 @@ def test_a_seed_becomes_a_house_a_walk_and_a_recording(world, tmp_path):
     task = tasks_of(world, 1)[0]
     rrd = tmp_path / "episode.rrd"
     frames = list(rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0))
-    with open_recording(Sinks(rrd), episode_blueprint(world.house), name="test", properties={"renderer": "any"}) as recording:
+    with open_recording(
+        Sinks(rrd), episode_blueprint(world.house), name="test", properties={"renderer": "any"}
+    ) as recording:
         passed_on = list(record(recording, world, task, (f.step for f in frames), pictures=Pictures((48, 64), 32)))
     assert [s.pose for s in passed_on] == [f.step.pose for f in frames]
     assert success(frames[-1].episode, world.graph) == 1.0
@@ -69,8 +71,9 @@ def test_the_expert_finds_everything_and_a_random_walker_little(world):
 
 def test_a_broken_recording_leaves_no_file(world, tmp_path):
     rrd = tmp_path / "episode.rrd"
-    with pytest.raises(RuntimeError, match="stopped half-way"), open_recording(
-        Sinks(rrd), episode_blueprint(world.house), name="test", properties={}
+    with (
+        pytest.raises(RuntimeError, match="stopped half-way"),
+        open_recording(Sinks(rrd), episode_blueprint(world.house), name="test", properties={}),
     ):
         raise RuntimeError("stopped half-way")
     assert not list(tmp_path.iterdir())
@@ -81,7 +84,11 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    viewer = subprocess.Popen([viewer_program(), "--save", str(saved), "--port", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    viewer = subprocess.Popen(
+        [viewer_program(), "--save", str(saved), "--port", str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         until = time.monotonic() + 20
         while not listens("127.0.0.1", port) and time.monotonic() < until:
@@ -89,10 +96,14 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
         with open_viewers(connect=f"rerun+http://127.0.0.1:{port}/proxy") as viewers:
             steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
             for _ in range(2):  # a second recording follows the first into the same viewer
-                with open_recording(Sinks(None, viewers), episode_blueprint(world.house), name="sent", properties={}) as recording:
+                with open_recording(
+                    Sinks(None, viewers), episode_blueprint(world.house), name="sent", properties={}
+                ) as recording:
                     list(record(recording, world, task, steps, pictures=Pictures((48, 64), 32)))
+
         def held() -> int:
             return saved.read_bytes().count(b"RecordingInfo:name") if saved.exists() else 0
+
         while held() < 2 and time.monotonic() < until:
             time.sleep(0.1)
         assert held() >= 2 and b"/agent/camera" in saved.read_bytes()
@@ -125,7 +136,25 @@ def test_the_camera_in_the_recording_looks_where_the_agent_looks():
 
 def test_house_command_writes_what_it_says(shared_cache, tmp_path, capsys):
     out = tmp_path / "house"
-    assert main(["house", "--seed", "2", "--area", "38", "46", "--no-mjcf", "--json", "--out", str(out), "--cache", str(shared_cache)]) == 0
+    assert (
+        main(
+            [
+                "house",
+                "--seed",
+                "2",
+                "--area",
+                "38",
+                "46",
+                "--no-mjcf",
+                "--json",
+                "--out",
+                str(out),
+                "--cache",
+                str(shared_cache),
+            ]
+        )
+        == 0
+    )
     facts = json.loads(capsys.readouterr().out)
     house = House.load(out / "house.json")
     assert house.digest == facts["digest"] and facts["objects"] == len(house.placements)
@@ -144,17 +173,20 @@ def test_doctor_fails_with_the_remedy_when_the_furniture_is_missing(shared_cache
     assert "none.sh3f" in said.out + said.err
 
 
-@pytest.mark.parametrize(("command", "complaint"), [
-    (["house", "--seed", "1", "--area", "900", "950", "--out", "x"], "area should be"),
-    (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
-    (["render", "nowhere"], "house.json"),
-    (["render", "nowhere", "--node", "3"], "--equirect"),
-    (["light", "nowhere", "--time", "tea"], "nowhere"),
-    (["view", "nowhere.rrd"], "nowhere.rrd"),
-    (["rollout", "--episodes", "0"], "--episodes"),
-    (["assets", "list", "--class", "unicorn"], "unicorn"),
-    (["bench", "nonsense"], "nonsense"),
-])
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [
+        (["house", "--seed", "1", "--area", "900", "950", "--out", "x"], "area should be"),
+        (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
+        (["render", "nowhere"], "house.json"),
+        (["render", "nowhere", "--node", "3"], "--equirect"),
+        (["light", "nowhere", "--time", "tea"], "nowhere"),
+        (["view", "nowhere.rrd"], "nowhere.rrd"),
+        (["rollout", "--episodes", "0"], "--episodes"),
+        (["assets", "list", "--class", "unicorn"], "unicorn"),
+        (["bench", "nonsense"], "nonsense"),
+    ],
+)
 def test_wrong_input_gives_one_clear_line(command, complaint, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main([*command, "--cache", str(tmp_path)] if command[0] != "view" else command) == 2
@@ -167,13 +199,23 @@ def test_what_the_readme_shows_in_python_runs_as_it_stands(shared_cache):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 2
     for block in blocks:
-        done = subprocess.run([sys.executable, "-c", block], check=False, capture_output=True, text=True, cwd=shared_cache,
-                              env={**os.environ, "EMBODIED_CACHE": str(shared_cache)}, timeout=900)
+        done = subprocess.run(
+            [sys.executable, "-c", block],
+            check=False,
+            capture_output=True,
+            text=True,
+            cwd=shared_cache,
+            env={**os.environ, "EMBODIED_CACHE": str(shared_cache)},
+            timeout=900,
+        )
         assert done.returncode == 0, done.stderr
 
 
 def test_every_place_that_the_readme_names_is_there():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    named = [*re.findall(r"\]\(([^)#:]+)\)", text), *re.findall(r"`((?:agents|docs|embodied|assets|viz)/[\w./]*)`", text)]
+    named = [
+        *re.findall(r"\]\(([^)#:]+)\)", text),
+        *re.findall(r"`((?:agents|docs|embodied|assets|viz)/[\w./]*)`", text),
+    ]
     assert len(named) > 8
     assert [n for n in named if not (ROOT / n).exists() and not n.startswith("embodied/HANNA")] == []

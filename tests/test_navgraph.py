@@ -157,7 +157,9 @@ def test_visible_is_a_line_of_sight_over_furniture_and_through_doors_not_through
     house = dataclasses.replace(two_rooms(), placements=(table, cupboard))
     xy = np.array([[1.0, 1.05], [4.0, 1.05], [6.0, 1.05], [8.5, 1.05], [8.5, 3.5], [6.0, 3.5]])
     rooms = ("living_room_1",) * 2 + ("bedroom_1",) * 4
-    graph = graph_of(np.c_[xy, np.full(6, 1.5)], np.array([[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]]), tuple("abcdef"), rooms)
+    graph = graph_of(
+        np.c_[xy, np.full(6, 1.5)], np.array([[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]]), tuple("abcdef"), rooms
+    )
     seen = sight_lines(graph, house)
     assert seen[0, 1] and seen[0, 3], "over the table, and on through the door"
     assert not seen[1, 5], "a wall is between"

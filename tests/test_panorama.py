@@ -44,7 +44,9 @@ def test_faces_are_right_handed_cameras_one_per_axis():
     assert {f for f, _ in FACES} == {tuple(s * e) for e in np.eye(3) for s in (1, -1)}
 
 
-@pytest.mark.parametrize(("yaw", "pitch", "vfov"), [(0.0, 0.0, 1.2), (0.7, 0.4, 1.0), (-2.5, -1.1, 1.5), (3.0, 1.5, 0.8)])
+@pytest.mark.parametrize(
+    ("yaw", "pitch", "vfov"), [(0.0, 0.0, 1.2), (0.7, 0.4, 1.0), (-2.5, -1.1, 1.5), (3.0, 1.5, 0.8)]
+)
 def test_a_resampled_view_equals_the_closed_form(yaw, pitch, vfov):
     rgb, depth, ids = analytic().view(yaw, pitch, vfov, (48, 60))
     rays = pinhole(yaw, pitch, vfov, 48, 60)
@@ -84,7 +86,11 @@ def test_views36_follow_the_matterport_order():
     for i in range(36):
         heading, elevation = math.radians(30 * (i % 12)), math.radians(30 * (i // 12 - 1))
         centre = views[i, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
-        direction = [math.sin(heading) * math.cos(elevation), math.cos(heading) * math.cos(elevation), math.sin(elevation)]
+        direction = [
+            math.sin(heading) * math.cos(elevation),
+            math.cos(heading) * math.cos(elevation),
+            math.sin(elevation),
+        ]
         assert np.abs(centre - (127 + 100 * np.array(direction))).max() < 3, f"view {i}"
 
 

@@ -21,12 +21,20 @@ from embodied.tasks.goals import find_instances
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
 SLIM = Asset("hand/slim", CLASS, "a slim person", (0.3, 0.3, 1.7), "floor")
 SITTER = Asset("hand/sitter", CLASS, "somebody at rest", (0.5, 0.7, 1.3), "floor", tags=("sitting",))
-CHAIR = Asset("hand/chair", "dining chair", "a chair", (0.4, 0.4, 0.9), "floor",
-              surfaces=(SupportSurface("seat", LAP + 0.02, -0.15, -0.15, 0.15, 0.1, 9.0),))
+CHAIR = Asset(
+    "hand/chair",
+    "dining chair",
+    "a chair",
+    (0.4, 0.4, 0.9),
+    "floor",
+    surfaces=(SupportSurface("seat", LAP + 0.02, -0.15, -0.15, 0.15, 0.1, 9.0),),
+)
 
 
 def catalogue(*figures: Asset) -> SimpleNamespace:
-    return SimpleNamespace(of_class=lambda name: figures if name == CLASS else (), assets={a.key: a for a in (*figures, CHAIR)})
+    return SimpleNamespace(
+        of_class=lambda name: figures if name == CLASS else (), assets={a.key: a for a in (*figures, CHAIR)}
+    )
 
 
 def populated(starts=(0, 14, 14, 30), world=None, figures=(FIGURE,), seed=1) -> tuple[House, object]:
@@ -53,10 +61,17 @@ def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
     assert 1 <= len(people) <= 3 and [p.id for p in people] == [f"person_{i + 1}" for i in range(len(people))]
     for node in (0, 14, 30):
         here = [p for p in people if p.room == world.graph.room_of_node[node]]
-        assert any(NEAREST - 1e-3 <= math.dist(p.position[:2], world.graph.positions[node, :2]) <= FARTHEST + 1e-3 for p in here)
+        assert any(
+            NEAREST - 1e-3 <= math.dist(p.position[:2], world.graph.positions[node, :2]) <= FARTHEST + 1e-3
+            for p in here
+        )
     for p in people:
         offsets = world.graph.positions[:, :2] - p.position[:2]
-        assert any(abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3 for x, y in offsets if math.hypot(x, y) <= FARTHEST + 1e-3)
+        assert any(
+            abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3
+            for x, y in offsets
+            if math.hypot(x, y) <= FARTHEST + 1e-3
+        )
 
 
 def test_nobody_blocks_an_edge_or_stands_in_furniture():
@@ -65,7 +80,9 @@ def test_nobody_blocks_an_edge_or_stands_in_furniture():
     people = [shapely.Point(p.position[:2]) for p in people_of(house)]
     assert len(people) > 12
     assert all(ways.distance(p) >= RADIUS + max(FIGURE.size[:2]) / 2 - 0.02 for p in people)
-    assert all(a.distance(b) >= APART / 2 + max(FIGURE.size[:2]) / 2 - 0.02 for i, a in enumerate(people) for b in people[:i])
+    assert all(
+        a.distance(b) >= APART / 2 + max(FIGURE.size[:2]) / 2 - 0.02 for i, a in enumerate(people) for b in people[:i]
+    )
     check(house)
 
 
@@ -75,7 +92,9 @@ def test_somebody_sits_on_a_chair_with_the_back_at_its_back():
     assert met[7].asset == SITTER.key and met[7].yaw == chair.yaw
     assert met[7].position[2] == pytest.approx(0.02)  # the seat's height above what the figure was modelled on
     assert met[7].position[0] == pytest.approx(chair.position[0], abs=1e-3)
-    assert met[7].position[1] + SITTER.size[1] / 2 == pytest.approx(chair.position[1] + CHAIR.surfaces[0].y1 + BACK, abs=1e-3)
+    assert met[7].position[1] + SITTER.size[1] / 2 == pytest.approx(
+        chair.position[1] + CHAIR.surfaces[0].y1 + BACK, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("what", ["legs in the way of walkers", "something on the seat", "a bar stool"])
@@ -85,11 +104,15 @@ def test_nobody_sits_where_one_cannot(what, monkeypatch):
         chair, met = seated(world, 7, 0.0, 0.5)
     elif what == "something on the seat":
         chair, _ = seated(world, 7, 1.1, 1.1)
-        box = dataclasses.replace(thing("box", 1, chair.room, *chair.position[:2]), position=(*chair.position[:2], 0.47), size=(0.3, 0.3, 0.3))
+        box = dataclasses.replace(
+            thing("box", 1, chair.room, *chair.position[:2]), position=(*chair.position[:2], 0.47), size=(0.3, 0.3, 0.3)
+        )
         house = dataclasses.replace(world.house, placements=(chair, box))
         met = meet(house, world.graph, catalogue(SITTER), seed=1)
     else:
-        monkeypatch.setattr("test_people.CHAIR", dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(CHAIR.surfaces[0], z=0.75),)))
+        monkeypatch.setattr(
+            "test_people.CHAIR", dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(CHAIR.surfaces[0], z=0.75),))
+        )
         chair, met = seated(world, 7, 1.1, 1.1)
     assert not met
 
@@ -100,15 +123,19 @@ def test_routes_begin_where_somebody_is_met():
     some = dict(list(met.items())[:5])
     paths = route_paths(world.graph, "grid", seed=0, house_split="test", starts=some)
     assert paths and {p[0] for p in paths} <= set(some)
-    assert route_paths(world.graph, "grid", seed=0, house_split="test", starts={}) == route_paths(world.graph, "grid", seed=0, house_split="test")
+    assert route_paths(world.graph, "grid", seed=0, house_split="test", starts={}) == route_paths(
+        world.graph, "grid", seed=0, house_split="test"
+    )
 
 
 def test_whoever_shuts_a_room_steps_aside_alone(monkeypatch):
     world = grid_world(6, spacing=2.2)
     everybody = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
     first = next(iter(everybody.values()))
-    monkeypatch.setattr("embodied.generate.people.unreachable_rooms", lambda house: ["kitchen_1"] if any(
-        p.position == first.position for p in house.placements) else [])
+    monkeypatch.setattr(
+        "embodied.generate.people.unreachable_rooms",
+        lambda house: ["kitchen_1"] if any(p.position == first.position for p in house.placements) else [],
+    )
     left = {p.position for p in meet(world.house, world.graph, catalogue(FIGURE), seed=1).values()}
     assert first.position not in left and left >= {p.position for p in everybody.values()} - {first.position}
 
@@ -117,8 +144,10 @@ def test_where_the_first_figure_does_not_fit_a_slimmer_one_stands():
     world = grid_world(6, spacing=2.2)
     x, y, _ = world.graph.positions[7]
     wide = dataclasses.replace(FIGURE, key="hand/wide", size=(0.89, 0.8, 1.8))
-    beds = [dataclasses.replace(thing("bed", i + 1, "kitchen_1", x + dx, y + dy), size=(1.0, 1.0, 0.7))
-            for i, (dx, dy) in enumerate((a, b) for a in (-1.2, 1.2) for b in (-1.2, 1.2))]
+    beds = [
+        dataclasses.replace(thing("bed", i + 1, "kitchen_1", x + dx, y + dy), size=(1.0, 1.0, 0.7))
+        for i, (dx, dy) in enumerate((a, b) for a in (-1.2, 1.2) for b in (-1.2, 1.2))
+    ]
     full = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=tuple(beds)))
     who = [p.asset for seed in range(8) for p in people_of(populated((7,), full, (wide, SLIM), seed)[0])]
     assert who and set(who) == {SLIM.key}

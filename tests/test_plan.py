@@ -48,7 +48,9 @@ def test_people_and_the_walker_are_seen_from_above():
     house = two_rooms()
     person = Placement("person_1", "hand/person", "person", house.rooms[0].id, (2.5, 3.0, 0.0), 0.0, (0.5, 0.4, 1.7))
     inhabited = dataclasses.replace(house, placements=(*house.placements, person))
-    assert np.abs(colour_at(draw_plan(inhabited, pixels_per_metre=SCALE), house, 2.68, 3.0) - (233, 138, 60)).max() < 30  # a shoulder
+    assert (
+        np.abs(colour_at(draw_plan(inhabited, pixels_per_metre=SCALE), house, 2.68, 3.0) - (233, 138, 60)).max() < 30
+    )  # a shoulder
     graph = build_graph(house)
     walked = [draw_plan(house, pixels_per_metre=SCALE, graph=graph, path=(0,), facing=f) for f in (None, 0.0, math.pi)]
     x, y = graph.positions[0][:2]

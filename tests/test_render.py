@@ -119,12 +119,22 @@ def test_a_large_picture_shrunk_is_the_small_one(renderer):
 
 def test_leaving_out_what_is_hidden_changes_no_pixel(renderer):
     rng = np.random.default_rng(1)
-    for x, y in [(0.4, 0.4), (4.9, 1.0), (5.0, 1.1), (5.1, 0.9), (6.0, 3.0), (8.6, 0.4), *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2))]:
+    for x, y in [
+        (0.4, 0.4),
+        (4.9, 1.0),
+        (5.0, 1.1),
+        (5.1, 0.9),
+        (6.0, 3.0),
+        (8.6, 0.4),
+        *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2)),
+    ]:
         yaw, pitch = rng.uniform(-math.pi, math.pi), rng.uniform(-0.6, 0.6)
         some = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64))
         everything = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64), cull=False)
         differ = (some.rgb != everything.rgb).any(axis=-1).sum()
-        assert differ <= 2, f"{differ} pixels at {x, y, yaw, pitch}; one or two may peep through a crack between two meshes"
+        assert differ <= 2, (
+            f"{differ} pixels at {x, y, yaw, pitch}; one or two may peep through a crack between two meshes"
+        )
         assert (some.ids != everything.ids).sum() <= 2
 
 
@@ -140,14 +150,20 @@ def test_hidden_rooms_are_left_out(renderer, house):
 def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():
     """Out of one wing's window and in through the other's: both face the same court."""
     base = two_rooms()
-    finishes = {k: getattr(base.rooms[0], k) for k in ("floor_finish", "wall_finish", "ceiling_finish", "skirting_finish")}
+    finishes = {
+        k: getattr(base.rooms[0], k) for k in ("floor_finish", "wall_finish", "ceiling_finish", "skirting_finish")
+    }
     wing = type(base.rooms[0])("study_1", "study", ((0.0, 4.0), (3.0, 4.0), (3.0, 9.0), (0.0, 9.0)), **finishes)
-    door = dataclasses.replace(base.openings[0], id="door_2", rooms=("study_1", "living_room_1"), a=(1.0, 4.0), b=(2.0, 4.0))
+    door = dataclasses.replace(
+        base.openings[0], id="door_2", rooms=("study_1", "living_room_1"), a=(1.0, 4.0), b=(2.0, 4.0)
+    )
     window = dataclasses.replace(base.openings[2], id="window_3", rooms=("study_1", None), a=(3.0, 5.0), b=(3.0, 8.0))
     house = dataclasses.replace(base, rooms=(*base.rooms, wing), openings=(*base.openings, door, window))
     portals = visibility.portals_of(house)
     eye = (7.0, 3.0, 1.5)
-    assert "study_1" in visibility.visible_rooms(house, portals, eye), "bedroom window to the north, study window to the east"
+    assert "study_1" in visibility.visible_rooms(house, portals, eye), (
+        "bedroom window to the north, study window to the east"
+    )
     lone = dataclasses.replace(house, openings=tuple(o for o in house.openings if o.id != "window_2"))
     assert "study_1" not in visibility.visible_rooms(lone, visibility.portals_of(lone), eye)
 
@@ -182,10 +198,16 @@ def test_two_houses_can_be_open_at_once_and_a_closed_one_says_so(house):
         one.panorama(EYE)
 
 
-@pytest.mark.parametrize(("wrong", "match"), [
-    ({"quality": "photo"}, "photo"), ({"backend": "metal"}, "metal"), ({"size": 0}, "size"), ({"size": -5}, "size"),
-    ({"quality": "baked"}, "lit"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        ({"quality": "photo"}, "photo"),
+        ({"backend": "metal"}, "metal"),
+        ({"size": 0}, "size"),
+        ({"size": -5}, "size"),
+        ({"quality": "baked"}, "lit"),
+    ],
+)
 def test_bad_settings_are_refused(house, wrong, match):
     with pytest.raises(ValueError, match=match):
         Renderer(house, HandCatalogue(), **wrong)

@@ -36,7 +36,9 @@ def test_every_geom_is_traceable_to_its_owner(house, compiled):
     assert compiled.owner_of_geom.min() > 0, "no geom without owner"
     for g in range(compiled.model.ngeom):
         assert compiled.model.geom(g).name.startswith(names[compiled.owner_of_geom[g] - 1] + "#")
-    drawn = {names[i - 1] for i, k in zip(compiled.owner_of_geom, compiled.kind_of_geom, strict=True) if k != "collision"}
+    drawn = {
+        names[i - 1] for i, k in zip(compiled.owner_of_geom, compiled.kind_of_geom, strict=True) if k != "collision"
+    }
     assert drawn == {p.owner for p in house_parts(house, HandCatalogue())}
 
 
@@ -44,7 +46,9 @@ def test_only_boxes_collide_and_only_meshes_are_drawn(compiled):
     m = compiled.model
     for g, kind in enumerate(compiled.kind_of_geom):
         if kind == "collision":
-            assert m.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX and m.geom_contype[g] and m.geom_group[g] == scene.COLLISION
+            assert (
+                m.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX and m.geom_contype[g] and m.geom_group[g] == scene.COLLISION
+            )
         else:
             assert m.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH and not m.geom_contype[g] and not m.geom_conaffinity[g]
 
@@ -61,7 +65,7 @@ def test_geoms_stand_where_the_parts_say(house, compiled):
         for g in range(m.ngeom):
             if m.geom(g).name.startswith(f"{owner}#") and compiled.kind_of_geom[g] != "collision":
                 mesh = m.geom_dataid[g]
-                v = m.mesh_vert[m.mesh_vertadr[mesh]:][:m.mesh_vertnum[mesh]]
+                v = m.mesh_vert[m.mesh_vertadr[mesh] :][: m.mesh_vertnum[mesh]]
                 found.append(v @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g])
         found = np.concatenate(found)
         for end in (np.min, np.max):
@@ -108,8 +112,12 @@ def test_a_generated_flat_stays_put_for_a_second(tmp_path):
 
 def test_a_floating_mug_falls(house):
     """The check above can fail."""
-    lifted = dataclasses.replace(house, placements=tuple(
-        dataclasses.replace(p, position=(1.3, 1.0, 1.2)) if p.id == "mug_1" else p for p in house.placements))
+    lifted = dataclasses.replace(
+        house,
+        placements=tuple(
+            dataclasses.replace(p, position=(1.3, 1.0, 1.2)) if p.id == "mug_1" else p for p in house.placements
+        ),
+    )
     moved = scene.displacements(scene.compile_scene(lifted, HandCatalogue(), free=["mug_1"]))
     assert moved["mug_1"] > 0.3
 
@@ -171,9 +179,18 @@ def test_a_table_keeps_its_underside_free_and_its_top_exact():
 
 def test_collision_boxes_leave_support_surfaces_free():
     """Ornament above a declared surface is no obstacle for what stands on it."""
-    asset = Asset("t/shelf", "shelf", "shelf", (1.0, 0.4, 1.0), "floor",
-                  surfaces=(SupportSurface("shelf_1", 0.5, -0.5, -0.2, 0.5, 0.2, 0.4),))
-    parts = (box_mesh((-0.5, -0.2, 0), (0.5, 0.2, 0.5), (1, 1, 1, 1)), box_mesh((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6), (1, 1, 1, 1)))
+    asset = Asset(
+        "t/shelf",
+        "shelf",
+        "shelf",
+        (1.0, 0.4, 1.0),
+        "floor",
+        surfaces=(SupportSurface("shelf_1", 0.5, -0.5, -0.2, 0.5, 0.2, 0.4),),
+    )
+    parts = (
+        box_mesh((-0.5, -0.2, 0), (0.5, 0.2, 0.5), (1, 1, 1, 1)),
+        box_mesh((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6), (1, 1, 1, 1)),
+    )
     boxes = collision.object_boxes(asset, parts, asset.size)
     assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.5, abs=5e-3)
 
@@ -203,8 +220,15 @@ def test_few_boxes_cover_a_complicated_thing():
 
 def test_lit_pages_replace_the_materials(house):
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], np.float32)
-    mesh = LitMesh("rug_1", "object", "living_room_1", 0, corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32),
-                   np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
+    mesh = LitMesh(
+        "rug_1",
+        "object",
+        "living_room_1",
+        0,
+        corners,
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32),
+    )
     pages = LitPages((mesh,), (np.full((8, 8, 3), 77, np.uint8),), "x")
     s = scene.compile_scene(house, HandCatalogue(), collisions=False, lit=pages)
     assert s.model.ngeom == 1 and s.owners[s.owner_of_geom[0] - 1] == "rug_1" and s.room_of_geom == ("living_room_1",)
@@ -238,12 +262,25 @@ def test_placements_outside_the_catalogue_are_named(house):
 
 
 def test_kept_boxes_are_those_that_were_computed_and_damage_is_mended(tmp_path):
-    plate = MeshPart(*(np.asarray(a, t) for a, t in (
-        ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.4]], np.float32), ([[0, 1, 2], [0, 2, 3]], np.int32),
-        ([[0, 0, 1]] * 4, np.float32), ([[0, 0]] * 4, np.float32))), Finish())
+    plate = MeshPart(
+        *(
+            np.asarray(a, t)
+            for a, t in (
+                ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.4]], np.float32),
+                ([[0, 1, 2], [0, 2, 3]], np.int32),
+                ([[0, 0, 1]] * 4, np.float32),
+                ([[0, 0]] * 4, np.float32),
+            )
+        ),
+        Finish(),
+    )
     asset = Asset("hand/plate", "plate", "plate", (1.0, 1.0, 0.4), "floor")
     first = collision.kept_boxes(asset, [plate], asset.size, tmp_path)
-    assert first == collision.object_boxes(asset, [plate], asset.size) == collision.kept_boxes(asset, [plate], asset.size, tmp_path)
+    assert (
+        first
+        == collision.object_boxes(asset, [plate], asset.size)
+        == collision.kept_boxes(asset, [plate], asset.size, tmp_path)
+    )
     kept = next((tmp_path / "collision").iterdir())
     kept.write_text(kept.read_text()[:-9])
     assert collision.kept_boxes(asset, [plate], asset.size, tmp_path) == first

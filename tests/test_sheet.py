@@ -12,8 +12,10 @@ from embodied.render.contact_sheet import LABEL, TILE, draw_sheets, sheet
 
 @pytest.fixture
 def catalogue(tmp_path):
-    rows = {n: {"file": "a.obj", "class": "cardboard box", "size": [0.5, 0.5, 0.5], "looks": {"": look}}
-            for n, look in (("blue", "#0000ff"), ("red", "#ff0000"))}
+    rows = {
+        n: {"file": "a.obj", "class": "cardboard box", "size": [0.5, 0.5, 0.5], "looks": {"": look}}
+        for n, look in (("blue", "#0000ff"), ("red", "#ff0000"))
+    }
     (write_own(tmp_path / "own", rows) / "a.obj").write_text(CUBE)
     return load_catalogue(tmp_path / "cache", own=[tmp_path / "own"])
 
@@ -22,7 +24,9 @@ def test_every_model_is_drawn_in_its_own_tile(catalogue):
     page = np.asarray(sheet(catalogue, ["mine/blue", "mine/red"])).astype(int)
     assert page.shape[0] == TILE + LABEL
     for i, channel in enumerate((2, 0)):
-        middle = page[LABEL + TILE // 2 - 20:LABEL + TILE // 2 + 20, i * TILE + TILE // 2 - 20:i * TILE + TILE // 2 + 20]
+        middle = page[
+            LABEL + TILE // 2 - 20 : LABEL + TILE // 2 + 20, i * TILE + TILE // 2 - 20 : i * TILE + TILE // 2 + 20
+        ]
         assert middle[..., channel].mean() > 2 * middle[..., 2 - channel].mean()
 
 

@@ -31,7 +31,9 @@ def setting(kind: str, n: int = 24):
 def same_but_for_the_goal(tasks: list[Task]) -> tuple[Task, Task]:
     one = tasks[0]
     two = next(t for t in tasks if t.goal_nodes != one.goal_nodes)
-    return one, dataclasses.replace(two, start=one.start, request=one.request, horizon=one.horizon, budget=one.budget, id=one.id)
+    return one, dataclasses.replace(
+        two, start=one.start, request=one.request, horizon=one.horizon, budget=one.budget, id=one.id
+    )
 
 
 def without_descriptions(o: Observation) -> Observation:

@@ -23,8 +23,10 @@ from embodied.interface import Sight
 def torchvision_layout(name: str) -> dict[str, tuple[int, ...]]:
     """Names and shapes of torchvision's state dict, written down from its documentation, not from our class."""
     block, counts, grow = {
-        "resnet18": ("basic", (2, 2, 2, 2), 1), "resnet34": ("basic", (3, 4, 6, 3), 1),
-        "resnet50": ("bottleneck", (3, 4, 6, 3), 4), "resnet101": ("bottleneck", (3, 4, 23, 3), 4),
+        "resnet18": ("basic", (2, 2, 2, 2), 1),
+        "resnet34": ("basic", (3, 4, 6, 3), 1),
+        "resnet50": ("bottleneck", (3, 4, 6, 3), 4),
+        "resnet101": ("bottleneck", (3, 4, 23, 3), 4),
         "resnet152": ("bottleneck", (3, 8, 36, 3), 4),
     }[name]
     out: dict[str, tuple[int, ...]] = {"conv1.weight": (64, 3, 7, 7)}
@@ -39,8 +41,11 @@ def torchvision_layout(name: str) -> dict[str, tuple[int, ...]]:
     for stage, (count, width) in enumerate(zip(counts, (64, 128, 256, 512), strict=True), 1):
         for i in range(count):
             at, outputs = f"layer{stage}.{i}", width * grow
-            shapes = [(width, inputs, 3, 3), (width, width, 3, 3)] if block == "basic" else [
-                (width, inputs, 1, 1), (width, width, 3, 3), (outputs, width, 1, 1)]
+            shapes = (
+                [(width, inputs, 3, 3), (width, width, 3, 3)]
+                if block == "basic"
+                else [(width, inputs, 1, 1), (width, width, 3, 3), (outputs, width, 1, 1)]
+            )
             for j, shape in enumerate(shapes, 1):
                 out[f"{at}.conv{j}.weight"] = shape
                 norm(f"{at}.bn{j}", shape[0])
@@ -114,7 +119,9 @@ def test_turning_the_strip_by_30_degrees_turns_the_views_exactly():
     views = pool_views(maps)
     rolled = pool_views(maps.roll(-3, 3))  # the world turns counter-clockwise: yaw falls along the columns
     for band in range(3):
-        assert torch.allclose(rolled[:, 12 * band : 12 * band + 12], views[:, 12 * band : 12 * band + 12].roll(1, 1), atol=1e-5)
+        assert torch.allclose(
+            rolled[:, 12 * band : 12 * band + 12], views[:, 12 * band : 12 * band + 12].roll(1, 1), atol=1e-5
+        )
 
 
 @pytest.mark.parametrize("view", [0, 5, 13, 18, 30])
@@ -214,8 +221,13 @@ def strips_of_colours(n: int, *, seed: int) -> labels.HouseStrips:
     rgb[..., 0], rgb[..., 1] = 200 * (what == 0) + 30, 200 * (what == 1) + 30
     share = (np.eye(2)[what] * 255).astype(np.uint8)
     return labels.HouseStrips(
-        f"house{seed}", ("fern", "rose")[::-1], rgb.repeat(16, 1).repeat(16, 2), share,
-        np.zeros((n, 12, 36), np.int8), np.zeros((n, 12, 36), np.float16), np.zeros(n, np.int8),
+        f"house{seed}",
+        ("fern", "rose")[::-1],
+        rgb.repeat(16, 1).repeat(16, 2),
+        share,
+        np.zeros((n, 12, 36), np.int8),
+        np.zeros((n, 12, 36), np.float16),
+        np.zeros(n, np.int8),
     )
 
 

@@ -20,7 +20,9 @@ from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason, stepwise_action
 
-TASK = Task("line/vnla/0", "vnla", "line", Pose(0, 6), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug", 0.0, 20, 2.0)
+TASK = Task(
+    "line/vnla/0", "vnla", "line", Pose(0, 6), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug", 0.0, 20, 2.0
+)
 
 
 def line_env(kind=VnlaEnv):
@@ -162,7 +164,9 @@ def test_the_rules_of_asking_in_their_order():
     assert ask_reason(situation(env, time=18), sure) == "remain"
     assert ask_reason(situation(env, trail=(0, 3)), think(0, 0.3)) == "arrive", "before 'uncertain'"
     wide = AskRules(deviate=1.9)
-    assert ask_reason(situation(env, trail=(1, 0), task=dataclasses.replace(TASK, start=Pose(1))), sure, wide) == "deviate"
+    assert (
+        ask_reason(situation(env, trail=(1, 0), task=dataclasses.replace(TASK, start=Pose(1))), sure, wide) == "deviate"
+    )
     assert ask_reason(situation(env, trail=(1,) * 9), sure, AskRules(only=("arrive", "deviate"))) is None
 
 
@@ -171,7 +175,9 @@ def test_relabelling_repeats_what_the_teacher_would_have_said():
     for e in play(make, VnlaAsking(Shortest(teacher), "first"), tasks, seed=0):
         world = grid_world()
         labels = teacher.relabel(e, world)
-        moves = [(s.action, label.move) for s, label in zip(e.steps, labels, strict=True) if not isinstance(s.action, Ask)]
+        moves = [
+            (s.action, label.move) for s, label in zip(e.steps, labels, strict=True) if not isinstance(s.action, Ask)
+        ]
         assert all(a == b for a, b in moves)
 
 
@@ -187,7 +193,9 @@ def test_counting_agrees_with_walking():
 
 
 def test_evaluation_limits_come_from_training():
-    limits = time_limits([("hall", "kitchen", 10), ("hall", "kitchen", 14), ("hall", "bath", 9), ("a", "b", 25), ("a", "b", 25)], 25)
+    limits = time_limits(
+        [("hall", "kitchen", 10), ("hall", "kitchen", 14), ("hall", "bath", 9), ("a", "b", 25), ("a", "b", 25)], 25
+    )
     assert limits == {("hall", "kitchen"): round(12 + 1.95 * 2), ("hall", "bath"): 25, ("a", "b"): 25}
 
 

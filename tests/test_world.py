@@ -32,7 +32,9 @@ def world(house, tmp_path):
 
 
 def make(house, cache, **options) -> World:
-    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ("living_room_1", "living_room_1", "bedroom_1"))
+    graph = graph_of(
+        NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ("living_room_1", "living_room_1", "bedroom_1")
+    )
     return open_world(house, HandCatalogue(), cache, graph=graph, size=options.pop("size", 64), **options)
 
 
@@ -58,7 +60,9 @@ def test_sightings_agree_with_the_panorama(world, house):
     assert {"red_box_1", "flag_1", "table_1", "mug_1"} <= set(seen)
     assert "red_box_2" not in seen, "it stands in the bedroom's far corner"
     for name in ("red_box_1", "flag_1", "table_1"):
-        x, y, z = np.add(house.placement_by_id[name].position, (0, 0, house.placement_by_id[name].size[2] / 2)) - NODES[0]
+        x, y, z = (
+            np.add(house.placement_by_id[name].position, (0, 0, house.placement_by_id[name].size[2] / 2)) - NODES[0]
+        )
         assert abs((seen[name].yaw - math.atan2(y, x) + math.pi) % (2 * math.pi) - math.pi) < 0.15, name
         assert abs(seen[name].pitch - math.atan2(z, math.hypot(x, y))) < 0.2, name
         assert seen[name].distance == pytest.approx(math.sqrt(x * x + y * y + z * z), abs=0.6), name

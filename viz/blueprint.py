@@ -16,7 +16,11 @@ def blueprint_of(house: House, episode: Episode) -> rrb.Blueprint:
     pictured = any(s.reply is not None and s.reply.image is not None for s in episode.steps)
     thought = any(s.action.thought is not None and s.action.thought.asks for s in episode.steps)
     return episode_blueprint(
-        house, dialogue=asked or episode.task.kind != "find", target=pictured, probabilities=thought, stack=episode.task.kind == "hari",
+        house,
+        dialogue=asked or episode.task.kind != "find",
+        target=pictured,
+        probabilities=thought,
+        stack=episode.task.kind == "hari",
     )
 
 
@@ -36,38 +40,59 @@ def episode_blueprint(
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre, span = (low + high) / 2, float(max(high - low))
     world = rrb.Spatial3DView(
-        origin="/", name="House", contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
+        origin="/",
+        name="House",
+        contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
         eye_controls=rrb.EyeControls3D(
-            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1),
+            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1)
         ),
-        background=(245, 246, 248), line_grid=False,
+        background=(245, 246, 248),
+        line_grid=False,
     )
     sees = rrb.Spatial2DView(origin="/agent/camera/image", name="What the agent sees")
     panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
     looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else [sees]
-    texts = [rrb.TextDocumentView(origin="/text/request", name="Request"),
-             rrb.TextDocumentView(origin="/text/instruction", name="Doing now")]
+    texts = [
+        rrb.TextDocumentView(origin="/text/request", name="Request"),
+        rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
+    ]
     if stack:
-        texts = [rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
-                 rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first")]
-    plots = [rrb.TimeSeriesView(origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)),
-             rrb.StateTimelineView(origin="/mode", name="Mode")]
+        texts = [
+            rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
+            rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
+        ]
+    plots = [
+        rrb.TimeSeriesView(
+            origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
+        ),
+        rrb.StateTimelineView(origin="/mode", name="Mode"),
+    ]
     if probabilities:
-        plots.append(rrb.TimeSeriesView(
-            origin="/plot/probability", name="Probability of asking", axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop)))
+        plots.append(
+            rrb.TimeSeriesView(
+                origin="/plot/probability",
+                name="Probability of asking",
+                axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+            )
+        )
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
-        rrb.Horizontal(*looks), panorama, rrb.Horizontal(*texts),
-        *([said] if dialogue else []), row_shares=[5, 3, 2, *([3] if dialogue else [])],
+        rrb.Horizontal(*looks),
+        panorama,
+        rrb.Horizontal(*texts),
+        *([said] if dialogue else []),
+        row_shares=[5, 3, 2, *([3] if dialogue else [])],
     )
     body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))
     events = rrb.TextLogView(
-        origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others]))
+        origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others])
+    )
     below = rrb.Horizontal(*plots, events, column_shares=[*[2] * len(plots), 3])
     left = rrb.Vertical(world, below, row_shares=[3, 1])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.TimePanel(state="collapsed", timeline="step", fps=1.5, play_state="playing"),
-        rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
     )

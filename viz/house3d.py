@@ -56,7 +56,9 @@ class LitSurface:
     """(h, w, 3) uint8 sRGB."""
 
 
-def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset(), budget: int = BUDGET) -> tuple[LightMesh, ...]:
+def light_meshes(
+    parts: Sequence[Part], hidden: frozenset[str] = frozenset(), budget: int = BUDGET
+) -> tuple[LightMesh, ...]:
     """One mesh per owner that can be seen from above: ceilings, the outdoors and the `hidden` owners are left out."""
     by_owner: dict[tuple[str, str], list[Part]] = {}
     for part in parts:
@@ -82,21 +84,30 @@ def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh | LitSur
         if isinstance(mesh, LitSurface):
             recording.log(
                 mesh.path,
-                rr.Mesh3D(vertex_positions=mesh.positions, triangle_indices=mesh.faces, vertex_texcoords=mesh.uv, albedo_texture=mesh.picture),
+                rr.Mesh3D(
+                    vertex_positions=mesh.positions,
+                    triangle_indices=mesh.faces,
+                    vertex_texcoords=mesh.uv,
+                    albedo_texture=mesh.picture,
+                ),
                 static=True,
             )
             continue
         recording.log(
             mesh.path,
             rr.Mesh3D(
-                vertex_positions=mesh.positions, triangle_indices=mesh.faces,
-                vertex_colors=mesh.colors, vertex_normals=mesh.normals,
+                vertex_positions=mesh.positions,
+                triangle_indices=mesh.faces,
+                vertex_colors=mesh.colors,
+                vertex_normals=mesh.normals,
             ),
             static=True,
         )
 
 
-def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET) -> tuple[LightMesh | LitSurface, ...]:
+def lit_meshes(
+    lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET
+) -> tuple[LightMesh | LitSurface, ...]:
     """The same from baked pages: objects with colours in their vertices, walls and floors with their light as a picture."""
     by_owner: dict[tuple[str, str, bool], list[LitMesh]] = {}
     for mesh in lit.meshes:
@@ -118,11 +129,17 @@ def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LitSurface:
     height, width = page.shape[:2]
     low = np.floor(mesh.uv.min(axis=0) * [width, height]).astype(int).clip(0)
     high = np.maximum(np.ceil(mesh.uv.max(axis=0) * [width, height]).astype(int), low + 1)
-    part = page[low[1]:high[1], low[0]:high[0]]
+    part = page[low[1] : high[1], low[0] : high[0]]
     scale = min(PICTURE / max(part.shape[:2]), 1.0)
     size = tuple(max(round(n * scale), 1) for n in part.shape[1::-1])
     uv = (mesh.uv * [width, height] - low) / (high - low)
-    return LitSurface(path, mesh.vertices, mesh.faces.astype(np.uint32), uv.astype(np.float32), cv2.resize(part, size, interpolation=cv2.INTER_AREA))
+    return LitSurface(
+        path,
+        mesh.vertices,
+        mesh.faces.astype(np.uint32),
+        uv.astype(np.float32),
+        cv2.resize(part, size, interpolation=cv2.INTER_AREA),
+    )
 
 
 def _share(owner: str, budget: int, meshes: int) -> int:
@@ -180,7 +197,7 @@ def _simplified(vertices: np.ndarray, normals: np.ndarray, colors: np.ndarray, f
     if len(faces) <= budget:
         return vertices, normals, colors, faces
     points, fewer = fast_simplification.simplify(
-        np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32), target_count=budget, agg=5.0,
+        np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32), target_count=budget, agg=5.0
     )
     if len(fewer) == 0:
         return vertices, normals, colors, faces

@@ -25,8 +25,13 @@ from viz.house3d import light_meshes, lit_meshes, log_house
 from viz.story import Story
 
 PALETTE = {
-    "graph": (120, 130, 150), "path": (31, 119, 255), "route": (255, 160, 30),
-    "goal": (20, 190, 90), "start": (90, 90, 90), "agent": (31, 119, 255), "person": (255, 120, 0),
+    "graph": (120, 130, 150),
+    "path": (31, 119, 255),
+    "route": (255, 160, 30),
+    "goal": (20, 190, 90),
+    "start": (90, 90, 90),
+    "agent": (31, 119, 255),
+    "person": (255, 120, 0),
 }
 VFOV = np.deg2rad(75.0)
 SHORT = 60
@@ -46,8 +51,13 @@ class Pictures:
 
 
 def record(
-    recording: rr.RecordingStream, world: World, task: Task, steps: Iterable[Step], *,
-    pictures: Pictures = Pictures(), with_house: bool = True,
+    recording: rr.RecordingStream,
+    world: World,
+    task: Task,
+    steps: Iterable[Step],
+    *,
+    pictures: Pictures = Pictures(),
+    with_house: bool = True,
 ) -> Iterator[Step]:
     """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
 
@@ -91,28 +101,54 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
     at = world.graph.positions
     goals = at[list(task.goal_nodes)] - [0, 0, 1.44]
     recording.log("task/goal", rr.Points3D(goals, radii=0.16, colors=PALETTE["goal"]), static=True)
-    sought = [world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id]
+    sought = [
+        world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id
+    ]
     if sought:
         centres = np.array([np.add(p.position, (0, 0, p.size[2] / 2)) for p in sought])
-        recording.log("task/sought", rr.Boxes3D(
-            centers=centres, half_sizes=np.array([p.size for p in sought]) / 2 + 0.05,
-            rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in sought],
-            colors=PALETTE["goal"], labels=[p.object_class for p in sought], radii=0.012,
-        ), static=True)
-    recording.log("task/start", rr.Points3D(at[task.start.node] - [0, 0, 1.44], radii=0.13, colors=PALETTE["start"]), static=True)
+        recording.log(
+            "task/sought",
+            rr.Boxes3D(
+                centers=centres,
+                half_sizes=np.array([p.size for p in sought]) / 2 + 0.05,
+                rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in sought],
+                colors=PALETTE["goal"],
+                labels=[p.object_class for p in sought],
+                radii=0.012,
+            ),
+            static=True,
+        )
+    recording.log(
+        "task/start", rr.Points3D(at[task.start.node] - [0, 0, 1.44], radii=0.13, colors=PALETTE["start"]), static=True
+    )
     heading = "## " if len(task.request) <= SHORT else ""
-    recording.log("text/request", rr.TextDocument(f"{heading}“{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True)
+    recording.log(
+        "text/request", rr.TextDocument(f"{heading}“{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True
+    )
     for name in ("goal", "target"):
-        recording.log(f"plot/distance/{name}", rr.SeriesLines(colors=PALETTE["route" if name == "target" else name], widths=2), static=True)
+        recording.log(
+            f"plot/distance/{name}",
+            rr.SeriesLines(colors=PALETTE["route" if name == "target" else name], widths=2),
+            static=True,
+        )
     people = [p for p in world.house.placements if p.object_class == "person"]
     if people:
-        recording.log("people", rr.Points3D(
-            [np.add(p.position, (0, 0, p.size[2] + 0.25)) for p in people], radii=0.05,
-            colors=PALETTE["person"], labels=["assistant"] * len(people), show_labels=False,
-        ), static=True)
+        recording.log(
+            "people",
+            rr.Points3D(
+                [np.add(p.position, (0, 0, p.size[2] + 0.25)) for p in people],
+                radii=0.05,
+                colors=PALETTE["person"],
+                labels=["assistant"] * len(people),
+                show_labels=False,
+            ),
+            static=True,
+        )
 
 
-def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, pictures: Pictures) -> None:
+def log_step(
+    recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, pictures: Pictures
+) -> None:
     """One step: what is seen before the action, then the action and the reply to it."""
     log_sight(recording, world, step.pose.node, step.pose.yaw, step.pose.pitch, pictures)
     goal_distance = min(float(world.graph.distance[step.pose.node, g]) for g in task.goal_nodes)
@@ -147,22 +183,37 @@ def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Stor
     recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
 
 
-def log_sight(recording: rr.RecordingStream, world: World, node: int, yaw: float, pitch: float, pictures: Pictures) -> None:
+def log_sight(
+    recording: rr.RecordingStream, world: World, node: int, yaw: float, pitch: float, pictures: Pictures
+) -> None:
     """The agent's pose, what it sees ahead, and the panorama around it with its gaze in the middle."""
     panorama = world.panorama(node)
     height, width = pictures.view
     view = panorama.view_rgb(yaw, pitch, VFOV, pictures.view)
-    recording.log("agent/camera", rr.Transform3D(
-        translation=world.graph.positions[node], quaternion=rr.Quaternion(xyzw=camera_turn(yaw, pitch))))
-    recording.log("agent/camera/image", rr.Pinhole(
-        width=width, height=height, focal_length=float(height / 2 / np.tan(VFOV / 2)),
-        camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.6, color=PALETTE["agent"],
-    ), encoded(view, pictures.jpeg))
+    recording.log(
+        "agent/camera",
+        rr.Transform3D(translation=world.graph.positions[node], quaternion=rr.Quaternion(xyzw=camera_turn(yaw, pitch))),
+    )
+    recording.log(
+        "agent/camera/image",
+        rr.Pinhole(
+            width=width,
+            height=height,
+            focal_length=float(height / 2 / np.tan(VFOV / 2)),
+            camera_xyz=rr.ViewCoordinates.RDF,
+            image_plane_distance=0.6,
+            color=PALETTE["agent"],
+        ),
+        encoded(view, pictures.jpeg),
+    )
     equirect = panorama.equirect(pictures.panorama)
     shift = round(yaw / (2 * np.pi) * equirect.shape[1])
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), pictures.jpeg))
     eye = world.graph.positions[node]
-    recording.log("agent/body", rr.Capsules3D(lengths=1.0, radii=0.2, translations=[eye - [0, 0, 1.3]], colors=(*PALETTE["agent"], 200)))
+    recording.log(
+        "agent/body",
+        rr.Capsules3D(lengths=1.0, radii=0.2, translations=[eye - [0, 0, 1.3]], colors=(*PALETTE["agent"], 200)),
+    )
 
 
 def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> None:
@@ -211,7 +262,10 @@ def instruction_text(step: Step) -> str:
 
 
 WANTED = {
-    Intention.HELP: "for help", Intention.CUR: "where it is", Intention.GOAL: "where to go", Intention.SUB: "for a nearer goal",
+    Intention.HELP: "for help",
+    Intention.CUR: "where it is",
+    Intention.GOAL: "where to go",
+    Intention.SUB: "for a nearer goal",
 }
 """What a request is for, in the event log."""
 
@@ -254,7 +308,9 @@ def encoded(rgb: np.ndarray, quality: int) -> rr.EncodedImage:
     """An RGB picture as JPEG."""
     ok, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not ok:
-        raise ValueError(f"a picture of shape {rgb.shape} and type {rgb.dtype} cannot be encoded; expected (h, w, 3) uint8")
+        raise ValueError(
+            f"a picture of shape {rgb.shape} and type {rgb.dtype} cannot be encoded; expected (h, w, 3) uint8"
+        )
     return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
 
 

@@ -46,7 +46,9 @@ def load_run(folder: Path) -> list[Listed]:
     folder = Path(folder)
     files = sorted(folder.glob("episodes*.jsonl"))
     if not files:
-        raise FileNotFoundError(f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd file")
+        raise FileNotFoundError(
+            f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd file"
+        )
     found = []
     for path in files:
         found += [Listed(_name(path.name), e) for e in load_lines(path, Episode)]
@@ -71,8 +73,19 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
     rows = []
     for number, x in enumerate(found):
         recording = Path("recordings") / f"{number}.rrd"
-        link = f'<a href="{recording}">recording</a>' if (Path(folder) / recording).exists() else f"embodied view … --episode {number}"
-        asked = next((s.instruction for s, before in zip(x.episode.steps[1:], x.episode.steps) if isinstance(before.action, Ask)), "")
+        link = (
+            f'<a href="{recording}">recording</a>'
+            if (Path(folder) / recording).exists()
+            else f"embodied view … --episode {number}"
+        )
+        asked = next(
+            (
+                s.instruction
+                for s, before in zip(x.episode.steps[1:], x.episode.steps)
+                if isinstance(before.action, Ask)
+            ),
+            "",
+        )
         rows.append(
             f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td><td>{html.escape(x.episode.task.request)}"
             f"<div class=q>{html.escape(asked)}</div></td><td>{'at a goal' if x.arrived else x.episode.ended}</td>"
@@ -83,7 +96,8 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
         f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(found)} episodes of {len(agents)} agents.</p>"
         f'<img alt="steps and requests by agent" src="data:image/png;base64,{_plots(found, agents, judged(folder))}">'
         "<table><tr><th>#<th>agent<th>request, and the first instruction heard<th>end<th>steps<th>requests<th></tr>"
-        + "".join(rows) + "</table>"
+        + "".join(rows)
+        + "</table>"
     )
     path = Path(folder) / "index.html"
     write_bytes(path, page.encode())
@@ -97,7 +111,10 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
         return {}
     rows = json.loads(table.read_text())
     return {
-        _name(episodes_file(r["split"], r["agent"])): (100 * r["values"]["success"]["mean"], 100 * r["values"]["success"]["half_width_95"])
+        _name(episodes_file(r["split"], r["agent"])): (
+            100 * r["values"]["success"]["mean"],
+            100 * r["values"]["success"]["half_width_95"],
+        )
         for r in rows
     }
 
@@ -108,14 +125,26 @@ def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str,
     axes = figure.subplots(1, 3, sharey=True)
     of = {a: [x for x in found if x.agent == a] for a in agents}
     if set(agents) <= set(success):
-        axes[0].barh(range(len(agents)), [success[a][0] for a in agents], xerr=[success[a][1] for a in agents], color="#2a9d8f", ecolor="#555")
+        axes[0].barh(
+            range(len(agents)),
+            [success[a][0] for a in agents],
+            xerr=[success[a][1] for a in agents],
+            color="#2a9d8f",
+            ecolor="#555",
+        )
         axes[0].set(title="success, % with 95 % interval", xlim=(0, 100))
     else:
-        axes[0].barh(range(len(agents)), [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f")
+        axes[0].barh(
+            range(len(agents)), [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f"
+        )
         axes[0].set(title="stopped at a goal node, %", xlim=(0, 100))
-    axes[1].boxplot([[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
+    axes[1].boxplot(
+        [[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents))
+    )
     axes[1].set(title="steps")
-    axes[2].boxplot([[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents)))
+    axes[2].boxplot(
+        [[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents))
+    )
     axes[2].set(title="requests for help")
     axes[0].set_yticks(range(len(agents)), agents)
     data = io.BytesIO()

@@ -76,7 +76,9 @@ def open_viewers(*, spawn: bool = False, connect: str | None = None, serve: bool
 
 
 @contextlib.contextmanager
-def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, properties: dict[str, str]) -> Iterator[rr.RecordingStream]:
+def open_recording(
+    sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, properties: dict[str, str]
+) -> Iterator[rr.RecordingStream]:
     """A recording stream connected to `sinks`, flushed and closed at the end.
 
     Args:
@@ -106,8 +108,10 @@ def open_recording(sinks: Sinks, blueprint: rrb.Blueprint, *, name: str, propert
         try:
             recording.flush(timeout_sec=PATIENCE)
         except RuntimeError as e:
-            raise OSError(f"the recording could not be sent or written to its end ({e}); free some disk space, or look "
-                          "whether the viewer still runs, and run again") from e
+            raise OSError(
+                f"the recording could not be sent or written to its end ({e}); free some disk space, or look "
+                "whether the viewer still runs, and run again"
+            ) from e
         recording.disconnect()
         if file is not None and file.read_bytes()[-12:-4] != FOOTER:
             raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
@@ -123,7 +127,10 @@ def open_file(rrd: Path, *, serve: bool = False) -> int:
     if serve:
         _refuse_taken(PORT, WEB_PORT)
         command += ["--serve-web", "--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
-        print(f"watch in a browser: http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}; Ctrl-C ends it", flush=True)
+        print(
+            f"watch in a browser: http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}; Ctrl-C ends it",
+            flush=True,
+        )
     else:
         _need_screen()
         command += ["--port", "auto"]
@@ -131,7 +138,9 @@ def open_file(rrd: Path, *, serve: bool = False) -> int:
     with contextlib.suppress(KeyboardInterrupt):  # reaches the viewer as well
         status = subprocess.run(command, check=False, stdout=subprocess.DEVNULL).returncode
     if status:
-        raise UnableError(f"the Rerun viewer ended with status {status}; look at what it wrote above, or use --serve and a browser")
+        raise UnableError(
+            f"the Rerun viewer ended with status {status}; look at what it wrote above, or use --serve and a browser"
+        )
     return 0
 
 
@@ -162,7 +171,9 @@ def _checked(url: str) -> str:
     if parts.scheme not in ("rerun", "rerun+http", "rerun+https") or not parts.hostname:
         raise ValueError(f"--connect should be the URL of a running viewer such as {_url(PORT)}, got {url!r}")
     if not listens(parts.hostname, parts.port or PORT):
-        raise UnableError(f"no viewer listens at {url}; start one with `rerun` (on a screen) or `rerun --serve-web` (for browsers)")
+        raise UnableError(
+            f"no viewer listens at {url}; start one with `rerun` (on a screen) or `rerun --serve-web` (for browsers)"
+        )
     return url
 
 
@@ -171,10 +182,18 @@ def _spawned() -> str:
     if not listens("127.0.0.1", PORT):
         _need_screen()
         try:
-            rr.spawn(connect=False, port=PORT, memory_limit=MEMORY_LIMIT, server_memory_limit=MEMORY_LIMIT,
-                     executable_path=viewer_program(), recording=rr.RecordingStream(APPLICATION))
+            rr.spawn(
+                connect=False,
+                port=PORT,
+                memory_limit=MEMORY_LIMIT,
+                server_memory_limit=MEMORY_LIMIT,
+                executable_path=viewer_program(),
+                recording=rr.RecordingStream(APPLICATION),
+            )
         except RuntimeError as e:
-            raise UnableError(f"the Rerun viewer could not be started ({e}); use --serve and a browser, or --rrd and a file") from e
+            raise UnableError(
+                f"the Rerun viewer could not be started ({e}); use --serve and a browser, or --rrd and a file"
+            ) from e
     return _url(PORT)
 
 
@@ -194,14 +213,18 @@ def viewer_program() -> str:
 
 def _need_screen() -> None:
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise UnableError("there is no screen here (neither DISPLAY nor WAYLAND_DISPLAY is set) to open the Rerun viewer on; "
-                          "use --serve and a browser, --connect URL with a viewer elsewhere, or --rrd FILE")
+        raise UnableError(
+            "there is no screen here (neither DISPLAY nor WAYLAND_DISPLAY is set) to open the Rerun viewer on; "
+            "use --serve and a browser, --connect URL with a viewer elsewhere, or --rrd FILE"
+        )
 
 
 def _refuse_taken(*ports: int) -> None:
     for port in ports:
         if listens("127.0.0.1", port):
-            raise UnableError(f"port {port} is taken; end the program that uses it, or send to it with --connect {_url(port)} if it is a viewer")
+            raise UnableError(
+                f"port {port} is taken; end the program that uses it, or send to it with --connect {_url(port)} if it is a viewer"
+            )
 
 
 def listens(host: str, port: int) -> bool:

@@ -11,11 +11,25 @@ if TYPE_CHECKING:
     from embodied.world import World
 
 QUESTIONS = {
-    Intention.HELP: "Can you help me?", Intention.CUR: "Where am I?", Intention.GOAL: "Where should I go?",
+    Intention.HELP: "Can you help me?",
+    Intention.CUR: "Where am I?",
+    Intention.GOAL: "Where should I go?",
     Intention.SUB: "Can you give me a nearer goal?",
 }
-SIDES = ("ahead", "ahead on the left", "left", "left", "left", "behind on the left",
-         "behind", "behind on the right", "right", "right", "right", "ahead on the right")
+SIDES = (
+    "ahead",
+    "ahead on the left",
+    "left",
+    "left",
+    "left",
+    "behind on the left",
+    "behind",
+    "behind on the right",
+    "right",
+    "right",
+    "right",
+    "ahead on the right",
+)
 """Where something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
 
 

@@ -66,10 +66,18 @@ def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:
     frame = rgb.copy()
     height = frame.shape[0]
     band = max(height // 14, 22)
-    frame[height - band:] = (frame[height - band:] * 0.35).astype(np.uint8)
+    frame[height - band :] = (frame[height - band :] * 0.35).astype(np.uint8)
     scale = band / 42
-    cv2.putText(frame, caption.encode("ascii", "replace").decode(), (10, height - band // 3), cv2.FONT_HERSHEY_SIMPLEX,
-                scale, (255, 255, 255), 1, cv2.LINE_AA)
+    cv2.putText(
+        frame,
+        caption.encode("ascii", "replace").decode(),
+        (10, height - band // 3),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        scale,
+        (255, 255, 255),
+        1,
+        cv2.LINE_AA,
+    )
     return frame
 
 

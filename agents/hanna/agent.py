@@ -50,8 +50,13 @@ class HannaAgent:
         config = self.config
         rule = ask_above(config.ask_threshold) if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
-            self.network, self.vocabulary, bank, choose=choose_at(config.evaluation_temperature), ask_rule=rule,
-            instruction_length=config.instruction_length, turn_to_agent=config.turn_to_agent,
+            self.network,
+            self.vocabulary,
+            bank,
+            choose=choose_at(config.evaluation_temperature),
+            ask_rule=rule,
+            instruction_length=config.instruction_length,
+            turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
         )
 
@@ -67,8 +72,11 @@ def new_agent(config: TrainingConfig, vocabulary: Vocabulary, encoder_digest: st
 def save_agent(agent: HannaAgent, path: Path) -> None:
     """Write weights in half precision, with settings and vocabulary, atomically."""
     settings = {
-        "format": FORMAT, "config": agent.config.to_json(), "encoder": agent.encoder_digest,
-        "feature_size": str(agent.feature_size), "vocabulary": json.dumps(agent.vocabulary.words),
+        "format": FORMAT,
+        "config": agent.config.to_json(),
+        "encoder": agent.encoder_digest,
+        "feature_size": str(agent.feature_size),
+        "vocabulary": json.dumps(agent.vocabulary.words),
     }
     tensors = {k: v.detach().cpu().half().contiguous() for k, v in agent.network.state_dict().items()}
     with atomic_path(Path(path)) as temporary:

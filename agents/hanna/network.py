@@ -105,11 +105,20 @@ class StateNetwork(nn.Module):
         inter_keys, inter_values = self.inter_attend.empty(batch, like)
         intra_keys, intra_values = self.intra_attend.empty(batch, like)
         return Memory(
-            text_keys=zero[:, None].expand(-1, length, -1), text_values=zero[:, None].expand(-1, length, -1),
+            text_keys=zero[:, None].expand(-1, length, -1),
+            text_values=zero[:, None].expand(-1, length, -1),
             text_mask=seen.expand(-1, length),
-            inter_state=zero, inter_keys=inter_keys, inter_values=inter_values, inter_mask=seen,
-            local_time=zero, global_time=zero, intra_keys=intra_keys, intra_values=intra_values,
-            intra_inputs=zero[:, None], intra_states=zero[:, None], similar_mask=seen[:, :0],
+            inter_state=zero,
+            inter_keys=inter_keys,
+            inter_values=inter_values,
+            inter_mask=seen,
+            local_time=zero,
+            global_time=zero,
+            intra_keys=intra_keys,
+            intra_values=intra_values,
+            intra_inputs=zero[:, None],
+            intra_states=zero[:, None],
+            similar_mask=seen[:, :0],
         )
 
     def forward(
@@ -157,10 +166,14 @@ class StateNetwork(nn.Module):
             state = tentative - beta * past  # (B, h) D.16
 
         return state, dataclasses.replace(
-            m, inter_state=inter, inter_keys=inter_keys,
+            m,
+            inter_state=inter,
+            inter_keys=inter_keys,
             inter_values=self.inter_attend.append_value(m.inter_values, inter),
             inter_mask=torch.cat([m.inter_mask, seen[:, :1]], 1),
-            local_time=local_time, global_time=global_time, intra_keys=intra_keys,
+            local_time=local_time,
+            global_time=global_time,
+            intra_keys=intra_keys,
             intra_values=self.intra_attend.append_value(m.intra_values, state),
             intra_inputs=torch.cat([m.intra_inputs, intra_in[:, None]], 1),
             intra_states=torch.cat([m.intra_states, state[:, None]], 1),
@@ -174,8 +187,10 @@ class StateNetwork(nn.Module):
         """
         lengths = (percept.tokens != 0).sum(1)
         keys, values = m.text_keys, m.text_values
-        for rows in ((percept.new_task & (lengths <= SHORT)).nonzero()[:, 0],
-                     (percept.new_task & (lengths > SHORT)).nonzero()[:, 0]):
+        for rows in (
+            (percept.new_task & (lengths <= SHORT)).nonzero()[:, 0],
+            (percept.new_task & (lengths > SHORT)).nonzero()[:, 0],
+        ):
             if len(rows):
                 width = int(lengths[rows].max())
                 text = self.text_encoder(percept.tokens[rows, :width])  # (k, width, h)
@@ -190,7 +205,9 @@ class StateNetwork(nn.Module):
         keep = ~who[:, None]
         opening = torch.arange(m.inter_mask.shape[1], device=who.device) == 0
         return dataclasses.replace(
-            m, inter_state=m.inter_state * keep, local_time=m.local_time * keep,
+            m,
+            inter_state=m.inter_state * keep,
+            local_time=m.local_time * keep,
             inter_mask=m.inter_mask & (keep | opening),
         )
 

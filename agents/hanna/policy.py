@@ -79,8 +79,11 @@ class HannaMemory:
         rows = [self.positions.index(p) for p in positions]
         index = torch.tensor(rows, dtype=torch.long, device=self.previous_ask.device)
         return dataclasses.replace(
-            self, positions=positions, networks=tuple(m.select(index) for m in self.networks),
-            previous_action=self.previous_action[index], previous_ask=self.previous_ask[index],
+            self,
+            positions=positions,
+            networks=tuple(m.select(index) for m in self.networks),
+            previous_action=self.previous_action[index],
+            previous_ask=self.previous_ask[index],
             last_ask=tuple(self.last_ask[r] for r in rows),
             channels=None if self.channels is None else self.channels[index],
         )
@@ -112,8 +115,12 @@ class HannaPolicy:
     _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def act(
-        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
-        rngs: Sequence[np.random.Generator], imposed: Sequence[int | None] | None = None,
+        self,
+        observations: Sequence[Observation | None],
+        memory: HannaMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        imposed: Sequence[int | None] | None = None,
     ) -> tuple[list[Action | None], HannaMemory]:
         """One step of every running episode; see embodied.interface.Policy.
 
@@ -162,9 +169,13 @@ class HannaPolicy:
         asked = [isinstance(actions[p], Ask) for p in positions]
         moments = (*memory.moments, Moment(positions, scores)) if self.keep_moments else ()
         return actions, HannaMemory(
-            positions, networks, percept.actions[rows, torch.tensor(chosen, device=device)],
-            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device), tuple(last_ask),
-            memory.channels, moments,
+            positions,
+            networks,
+            percept.actions[rows, torch.tensor(chosen, device=device)],
+            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device),
+            tuple(last_ask),
+            memory.channels,
+            moments,
         )
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
@@ -172,9 +183,12 @@ class HannaPolicy:
         k, device, share = len(positions), next(self.network.parameters()).device, self.environment_dropout
         ones = torch.ones(k, self.bank.size, device=device)
         return HannaMemory(
-            positions, self.network.start(k, self.instruction_length),
+            positions,
+            self.network.start(k, self.instruction_length),
             torch.zeros(k, self.network.config.action_size, device=device),
-            torch.full((k,), START, device=device), (-1,) * k, F.dropout(ones, share) if share else None,
+            torch.full((k,), START, device=device),
+            (-1,) * k,
+            F.dropout(ones, share) if share else None,
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -211,8 +225,13 @@ class HannaPolicy:
         return Percept(
             tokens=send(np.stack([self.encode(o) for o in observations])),
             new_task=send(np.array([o.time_on_task == 0 for o in observations])),
-            current=current, target=target, actions=actions, action_mask=send(mask), action_slots=send(slots),
-            previous_action=memory.previous_action, previous_ask=memory.previous_ask,
+            current=current,
+            target=target,
+            actions=actions,
+            action_mask=send(mask),
+            action_slots=send(slots),
+            previous_action=memory.previous_action,
+            previous_ask=memory.previous_ask,
         )
 
     def encode(self, observation: Observation) -> np.ndarray:
@@ -228,8 +247,12 @@ def for_training(
 ) -> HannaPolicy:
     """The same networks, sampling their actions and keeping what they said."""
     return dataclasses.replace(
-        policy, choose=choose_sampled, ask_rule=ask_rule, environment_dropout=environment_dropout,
-        guided_asking=guided_asking, keep_moments=True,
+        policy,
+        choose=choose_sampled,
+        ask_rule=ask_rule,
+        environment_dropout=environment_dropout,
+        guided_asking=guided_asking,
+        keep_moments=True,
     )
 
 
@@ -244,8 +267,12 @@ class PerfectInterpretation:
     privileged: bool = True
 
     def act(
-        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Sequence[Observation | None],
+        memory: HannaMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[list[Action | None], HannaMemory]:
         imposed = [None if s is None or s.mode is Mode.MAIN else _teacher_index(s) for s in situations]
         return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)

@@ -36,9 +36,13 @@ class Progress:
 def save_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
     """Write `path` atomically; an interruption leaves the checkpoint before it."""
     body = {
-        "format": FORMAT, "config": agent.config.to_json(), "encoder": agent.encoder_digest,
-        "vocabulary": list(agent.vocabulary.words), "network": agent.network.state_dict(),
-        "optimizer": optimizer.state_dict(), "progress": vars(progress),
+        "format": FORMAT,
+        "config": agent.config.to_json(),
+        "encoder": agent.encoder_digest,
+        "vocabulary": list(agent.vocabulary.words),
+        "network": agent.network.state_dict(),
+        "optimizer": optimizer.state_dict(),
+        "progress": vars(progress),
     }
     with atomic_path(Path(path)) as temporary:
         torch.save(body, temporary)
@@ -63,13 +67,22 @@ def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
     changed = sorted(k for k, v in vars(before).items() if vars(now)[k] != v and k not in MAY_CHANGE)
     if changed:
         pairs = ", ".join(f"{k} {vars(before)[k]!r} -> {vars(now)[k]!r}" for k in changed)
-        raise CheckpointError(f"{path}: settings changed since this run began ({pairs}); restore them or use another run folder")
+        raise CheckpointError(
+            f"{path}: settings changed since this run began ({pairs}); restore them or use another run folder"
+        )
     agent.network.load_state_dict(body["network"])
     optimizer.load_state_dict(body["optimizer"])
     return Progress(**body["progress"])
 
 
-MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "evaluation_batch", "evaluation_temperature", "ask_threshold")
+MAY_CHANGE = (
+    "iterations",
+    "cooldown",
+    "checkpoint_minutes",
+    "evaluation_batch",
+    "evaluation_temperature",
+    "ask_threshold",
+)
 """Settings that may differ on resuming without changing what was learned so far."""
 
 

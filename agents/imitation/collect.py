@@ -73,7 +73,10 @@ class _Remembering:
         self.seconds = 0.0
 
     def act(
-        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *,
+        self,
+        observations: Sequence[Observation | None],
+        memory: HannaMemory | None,
+        *,
         rngs: Sequence[np.random.Generator],
     ) -> tuple[list[Action | None], HannaMemory]:
         began = time.perf_counter()
@@ -83,8 +86,13 @@ class _Remembering:
 
 
 def collect(
-    make_env: Callable[[], HelpEnv], policy: HannaPolicy, tasks: Sequence[Task], teacher: Teacher,
-    worlds: Mapping[str, World], *, seed: int,
+    make_env: Callable[[], HelpEnv],
+    policy: HannaPolicy,
+    tasks: Sequence[Task],
+    teacher: Teacher,
+    worlds: Mapping[str, World],
+    *,
+    seed: int,
 ) -> Experience:
     """Play `tasks` side by side with a policy that keeps its moments, and have them labelled."""
     remembering = _Remembering(policy)
@@ -99,9 +107,7 @@ def collect(
 def join(moments: Sequence[Moment]) -> Said:
     """All steps below each other; A is the most actions of any step."""
     most = max(m.scores.navigation.shape[1] for m in moments)
-    moves = [
-        F.pad(m.scores.navigation, (0, most - m.scores.navigation.shape[1]), value=-torch.inf) for m in moments
-    ]
+    moves = [F.pad(m.scores.navigation, (0, most - m.scores.navigation.shape[1]), value=-torch.inf) for m in moments]
     reasons = [m.scores.reasons for m in moments]
     return Said(
         torch.cat(moves), torch.cat([m.scores.ask for m in moments]), None if reasons[0] is None else torch.cat(reasons)
@@ -121,7 +127,9 @@ def targets(moments: Sequence[Moment], labels: Sequence[Sequence[Label]]) -> Tar
     reasons = np.array([r.reasons or (False, False, False) for r in rows], dtype=np.float32)
     device = moments[0].scores.navigation.device
     return Targets(
-        torch.tensor(moves, device=device), torch.from_numpy(negatives).to(device), torch.tensor(asks, device=device),
+        torch.tensor(moves, device=device),
+        torch.from_numpy(negatives).to(device),
+        torch.tensor(asks, device=device),
         torch.from_numpy(reasons).to(device),
     )
 

@@ -103,8 +103,15 @@ class TrainingConfig:
             raise ValueError(f"environment_dropout must be in [0, 1), got {self.environment_dropout}")
         if self.ask_rule not in RULES:
             raise ValueError(f"ask_rule must be one of {sorted(RULES)}, got {self.ask_rule!r}")
-        for name in ("iterations", "batch", "training_steps", "evaluation_steps", "evaluation_batch", "validate_every",
-                     "instruction_length"):
+        for name in (
+            "iterations",
+            "batch",
+            "training_steps",
+            "evaluation_steps",
+            "evaluation_batch",
+            "validate_every",
+            "instruction_length",
+        ):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         for name in ("learning_rate", "checkpoint_minutes"):
@@ -127,10 +134,16 @@ class TrainingConfig:
     def network_config(self, words: int, feature_size: int) -> HannaConfig:
         """The sizes of the networks for a vocabulary and an encoder."""
         return HannaConfig(
-            words=words, feature_size=feature_size, hidden_size=self.hidden_size,
-            navigation_embedding=self.navigation_embedding, ask_embedding=self.ask_embedding,
-            self_heads=self.self_heads, text_heads=self.text_heads, dropout=self.dropout,
-            reset_inter_task=self.reset_inter_task, predict_reasons=self.predict_reasons,
+            words=words,
+            feature_size=feature_size,
+            hidden_size=self.hidden_size,
+            navigation_embedding=self.navigation_embedding,
+            ask_embedding=self.ask_embedding,
+            self_heads=self.self_heads,
+            text_heads=self.text_heads,
+            dropout=self.dropout,
+            reset_inter_task=self.reset_inter_task,
+            predict_reasons=self.predict_reasons,
             similarity_attention=self.similarity_attention,
         )
 
@@ -149,9 +162,21 @@ class TrainingConfig:
 
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
-        hidden_size=128, navigation_embedding=128, ask_embedding=32, self_heads=4, text_heads=4, dropout=0.2,
-        iterations=1600, learning_rate=7e-4, cooldown=0.4, curiosity_floor=0.02, environment_dropout=0.4, guided_asking=0.5,
-        evaluation_temperature=0.5, validate_every=200, validation_tasks=200,
+        hidden_size=128,
+        navigation_embedding=128,
+        ask_embedding=32,
+        self_heads=4,
+        text_heads=4,
+        dropout=0.2,
+        iterations=1600,
+        learning_rate=7e-4,
+        cooldown=0.4,
+        curiosity_floor=0.02,
+        environment_dropout=0.4,
+        guided_asking=0.5,
+        evaluation_temperature=0.5,
+        validate_every=200,
+        validation_tasks=200,
     ),
     "paper": TrainingConfig(),
 }

@@ -79,7 +79,11 @@ def whole(
         return dict(numbers)
     table = torch.tensor([[numbers.get(n, 0.0), float(n in numbers)] for n in names], device=device)
     dist.all_reduce(table)
-    return {n: total / (1 if n in added else count) for n, (total, count) in zip(names, table.tolist(), strict=True) if count}
+    return {
+        n: total / (1 if n in added else count)
+        for n, (total, count) in zip(names, table.tolist(), strict=True)
+        if count
+    }
 
 
 def one_voice(note: Callable[[str], None]) -> Callable[[str], None]:

@@ -33,7 +33,9 @@ def split_of(
     paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in names}
     tasks = [t for t in data.tasks(name) if t.world in paths]
     return Split(
-        data.places(name), tasks if limit is None else spread(tasks, limit), data.environment(name),
+        data.places(name),
+        tasks if limit is None else spread(tasks, limit),
+        data.environment(name),
         load_bank(paths, encoder.digest).to(device),
     )
 
@@ -46,21 +48,37 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
 
 
 def run_train_hanna(
-    args: argparse.Namespace, config: TrainingConfig, note: Note = print,
+    args: argparse.Namespace,
+    config: TrainingConfig,
+    note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> int:
     """Train an agent on a data set's training houses, validating on its unseen validation houses."""
     torch.set_num_threads(args.threads)
     train_agent(
-        Dataset(args.data), encoder_of(args), config, args.out,
-        device=join_launcher(args.device), minutes=args.minutes, begin=args.begin, note=note, on_validation=on_validation,
+        Dataset(args.data),
+        encoder_of(args),
+        config,
+        args.out,
+        device=join_launcher(args.device),
+        minutes=args.minutes,
+        begin=args.begin,
+        note=note,
+        on_validation=on_validation,
     )
     return 0
 
 
 def train_agent(
-    data: Dataset, encoder: Encoder, config: TrainingConfig, folder: Path, *, device: str = "cpu",
-    minutes: float | None = None, begin: Path | None = None, note: Note = print,
+    data: Dataset,
+    encoder: Encoder,
+    config: TrainingConfig,
+    folder: Path,
+    *,
+    device: str = "cpu",
+    minutes: float | None = None,
+    begin: Path | None = None,
+    note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.imitation.training.train.
@@ -83,4 +101,6 @@ def train_agent(
     parameters = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})
     note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
-    return train(agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation)
+    return train(
+        agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation
+    )

@@ -82,8 +82,14 @@ class Clock:
 
 
 def train(
-    agent: HannaAgent, training: Split, validation: Split, teacher: Teacher, folder: Path, *,
-    minutes: float | None = None, note: Note = print,
+    agent: HannaAgent,
+    training: Split,
+    validation: Split,
+    teacher: Teacher,
+    folder: Path,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
     """Train `agent` in place, from `folder`'s checkpoint if there is one.
@@ -147,8 +153,13 @@ def train(
 
 
 def learn_once(
-    agent: HannaAgent, optimizer: torch.optim.Optimizer, learner: Any, training: Split, teacher: Teacher,
-    update: int, clock: Clock,
+    agent: HannaAgent,
+    optimizer: torch.optim.Optimizer,
+    learner: Any,
+    training: Split,
+    teacher: Teacher,
+    update: int,
+    clock: Clock,
 ) -> dict[str, float]:
     """One update; returns the numbers to report.
 
@@ -167,7 +178,9 @@ def learn_once(
                 )
             clock.move(experience.thinking, "environment", "network")
             with clock.on("backward"):
-                losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor)
+                losses = imitation_loss(
+                    experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor
+                )
                 for group in optimizer.param_groups:
                     group["lr"] = config.learning_rate_at(update)
                 optimizer.zero_grad(set_to_none=True)
@@ -211,7 +224,17 @@ def dropout_of(seed: int, update: int) -> Iterator[None]:
         yield
 
 
-NUMBERS = ("loss navigation", "loss asking", "gradient", "right moves", "steps", "success", "requests", "should ask", "right asks")
+NUMBERS = (
+    "loss navigation",
+    "loss asking",
+    "gradient",
+    "right moves",
+    "steps",
+    "success",
+    "requests",
+    "should ask",
+    "right asks",
+)
 """What is reported of an update; the last two only where help could be asked for."""
 ADDED = ("loss navigation", "loss asking", "steps")
 """Those that are sums over the batch, of which every process has a share."""
@@ -225,8 +248,11 @@ def numbers_of(
     moves, asks = wanted.moves != IGNORE, wanted.asks != IGNORE
     right = (said.moves.argmax(-1) == wanted.moves)[moves].float().mean()
     numbers = {
-        "loss navigation": float(losses[0].detach()), "loss asking": float(losses[1].detach()), "gradient": norm,
-        "right moves": float(right), "steps": float(sum(len(e.steps) for e in episodes)),
+        "loss navigation": float(losses[0].detach()),
+        "loss asking": float(losses[1].detach()),
+        "gradient": norm,
+        "right moves": float(right),
+        "steps": float(sum(len(e.steps) for e in episodes)),
         "success": sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes),
         "requests": sum(e.requests for e in episodes) / len(episodes),
     }
@@ -238,7 +264,12 @@ def numbers_of(
 
 
 def validate(
-    agent: HannaAgent, split: Split, progress: Progress, folder: Path, report: Report, seconds: float,
+    agent: HannaAgent,
+    split: Split,
+    progress: Progress,
+    folder: Path,
+    report: Report,
+    seconds: float,
     on_validation: Callable[[int, Sequence[Episode]], None] | None,
 ) -> Progress:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far.

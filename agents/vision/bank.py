@@ -18,8 +18,8 @@ class FeatureBank:
 
     def __init__(self, worlds: Mapping[str, np.ndarray], digest: str):
         """Args:
-          worlds: world name -> (nodes, 36, D) features, float16 or float32.
-          digest: names the encoder that made them.
+        worlds: world name -> (nodes, 36, D) features, float16 or float32.
+        digest: names the encoder that made them.
         """
         sizes = {name: array.shape[1:] for name, array in worlds.items()}
         if not worlds or any(len(s) != 2 or s[0] != VIEWS for s in sizes.values()) or len(set(sizes.values())) != 1:

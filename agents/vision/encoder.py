@@ -161,4 +161,3 @@ def _tensors(encoder: Encoder) -> dict[str, Tensor]:
     body = {k: v for k, v in encoder.network.state_dict().items() if not k.endswith("num_batches_tracked")}
     extra = {k: v for k, v in (("mean", encoder.mean), ("mix", encoder.mix)) if v is not None}
     return {**body, **extra}
-

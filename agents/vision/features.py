@@ -49,7 +49,9 @@ def views_of(panorama: Panorama, size: tuple[int, int] = VIEW_SIZE) -> np.ndarra
 
 def encode_panoramas(encoder: Encoder, panoramas: Iterable[Panorama], batch: int = 8) -> np.ndarray:
     """(n, 36, D) float16 features of panoramas, in order, as the encoder wants to look at them."""
-    prepare, encode = (strip_of, encoder.encode_strips) if encoder.sharing == "strip" else (views_of, encoder.encode_views)
+    prepare, encode = (
+        (strip_of, encoder.encode_strips) if encoder.sharing == "strip" else (views_of, encoder.encode_views)
+    )
     out = [encode(np.stack(group)) for group in _groups((prepare(p) for p in panoramas), batch)]
     return np.concatenate(out).astype(np.float16)
 

@@ -50,8 +50,13 @@ class HouseStrips:
     def save(self, path: Path) -> None:
         with atomic_path(Path(path)) as temporary, open(temporary, "wb") as f:
             np.savez_compressed(
-                f, classes=np.array(self.classes), rgb=self.rgb, share=self.share, rooms=self.rooms,
-                log_depth=self.log_depth, room=self.room,
+                f,
+                classes=np.array(self.classes),
+                rgb=self.rgb,
+                share=self.share,
+                rooms=self.rooms,
+                log_depth=self.log_depth,
+                room=self.room,
             )
 
     @staticmethod
@@ -60,8 +65,13 @@ class HouseStrips:
         try:
             with np.load(path, allow_pickle=False) as f:
                 return HouseStrips(
-                    Path(path).stem, tuple(str(c) for c in f["classes"]), f["rgb"], f["share"], f["rooms"],
-                    f["log_depth"], f["room"],
+                    Path(path).stem,
+                    tuple(str(c) for c in f["classes"]),
+                    f["rgb"],
+                    f["share"],
+                    f["rooms"],
+                    f["log_depth"],
+                    f["room"],
                 )
         except (ValueError, KeyError, EOFError) as e:
             raise ValueError(f"{path}: not a file of strips, or truncated ({e}); delete it and render again") from e
@@ -95,7 +105,12 @@ def look(world: World, classes: Sequence[str]) -> HouseStrips:
         depths.append(labels[2])
     room = [ROOM_KINDS.index(world.house.room_by_id[str(r)].kind) for r in world.graph.room_of_node]
     return HouseStrips(
-        world.house.name, tuple(classes), np.stack(rgb), np.stack(share), np.stack(rooms), np.stack(depths),
+        world.house.name,
+        tuple(classes),
+        np.stack(rgb),
+        np.stack(share),
+        np.stack(rooms),
+        np.stack(depths),
         np.array(room, dtype=np.int8),
     )
 
@@ -141,7 +156,8 @@ def cell_labels(
     logs = np.log(np.maximum(depth, NEAREST)).reshape(ROWS, CELL, COLUMNS, CELL).mean((1, 3))
     return (
         np.ceil(share * 255).astype(np.uint8).reshape(ROWS, COLUMNS, classes),
-        most.astype(np.int8).reshape(ROWS, COLUMNS), logs.astype(np.float16),
+        most.astype(np.int8).reshape(ROWS, COLUMNS),
+        logs.astype(np.float16),
     )
 
 

@@ -82,7 +82,9 @@ def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Rea
     pooled = [t.view(-1, 36, d).mean(1) for t in (x, y)]  # (n, D): the node as a whole
     scale = pooled[0].std(0) + 1e-6
     rooms = torch.from_numpy(train.room.astype(np.int64))
-    reader = _fit(pooled[0] / scale, rooms, F.cross_entropy, seed, steps, int(max(train.room.max(), test.room.max())) + 1)
+    reader = _fit(
+        pooled[0] / scale, rooms, F.cross_entropy, seed, steps, int(max(train.room.max(), test.room.max())) + 1
+    )
     guessed = reader(pooled[1] / scale).argmax(1).numpy()
 
     goal = torch.from_numpy(train.log_depth.reshape(-1, 1)).float()
@@ -90,11 +92,15 @@ def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Rea
     true_depth = test.log_depth.reshape(-1)
     common = np.bincount(train.room).argmax()
     return Reading(
-        mean_ap=float(np.nanmean(ap)), chance_ap=float(truth[:, [c for c in known if truth[:, c].any()]].mean()),
-        classes=int(np.isfinite(ap).sum()), ap=tuple(ap), room_accuracy=float((guessed == test.room).mean()),
+        mean_ap=float(np.nanmean(ap)),
+        chance_ap=float(truth[:, [c for c in known if truth[:, c].any()]].mean()),
+        classes=int(np.isfinite(ap).sum()),
+        ap=tuple(ap),
+        room_accuracy=float((guessed == test.room).mean()),
         common_room=float((test.room == common).mean()),
         depth_r2=float(1 - ((depth - true_depth) ** 2).mean() / true_depth.var()),
-        place_auc=place_auc(test), nodes=len(test.room),
+        place_auc=place_auc(test),
+        nodes=len(test.room),
     )
 
 

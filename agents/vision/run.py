@@ -55,9 +55,15 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
     encoder = load_encoder(args.out / "encoder.safetensors")
     untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
     numbers = {}
-    for name, who, alone in (("trained", encoder, False), ("trained, each view alone", encoder, True), ("random", untrained, False)):
+    for name, who, alone in (
+        ("trained", encoder, False),
+        ("trained, each view alone", encoder, True),
+        ("random", untrained, False),
+    ):
         began = time.perf_counter()
-        halves = [labelled(data, [strips[n] for n in names], who, classes, alone=alone) for names in (train_names, test_names)]
+        halves = [
+            labelled(data, [strips[n] for n in names], who, classes, alone=alone) for names in (train_names, test_names)
+        ]
         spent = time.perf_counter() - began
         reading = read(*halves, seed=config.seed)
         numbers[name] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
@@ -81,10 +87,12 @@ def labelled(
     encode = encoder.encode_strips
     if alone:
         encode = lambda strips: encoder.encode_views(
-            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips]))
+            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips])
+        )
     features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
     return Labelled(
-        np.concatenate(features), np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
+        np.concatenate(features),
+        np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
         np.concatenate([h.room for h in houses]).astype(np.int64),
         np.concatenate([mean_log_depth_of_views(h.log_depth) for h in houses]),
         np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
@@ -108,6 +116,7 @@ def _houses(data: Dataset, splits: Sequence[str]) -> list[str]:
 
 
 # Features ----------------------------------------------------------------------------------------
+
 
 def encoder_of(args: argparse.Namespace) -> Encoder:
     """The encoder that --encoder and --network describe."""

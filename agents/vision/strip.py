@@ -88,7 +88,5 @@ def seen_by_view(view: int) -> np.ndarray:
 @functools.cache
 def windows() -> np.ndarray:
     """(36, 12, 36) float32: weight of each cell of the feature map in each view; each view sums to 1."""
-    weights = np.stack([
-        seen_by_view(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)
-    ])
+    weights = np.stack([seen_by_view(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)])
     return (weights / weights.sum((1, 2), keepdims=True)).astype(np.float32)

@@ -71,9 +71,8 @@ def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tenso
         "cell room": F.cross_entropy(heads.cell_room(maps), batch.rooms, ignore_index=-1) * 0.5,
         "cell depth": F.smooth_l1_loss(heads.cell_depth(maps)[:, 0], batch.log_depth),
         "view objects": F.binary_cross_entropy_with_logits(heads.view_objects(views), batch.visible.float()) * 5,
-        "view room": F.cross_entropy(
-            heads.view_room(views).flatten(0, 1), batch.room.repeat_interleave(views.shape[1])
-        ) * 0.5,
+        "view room": F.cross_entropy(heads.view_room(views).flatten(0, 1), batch.room.repeat_interleave(views.shape[1]))
+        * 0.5,
     }
     return sum(parts.values()), {name: float(value.detach()) for name, value in parts.items()}
 
@@ -97,8 +96,11 @@ def batches(
             room.append(house.room[i])
         share = np.stack(share)
         yield StripBatch(
-            torch.from_numpy(np.stack(rgb)), torch.from_numpy(share), torch.from_numpy(visible_in_views(share)),
-            torch.from_numpy(np.stack(rooms).astype(np.int64)), torch.from_numpy(np.stack(depth).astype(np.float32)),
+            torch.from_numpy(np.stack(rgb)),
+            torch.from_numpy(share),
+            torch.from_numpy(visible_in_views(share)),
+            torch.from_numpy(np.stack(rooms).astype(np.int64)),
+            torch.from_numpy(np.stack(depth).astype(np.float32)),
             torch.from_numpy(np.array(room, dtype=np.int64)),
         )
 

@@ -23,20 +23,7 @@ from assets.built.maker import (
     plain,
     whole_image,
 )
-from assets.built.primitives import (
-    Shape,
-    ball,
-    box,
-    cylinder,
-    flat,
-    lathe,
-    moved,
-    quads,
-    scaled,
-    sheet,
-    tube,
-    turned,
-)
+from assets.built.primitives import Shape, ball, box, cylinder, flat, lathe, moved, quads, scaled, sheet, tube, turned
 from assets.materials import MATERIALS
 from assets.records import MeshPart
 

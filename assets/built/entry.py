@@ -5,30 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from assets.built.maker import (
-    FinishOf,
-    Look,
-    Maker,
-    maker,
-    material,
-    metal,
-    parts_of,
-    plain,
-)
-from assets.built.primitives import (
-    Shape,
-    ball,
-    bar,
-    box,
-    extruded,
-    joined,
-    lathe,
-    moved,
-    scaled,
-    sheet,
-    tube,
-    turned,
-)
+from assets.built.maker import FinishOf, Look, Maker, maker, material, metal, parts_of, plain
+from assets.built.primitives import Shape, ball, bar, box, extruded, joined, lathe, moved, scaled, sheet, tube, turned
 from assets.records import MeshPart
 
 

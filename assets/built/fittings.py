@@ -4,25 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import (
-    BLACK,
-    WHITE,
-    FinishOf,
-    Look,
-    Maker,
-    maker,
-    material,
-    parts_of,
-    plain,
-)
-from assets.built.primitives import (
-    box,
-    cylinder,
-    lathe,
-    moved,
-    tube,
-    turned,
-)
+from assets.built.maker import BLACK, WHITE, FinishOf, Look, Maker, maker, material, parts_of, plain
+from assets.built.primitives import box, cylinder, lathe, moved, tube, turned
 from assets.records import MeshPart
 
 

@@ -4,23 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import (
-    SOIL,
-    FinishOf,
-    Look,
-    Maker,
-    maker,
-    parts_of,
-    plain,
-)
-from assets.built.primitives import (
-    Shape,
-    lathe,
-    sheet,
-    tube,
-    turned,
-    two_sided,
-)
+from assets.built.maker import SOIL, FinishOf, Look, Maker, maker, parts_of, plain
+from assets.built.primitives import Shape, lathe, sheet, tube, turned, two_sided
 from assets.records import MeshPart
 
 

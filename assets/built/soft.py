@@ -4,18 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import (
-    WHITE,
-    FinishOf,
-    Look,
-    Maker,
-    maker,
-    material,
-    metal,
-    parts_of,
-    plain,
-    whole_image,
-)
+from assets.built.maker import WHITE, FinishOf, Look, Maker, maker, material, metal, parts_of, plain, whole_image
 from assets.built.primitives import (
     Shape,
     ball,

@@ -22,12 +22,7 @@ from assets.built.maker import (
     parts_of,
     surface,
 )
-from assets.built.primitives import (
-    bar,
-    box,
-    moved,
-    pillow,
-)
+from assets.built.primitives import bar, box, moved, pillow
 from assets.records import MeshPart, SupportSurface
 
 BOARD = 0.022

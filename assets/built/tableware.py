@@ -5,31 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from assets.built.maker import (
-    BLACK,
-    BRASS,
-    GLASS,
-    STEEL,
-    FinishOf,
-    Look,
-    Maker,
-    maker,
-    material,
-    parts_of,
-    plain,
-)
-from assets.built.primitives import (
-    Shape,
-    ball,
-    box,
-    cylinder,
-    extruded,
-    lathe,
-    moved,
-    scaled,
-    tube,
-    turned,
-)
+from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Maker, maker, material, parts_of, plain
+from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, moved, scaled, tube, turned
 from assets.records import MeshPart
 
 KITCHEN_TOPS = ("base cabinet", "drawer cabinet", "kitchen island", "corner base cabinet", "dining table")

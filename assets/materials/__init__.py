@@ -107,7 +107,9 @@ def _read_mean(folder: Path) -> dict | None:
         mean = json.loads(note.read_text())
         sizes = {name: (folder / name).stat().st_size for name in IMAGES}
         numbers = [*mean["color"], mean["roughness"]]
-        whole = sizes == mean["bytes"] and len(numbers) == 4 and all(isinstance(n, float) and 0 <= n <= 1 for n in numbers)
+        whole = (
+            sizes == mean["bytes"] and len(numbers) == 4 and all(isinstance(n, float) and 0 <= n <= 1 for n in numbers)
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return mean if whole else None

@@ -67,7 +67,10 @@ class Anna:
         route = best[int(rng.integers(len(best)))] if len(best) > 1 else best[0]
         depart, goal = home.departure(route.path, goals)
         subtask = Subtask(
-            route.id, depart, start=Pose(route.path[0], route.turn, route.tilt), goal=goal,
+            route.id,
+            depart,
+            start=Pose(route.path[0], route.turn, route.tilt),
+            goal=goal,
             path=route.path[: route.path.index(depart) + 1],
         )
         return Reply(text=route.instruction, image=Sight(name, depart), subtask=subtask)

@@ -56,8 +56,10 @@ class Describer:
         """The next optimal navigation action towards `target`: 'go' with its direction, or 'stop'."""
         if node == target:
             return (Feature("action", "stop"),)
-        offset = np.asarray(world.graph.positions)[int(world.graph.next_hop[node, target])] - np.asarray(
-            world.graph.positions)[node]
+        offset = (
+            np.asarray(world.graph.positions)[int(world.graph.next_hop[node, target])]
+            - np.asarray(world.graph.positions)[node]
+        )
         return (Feature("action", "go", *_bins(offset)),)
 
     def pretraining_goal(

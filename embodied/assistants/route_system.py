@@ -157,7 +157,12 @@ def benchmark_lemma2(graph: NavGraph, *, rng: np.random.Generator, pairs: int | 
 
 
 def route_paths(
-    graph: NavGraph, name: str, *, seed: int, house_split: str, config: RouteConfig = RouteConfig(),
+    graph: NavGraph,
+    name: str,
+    *,
+    seed: int,
+    house_split: str,
+    config: RouteConfig = RouteConfig(),
     starts: Collection[int] | None = None,
 ) -> list[tuple[int, ...]]:
     """The sampled paths of the house `name`: so many that each can be worded once per wording of its split."""

@@ -34,12 +34,18 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         counts = walk(env, tasks)
         asked = counts[1] / counts[0]
         yield measure(
-            f"{kind} steps, {100 * asked:.0f} % requests", lambda env=env, tasks=tasks: walk(env, tasks), "1/s",
-            repeats=7, per=counts[0], aim=aim,
+            f"{kind} steps, {100 * asked:.0f} % requests",
+            lambda env=env, tasks=tasks: walk(env, tasks),
+            "1/s",
+            repeats=7,
+            per=counts[0],
+            aim=aim,
         )
         if kind == "hanna":
             result = benchmark_lemma2(graph, rng=stream(seed, "lemma 2"), pairs=2_000)
-            yield from_values(f"Lemma 2: instructions of 2 N log2 N, N = {result.nodes}", [result.instructions / result.bound], "x")
+            yield from_values(
+                f"Lemma 2: instructions of 2 N log2 N, N = {result.nodes}", [result.instructions / result.bound], "x"
+            )
             yield from_values("Lemma 2: most instructions between two nodes", [float(result.most)], "")
 
 

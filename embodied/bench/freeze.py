@@ -28,7 +28,9 @@ CODE = ("code", "version", "commit", "digest", "libraries", "seconds", "cache", 
 """Fields of JSON files that name the program or the place rather than the product."""
 
 
-def digests(catalogue: Catalogue, cache: Path, *, lit: bool = True, progress: Callable[[str], None] = print) -> dict[str, str]:
+def digests(
+    catalogue: Catalogue, cache: Path, *, lit: bool = True, progress: Callable[[str], None] = print
+) -> dict[str, str]:
     """Name of a product to its hex digest, in a fixed order.
 
     Args:
@@ -59,8 +61,22 @@ def _all(catalogue: Catalogue, cache: Path, folder: Path, lit: bool) -> Iterator
         _run("dataset", kind, "--out", data, "--scale", "tiny", "--area", "60", "110", "--cache", cache)
         yield f"dataset/{kind}", folder_digest(data)
     yield "eval/hanna", _judged(folder, "eval", "hanna", "--data", folder / "hanna", "--tasks", "12", "--cache", cache)
-    yield "eval/hari", _judged(folder, "eval", "hari", "--data", folder / "hari", "--split", "test_unseen_env",
-                               "--tasks", "12", "--cache", cache)
+    yield (
+        "eval/hari",
+        _judged(
+            folder,
+            "eval",
+            "hari",
+            "--data",
+            folder / "hari",
+            "--split",
+            "test_unseen_env",
+            "--tasks",
+            "12",
+            "--cache",
+            cache,
+        ),
+    )
     _run("features", "--data", folder / "hanna", "--cache", cache)
     yield "judge/hanna", _judged(folder, "judge", "--data", folder / "hanna", "--tasks", "12", "--cache", cache)
 
@@ -79,8 +95,10 @@ def _light(catalogue: Catalogue, cache: Path) -> str:
         house = generate_house(7, FLAT, catalogue=catalogue)
         lit = light.bake(house, catalogue, Path(fresh), next(iter(light.QUALITIES))).lit
     meshes = [(m.owner, m.page, m.vertices.tobytes(), m.faces.tobytes(), m.uv.tobytes()) for m in lit.meshes]
-    return digest([hashlib.sha256(p.tobytes()).hexdigest() for p in lit.pages],
-                  [(o, p, *(hashlib.sha256(b).hexdigest() for b in rest)) for o, p, *rest in meshes])
+    return digest(
+        [hashlib.sha256(p.tobytes()).hexdigest() for p in lit.pages],
+        [(o, p, *(hashlib.sha256(b).hexdigest() for b in rest)) for o, p, *rest in meshes],
+    )
 
 
 def _judged(folder: Path, *words: object) -> str:

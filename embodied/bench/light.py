@@ -54,8 +54,19 @@ class Report:
     text: str
 
 
-def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4, views: int = 3, settings: str = "normal",
-            size: tuple[int, int] = (160, 240), rays: int = 64, progress: Callable[[str], None] = lambda text: None) -> Report:
+def compare(
+    catalogue,
+    cache: Path,
+    out: Path,
+    *,
+    seed: int = 1,
+    houses: int = 4,
+    views: int = 3,
+    settings: str = "normal",
+    size: tuple[int, int] = (160, 240),
+    rays: int = 64,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Report:
     """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Args:
@@ -69,7 +80,9 @@ def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4
     for k in range(houses):
         hour, weather = TIMES[k % len(TIMES)]
         house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
-        progress(f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects")
+        progress(
+            f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
+        )
         bakes.append(bake(house, catalogue, cache, settings))
         chosen = viewpoints(house, catalogue, views, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
@@ -77,7 +90,9 @@ def compare(catalogue, cache: Path, out: Path, *, seed: int = 1, houses: int = 4
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes())
+    write_bytes(
+        out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes()
+    )
     write_json(out / "light.json", facts, indent=1)
     return Report(facts, table(facts))
 
@@ -102,12 +117,21 @@ def viewpoints(house: House, catalogue, count: int, shown: Sequence[str] = ()) -
     return found
 
 
-def draw(house: House, catalogue, baked: Bake, views: Sequence[tuple[str, np.ndarray, float]], size: tuple[int, int], rays: int) -> list[Shot]:
+def draw(
+    house: House,
+    catalogue,
+    baked: Bake,
+    views: Sequence[tuple[str, np.ndarray, float]],
+    size: tuple[int, int],
+    rays: int,
+) -> list[Shot]:
     """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
     shots = []
     for way in WAYS:
         if way in DRAWN:
-            quality, backend = ("unlit", "classic") if way == "unlit" else ("baked", "filament" if way == "filament" else "classic")
+            quality, backend = (
+                ("unlit", "classic") if way == "unlit" else ("baked", "filament" if way == "filament" else "classic")
+            )
             lit = None if way == "unlit" else baked.lit
             with Renderer(house, catalogue, quality=quality, backend=backend, lit=lit, size=256) as r:
                 for room, eye, yaw in views:
@@ -138,16 +162,23 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
     for way in WAYS:
         row: dict = {"way": way, "ms_256": float(np.median([by[*v, way].ms for v in views]))}
         for name, truth in (("reference", "reference"), ("diffuse", "diffuse"), ("diffuse_all", "diffuse")):
-            pairs = [(by[*v, way].rgb, by[*v, truth].rgb, by[*v, "diffuse"].plain if name == "diffuse" else None) for v in views]
+            pairs = [
+                (by[*v, way].rgb, by[*v, truth].rgb, by[*v, "diffuse"].plain if name == "diffuse" else None)
+                for v in views
+            ]
             row[f"psnr_{name}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
             row[f"ssim_{name}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
         rows.append(row)
     pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
     return {
-        "rows": rows, "views": [list(v) for v in views], "device": device(), "renderer": str(gl.info()),
+        "rows": rows,
+        "views": [list(v) for v in views],
+        "device": device(),
+        "renderer": str(gl.info()),
         "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),
         "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
-        "disk_mb": float(np.median(pages)), "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
+        "disk_mb": float(np.median(pages)),
+        "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
         "shiny": float(np.mean([1 - by[*v, "diffuse"].plain.mean() for v in views])),
         "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
     }
@@ -156,9 +187,15 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
 def table(facts: dict) -> str:
     """The measures as Markdown."""
     number = lambda x, form: "" if x is None else format(x, form)
-    lines = ["| way | ms per 256 × 256 | PSNR / SSIM to reference | to diffuse reference | the same with mirrors and metal |", "|---|---|---|---|---|"]
+    lines = [
+        "| way | ms per 256 × 256 | PSNR / SSIM to reference | to diffuse reference | the same with mirrors and metal |",
+        "|---|---|---|---|---|",
+    ]
     for r in facts["rows"]:
-        cells = [f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}" for t in ("reference", "diffuse", "diffuse_all")]
+        cells = [
+            f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}"
+            for t in ("reference", "diffuse", "diffuse_all")
+        ]
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
     lines.append(
         f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or metal; {facts['renderer']}. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
@@ -178,7 +215,16 @@ def sheet(shots: Sequence[Shot]) -> np.ndarray:
         rows.append(np.concatenate(row, axis=1))
     head = np.full((20, rows[0].shape[1], 3), 255, np.uint8)
     for k, way in enumerate(WAYS):
-        cv2.putText(head, way, (6 + k * rows[0].shape[1] // len(WAYS), 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+        cv2.putText(
+            head,
+            way,
+            (6 + k * rows[0].shape[1] // len(WAYS), 14),
+            cv2.FONT_HERSHEY_SIMPLEX,
+            0.45,
+            (0, 0, 0),
+            1,
+            cv2.LINE_AA,
+        )
     return np.concatenate([head, *rows])
 
 

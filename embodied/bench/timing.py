@@ -35,8 +35,16 @@ class Measure:
         return self.value >= self.aim if self.unit in ("1/s", "x") else self.value <= self.aim
 
 
-def measure(name: str, body: Callable[[], object], unit: str = "ms", *, repeats: int = 9, warm: int = 1,
-            per: int = 1, aim: float | None = None) -> Measure:
+def measure(
+    name: str,
+    body: Callable[[], object],
+    unit: str = "ms",
+    *,
+    repeats: int = 9,
+    warm: int = 1,
+    per: int = 1,
+    aim: float | None = None,
+) -> Measure:
     """Time `body` `repeats` times after `warm` untimed calls.
 
     Args:
@@ -68,14 +76,23 @@ def ratio(name: str, slow: Measure, fast: Measure) -> Measure:
 
 def machine() -> dict[str, object]:
     """What the numbers were made on."""
-    return {"cores": os.cpu_count(), "machine": platform.machine(), "system": platform.platform(),
-            "python": platform.python_version(), "load": [round(x, 2) for x in os.getloadavg()]}
+    return {
+        "cores": os.cpu_count(),
+        "machine": platform.machine(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "load": [round(x, 2) for x in os.getloadavg()],
+    }
 
 
 def table(measures: Sequence[Measure]) -> str:
     """The measures as a Markdown table."""
     lines = ["| measured | median | 10-90 % | n | aim |", "|---|---|---|---|---|"]
     for m in measures:
-        aim = "" if m.aim is None else f"{'>=' if m.unit in ('1/s', 'x') else '<='} {m.aim:g} {'met' if m.met else 'MISSED'}"
+        aim = (
+            ""
+            if m.aim is None
+            else f"{'>=' if m.unit in ('1/s', 'x') else '<='} {m.aim:g} {'met' if m.met else 'MISSED'}"
+        )
         lines.append(f"| {m.name} | {m.value:.4g} {m.unit} | {m.low:.4g}-{m.high:.4g} | {m.repeats} | {aim} |")
     return "\n".join(lines)

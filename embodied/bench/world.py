@@ -33,7 +33,13 @@ TYPICAL = HouseConfig(area=(110.0, 130.0))
 def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     """Layout and furnishing of a 125-node house."""
     seeds = iter(range(seed, seed + 10_000))
-    yield measure("layout and furnishing, 125-node house", lambda: generate_house(next(seeds), LARGE, catalogue), "s", repeats=7, aim=1.0)
+    yield measure(
+        "layout and furnishing, 125-node house",
+        lambda: generate_house(next(seeds), LARGE, catalogue),
+        "s",
+        repeats=7,
+        aim=1.0,
+    )
     house = generate_house(seed, LARGE, catalogue)
     yield measure("navigation graph of it", lambda: build_graph(house, catalogue), "s", repeats=5)
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
@@ -46,15 +52,32 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iter
         renderer, eyes = world.renderer, world.graph.positions
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
         cameras = [c for n in nodes for c in face_cameras(eyes[n])]
-        face = measure(f"256x256 cube face, rgb, {quality}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras],
-                       per=len(cameras), repeats=5, aim=10.0 if quality == "unlit" else 12.0)
+        face = measure(
+            f"256x256 cube face, rgb, {quality}",
+            lambda: [renderer.rgb(c, (256, 256)) for c in cameras],
+            per=len(cameras),
+            repeats=5,
+            aim=10.0 if quality == "unlit" else 12.0,
+        )
         yield face
-        yield measure(f"256 panorama, six faces of rgb, {quality}", lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
-                      per=len(nodes), repeats=3, aim=60.0)
-        yield measure(f"256 panorama with depth and ids, {quality}", lambda: [renderer.panorama(eyes[n]) for n in nodes], per=len(nodes), repeats=3)
+        yield measure(
+            f"256 panorama, six faces of rgb, {quality}",
+            lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
+            per=len(nodes),
+            repeats=3,
+            aim=60.0,
+        )
+        yield measure(
+            f"256 panorama with depth and ids, {quality}",
+            lambda: [renderer.panorama(eyes[n]) for n in nodes],
+            per=len(nodes),
+            repeats=3,
+        )
         panorama = renderer.panorama(eyes[0])
         yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15, aim=15.0)
-    naive = measure("the naive way: a new mujoco.Renderer per view, all rooms", naive_view(house, catalogue, eyes[0]), repeats=3)
+    naive = measure(
+        "the naive way: a new mujoco.Renderer per view, all rooms", naive_view(house, catalogue, eyes[0]), repeats=3
+    )
     yield naive
     yield ratio("naive view over our face", naive, face)
 
@@ -109,7 +132,5 @@ def memory(catalogue: Catalogue, cache: Path, seed: int, count: int) -> Iterator
     yield from_values(f"memory after {count} houses", values[-1:], "MiB", aim=2048.0)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10  # Linux counts KiB
     yield from_values("peak memory on the way", [peak], "MiB", aim=2048.0)
-    growth = np.median(values[-third:]) - np.median(values[third:2 * third] if count >= 3 else values)
+    growth = np.median(values[-third:]) - np.median(values[third : 2 * third] if count >= 3 else values)
     yield from_values("growth over the last third", [float(growth)], "MiB", aim=100.0)
-
-

@@ -19,8 +19,23 @@ from typing import NoReturn
 
 from embodied.errors import UnableError
 
-COMMANDS = ("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features",
-            "train", "eval", "judge", "study", "bench")
+COMMANDS = (
+    "demo",
+    "doctor",
+    "assets",
+    "house",
+    "light",
+    "render",
+    "rollout",
+    "view",
+    "dataset",
+    "features",
+    "train",
+    "eval",
+    "judge",
+    "study",
+    "bench",
+)
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
 REMEDIES = {
@@ -51,7 +66,9 @@ def parser(chosen: str | None = None) -> argparse.ArgumentParser:
         description="Generated houses in MuJoCo, panoramas, and agents that ask people for help.",
         epilog="Start with `embodied doctor`, then `embodied demo`. `embodied COMMAND --help` explains each.",
     )
-    top.add_argument("--traceback", action="store_true", help="show where in the code an error comes from (before COMMAND)")
+    top.add_argument(
+        "--traceback", action="store_true", help="show where in the code an error comes from (before COMMAND)"
+    )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
         text = ast.get_docstring(ast.parse((Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")))

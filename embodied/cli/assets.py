@@ -14,8 +14,11 @@ from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, sh
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("action", choices=("build", "list", "sheet", "attribution"),
-                        help="attribution writes who made which model, under which licence")
+    parser.add_argument(
+        "action",
+        choices=("build", "list", "sheet", "attribution"),
+        help="attribution writes who made which model, under which licence",
+    )
     parser.add_argument("--class", dest="object_class", metavar="NAME", help="only this object class")
     parser.add_argument("--out", type=Path, metavar="PATH", help="folder for sheets, file for the attribution")
     add_cache(parser)
@@ -27,7 +30,9 @@ def run(args: argparse.Namespace) -> int:
     catalogue = catalogue_of(args)
     chosen = [a for a in catalogue.assets.values() if args.object_class in (None, a.object_class)]
     if not chosen:
-        raise ValueError(f"no object class {args.object_class!r}; `embodied assets list` names all {len(catalogue.classes)}")
+        raise ValueError(
+            f"no object class {args.object_class!r}; `embodied assets list` names all {len(catalogue.classes)}"
+        )
     return {"build": build, "list": list_assets, "sheet": sheet, "attribution": attribution}[args.action](
         args, catalogue, chosen
     )

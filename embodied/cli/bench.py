@@ -18,11 +18,19 @@ PARTS = ("houses", "pictures", "steps", "plays", "memory", "light")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)")
+    parser.add_argument(
+        "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
+    )
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
-    parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how pictures are drawn (default: unlit)")
-    parser.add_argument("--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures")
+    parser.add_argument(
+        "--quality", choices=("unlit", "baked"), default="unlit", help="how pictures are drawn (default: unlit)"
+    )
+    parser.add_argument(
+        "--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures"
+    )
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

@@ -22,7 +22,10 @@ PATIENCE = 2.0
 def add_cache(parser: argparse.ArgumentParser) -> None:
     """--cache: where meshes, textures, baked light and panoramas are kept."""
     parser.add_argument(
-        "--cache", type=Path, default=default_cache(), metavar="DIR",
+        "--cache",
+        type=Path,
+        default=default_cache(),
+        metavar="DIR",
         help="where expensive products are kept; safe to delete (default: %(default)s)",
     )
 
@@ -30,11 +33,19 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
 def add_packs(parser: argparse.ArgumentParser) -> None:
     """--pack, --own: which furniture to use."""
     parser.add_argument(
-        "--pack", type=Path, action="append", default=[], metavar="FILE",
+        "--pack",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
         help=".sh3f furniture library, may be repeated (default: those of the system package)",
     )
     parser.add_argument(
-        "--own", type=Path, action="append", default=[], metavar="DIR",
+        "--own",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
         help="folder with your own .sh3f, .glb or .obj files and a catalogue.json (docs/assets.md)",
     )
 
@@ -78,7 +89,9 @@ def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> I
 def fetch(catalogue, house) -> None:
     """Import all models and materials that `house` needs into the cache, with a bar if that takes a while."""
     surfaces = (*house.rooms, *house.openings)
-    finishes = {getattr(s, f.name) for s in surfaces for f in dataclasses.fields(s) if f.name.endswith("finish")} - {None}
+    finishes = {getattr(s, f.name) for s in surfaces for f in dataclasses.fields(s) if f.name.endswith("finish")} - {
+        None
+    }
     models = dict.fromkeys((p.asset, p.size, p.params) for p in house.placements)
     jobs = [(catalogue.finish, (key,)) for key in sorted(finishes)] + [(catalogue.mesh, m) for m in models]
     for job, arguments in bar(jobs, "furniture and materials", "model"):

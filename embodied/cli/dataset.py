@@ -18,17 +18,39 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the data set")
     parser.add_argument("--scale", choices=SCALES, default="mini", help="how much of it (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
-    parser.add_argument("--area", type=float, nargs=2, default=(150.0, 420.0), metavar=("LOW", "HIGH"),
-                        help="size of the houses in square metres (default: 150 420)")
-    parser.add_argument("--routes", choices=("sampled", "spanning"), default="sampled",
-                        help="what assistants know: random stretches, or a spanning tree's (default: %(default)s)")
-    parser.add_argument("--language", choices=("people", "plain"), default="people",
-                        help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)")
+    parser.add_argument(
+        "--area",
+        type=float,
+        nargs=2,
+        default=(150.0, 420.0),
+        metavar=("LOW", "HIGH"),
+        help="size of the houses in square metres (default: 150 420)",
+    )
+    parser.add_argument(
+        "--routes",
+        choices=("sampled", "spanning"),
+        default="sampled",
+        help="what assistants know: random stretches, or a spanning tree's (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--language",
+        choices=("people", "plain"),
+        default="people",
+        help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)",
+    )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
-    parser.add_argument("--panoramas", choices=("unlit", "baked", "glossy"), help="also draw every viewpoint, this well")
-    parser.add_argument("--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)")
-    parser.add_argument("--export", type=Path, metavar="DIR", help="also write the files that the published programs read")
-    parser.add_argument("--workers", type=int, default=2, metavar="N", help="processes on this machine (default: %(default)s)")
+    parser.add_argument(
+        "--panoramas", choices=("unlit", "baked", "glossy"), help="also draw every viewpoint, this well"
+    )
+    parser.add_argument(
+        "--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--export", type=Path, metavar="DIR", help="also write the files that the published programs read"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="processes on this machine (default: %(default)s)"
+    )
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_cache(parser)
     add_packs(parser)
@@ -46,23 +68,35 @@ def run(args: argparse.Namespace) -> int:
     HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
     if args.workers < 1:
         raise ValueError(f"--workers should be at least 1, got {args.workers}")
-    config = DatasetConfig(args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language)
+    config = DatasetConfig(
+        args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language
+    )
 
     def watch(jobs, total):
         return tqdm(jobs, "houses", total=total, unit="house")
 
     build_dataset(
-        config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray,
+        config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray
     )
     if args.panoramas:
         note("drawing panoramas; what is drawn already is kept")
         draw_panoramas(
-            config, args.out, args.cache, quality=args.panoramas, size=args.size, workers=args.workers, watch=watch,
-            packs=tuple(args.pack), ray_address=args.ray,
+            config,
+            args.out,
+            args.cache,
+            quality=args.panoramas,
+            size=args.size,
+            workers=args.workers,
+            watch=watch,
+            packs=tuple(args.pack),
+            ray_address=args.ray,
         )
     data = Dataset(args.out)
     if args.export:
         note(f"{len(export(data, args.export))} files for the published programs in {args.export}")
-    show(args, {"folder": str(args.out), "digest": data.digest, "splits": data.index["splits"]},
-         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}")
+    show(
+        args,
+        {"folder": str(args.out), "digest": data.digest, "splits": data.index["splits"]},
+        f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
+    )
     return 0

@@ -23,9 +23,15 @@ SEED = 3
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=SEED, help="which house (default: %(default)s)")
     parser.add_argument("--task", type=int, default=3, help="which of the house's tasks (default: %(default)s)")
-    parser.add_argument("--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)")
-    parser.add_argument("--quality", choices=("unlit", "baked"), default="baked", help="unlit is drawn at once (default: baked)")
-    parser.add_argument("--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder to write (default: %(default)s)")
+    parser.add_argument(
+        "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--quality", choices=("unlit", "baked"), default="baked", help="unlit is drawn at once (default: baked)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder to write (default: %(default)s)"
+    )
     add_sinks(parser, "DIR/episode.rrd")
     add_cache(parser)
     add_packs(parser)
@@ -60,10 +66,25 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
             walk = find_something(args, world, viewers)
         with timed("the second task: ask for help", seconds):
             help_facts = ask_for_help(args, world, routes, viewers)
-        facts = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png"), "seconds": seconds,
-                 "renderer": world.fingerprint["renderer"]}
-    show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}",
-                                 f"look at a recording with: .venv/bin/embodied view {help_facts['recording']}"]))
+        facts = {
+            "walk": walk,
+            "help": help_facts,
+            "plan": str(args.out / "plan.png"),
+            "seconds": seconds,
+            "renderer": world.fingerprint["renderer"],
+        }
+    show(
+        args,
+        facts,
+        "\n".join(
+            [
+                told(walk),
+                told(help_facts),
+                f"floor plan  {facts['plan']}",
+                f"look at a recording with: .venv/bin/embodied view {help_facts['recording']}",
+            ]
+        ),
+    )
     return 0
 
 
@@ -92,7 +113,9 @@ def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) ->
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
-    episode = play(environment_maker("find", {world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path")[0]
+    episode = play(
+        environment_maker("find", {world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path"
+    )[0]
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 
@@ -132,13 +155,23 @@ def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
     from viz.recording import record
     from viz.sinks import Sinks, open_recording
 
-    with open_recording(Sinks(path, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as stream:
+    with open_recording(
+        Sinks(path, viewers),
+        blueprint_of(world.house, episode),
+        name=episode.task.request,
+        properties=texts(world.fingerprint),
+    ) as stream:
         for _ in record(stream, world, episode.task, bar(episode.steps, "recording", "step")):
             pass
     return {
-        "agent": episode.agent, "request": episode.task.request, "success": bool(success(episode, world.graph)),
-        "spl": round(spl(episode, world.graph), 3), "navigation_error_m": round(navigation_error(episode, world.graph), 2),
-        "steps": len(episode.steps), "requests": episode.requests, "recording": str(path),
+        "agent": episode.agent,
+        "request": episode.task.request,
+        "success": bool(success(episode, world.graph)),
+        "spl": round(spl(episode, world.graph), 3),
+        "navigation_error_m": round(navigation_error(episode, world.graph), 2),
+        "steps": len(episode.steps),
+        "requests": episode.requests,
+        "recording": str(path),
         "recording_mib": round(path.stat().st_size / 2**20, 1),
     }
 
@@ -146,8 +179,10 @@ def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
 def told(facts: dict) -> str:
     """One line about a recorded episode."""
     outcome = "found" if facts["success"] else f"missed by {facts['navigation_error_m']} m"
-    return (f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} request{'s' * (facts['requests'] != 1)} for help"
-            f"  -> {facts['recording']} ({facts['recording_mib']} MiB)")
+    return (
+        f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} request{'s' * (facts['requests'] != 1)} for help"
+        f"  -> {facts['recording']} ({facts['recording_mib']} MiB)"
+    )
 
 
 @contextlib.contextmanager

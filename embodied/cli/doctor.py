@@ -17,8 +17,16 @@ from embodied.cli import message_of
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 
 LIBRARIES = (
-    "embodied", "mujoco", "trimesh", "torch", "opencv-python-headless",
-    "rerun-sdk", "gymnasium", "mitsuba", "numpy", "shapely",
+    "embodied",
+    "mujoco",
+    "trimesh",
+    "torch",
+    "opencv-python-headless",
+    "rerun-sdk",
+    "gymnasium",
+    "mitsuba",
+    "numpy",
+    "shapely",
 )
 FREE_DISK = 2.0
 """GiB below which rendering houses will soon fail."""
@@ -49,8 +57,11 @@ def run(args: argparse.Namespace) -> int:
         if not args.json:
             print(line(findings[-1]), flush=True)
     ok = all(f.ok for f in findings if f.needed)
-    show(args, {"ok": ok, "findings": [asdict(f) for f in findings]},
-         "Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.")
+    show(
+        args,
+        {"ok": ok, "findings": [asdict(f) for f in findings]},
+        "Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.",
+    )
     return 0 if ok else 1
 
 
@@ -108,7 +119,9 @@ def path_tracer(_: argparse.Namespace) -> Finding:
     except LightError as e:
         return Finding("path tracer", False, str(e), "pip install mitsuba; until then use --quality unlit", False)
     if found == "scalar":
-        return Finding("path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "apt-get install libllvm19", False)
+        return Finding(
+            "path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "apt-get install libllvm19", False
+        )
     return Finding("path tracer", True, f"Mitsuba on {found}", needed=False)
 
 
@@ -118,8 +131,11 @@ def vulkan(_: argparse.Namespace) -> Finding:
 
     found = ctypes.util.find_library("vulkan")
     return Finding(
-        "Vulkan", found is not None, found or "no Vulkan loader",
-        "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers", False,
+        "Vulkan",
+        found is not None,
+        found or "no Vulkan loader",
+        "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers",
+        False,
     )
 
 
@@ -129,7 +145,13 @@ def body(_: argparse.Namespace) -> Finding:
         text, found = f"dm-control {importlib.metadata.version('dm-control')}", True
     except importlib.metadata.PackageNotFoundError:
         text, found = "no dm-control", False
-    return Finding("driven body", found, text, "only environments with wheels=True need it: pip install --no-deps dm-control", False)
+    return Finding(
+        "driven body",
+        found,
+        text,
+        "only environments with wheels=True need it: pip install --no-deps dm-control",
+        False,
+    )
 
 
 def disk(args: argparse.Namespace) -> Finding:
@@ -138,4 +160,9 @@ def disk(args: argparse.Namespace) -> Finding:
     while not place.exists():
         place = place.parent
     free = shutil.disk_usage(place).free / 2**30
-    return Finding("disk", free >= FREE_DISK, f"{free:.0f} GiB free for {args.cache}", f"free {FREE_DISK} GiB or choose another --cache")
+    return Finding(
+        "disk",
+        free >= FREE_DISK,
+        f"{free:.0f} GiB free for {args.cache}",
+        f"free {FREE_DISK} GiB or choose another --cache",
+    )

@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
     rows = []
     for split in args.split:
+
         def keep(name, episodes, split=split):
             if args.out:
                 save_lines(args.out / episodes_file(split, name), episodes)

@@ -18,7 +18,9 @@ from embodied.house.house import WEATHERS
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="which house; the same seed gives the same house (default: %(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="which house; the same seed gives the same house (default: %(default)s)"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
@@ -54,9 +56,18 @@ def run(args: argparse.Namespace) -> int:
         if args.glb:
             export_glb(house, catalogue, args.out / "house.glb")
     facts = {
-        "seed": args.seed, "digest": house.digest, "area_m2": round(house.area, 1), "rooms": len(house.rooms),
-        "objects": len(house.placements), "nodes": len(graph.ids), "out": str(args.out),
+        "seed": args.seed,
+        "digest": house.digest,
+        "area_m2": round(house.area, 1),
+        "rooms": len(house.rooms),
+        "objects": len(house.placements),
+        "nodes": len(graph.ids),
+        "out": str(args.out),
     }
-    show(args, facts, f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
-                      f"{facts['nodes']} viewpoints -> {args.out}")
+    show(
+        args,
+        facts,
+        f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
+        f"{facts['nodes']} viewpoints -> {args.out}",
+    )
     return 0

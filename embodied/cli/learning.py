@@ -22,17 +22,34 @@ METAVARS = {int: "N", float: "X", str: "WORD"}
 
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Options that all of them share."""
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built")
-    parser.add_argument("--cache", type=Path, default=default_cache(), metavar="DIR",
-                        help="where expensive products are kept; safe to delete (default: %(default)s)")
-    parser.add_argument("--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)")
+    parser.add_argument(
+        "--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built"
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        default=default_cache(),
+        metavar="DIR",
+        help="where expensive products are kept; safe to delete (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--threads", type=int, default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+    )
 
 
 def add_encoder(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
-                        help="an encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)")
-    parser.add_argument("--network", metavar="NAME", help="torchvision network of --encoder: resnet18 to resnet152; "
-                        "'random' for an untrained compact one")
+    parser.add_argument(
+        "--encoder",
+        type=Path,
+        default=SHIPPED_ENCODER,
+        metavar="FILE",
+        help="an encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)",
+    )
+    parser.add_argument(
+        "--network",
+        metavar="NAME",
+        help="torchvision network of --encoder: resnet18 to resnet152; 'random' for an untrained compact one",
+    )
 
 
 def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
@@ -42,7 +59,10 @@ def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str
     for f in dataclasses.fields(config):
         if f.name in skip:
             continue
-        option, text = f"--{f.name.replace('_', '-')}", f"{helps[f.name]} (default: {default_of(config, f)})".replace("%", "%%")
+        option, text = (
+            f"--{f.name.replace('_', '-')}",
+            f"{helps[f.name]} (default: {default_of(config, f)})".replace("%", "%%"),
+        )
         if hints[f.name] is bool:
             parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
@@ -66,7 +86,9 @@ def chosen(args: argparse.Namespace, config):
 def add_train_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where strips, weights and numbers go")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="houses drawn side by side (default: %(default)s)")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="houses drawn side by side (default: %(default)s)"
+    )
     add_fields(parser, VisionConfig)
 
 
@@ -74,31 +96,54 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
     parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="houses side by side (default: %(default)s)")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="houses side by side (default: %(default)s)"
+    )
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
 
 
 def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it")
-    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it"
+    )
+    parser.add_argument(
+        "--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)"
+    )
     parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
-    parser.add_argument("--begin", type=Path, metavar="FILE", help="begin with the weights of this agent instead of random ones")
+    parser.add_argument(
+        "--begin", type=Path, metavar="FILE", help="begin with the weights of this agent instead of random ones"
+    )
     add_fields(parser, TrainingConfig)
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2 or houses")
     add_common(parser)
-    parser.add_argument("--encoder", type=Path, default=SHIPPED_ENCODER, metavar="FILE",
-                        help="an encoder of `embodied train vision` (default: shipped)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="agents, episodes and tables; the same command goes on")
-    parser.add_argument("--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)")
-    parser.add_argument("--tasks", type=int, metavar="N", help="judge on at most so many tasks of a split, from all houses alike")
-    parser.add_argument("--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)")
-    parser.add_argument("--workers", type=int, default=2, metavar="N", help="agents trained side by side (default: %(default)s)")
+    parser.add_argument(
+        "--encoder",
+        type=Path,
+        default=SHIPPED_ENCODER,
+        metavar="FILE",
+        help="an encoder of `embodied train vision` (default: shipped)",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="agents, episodes and tables; the same command goes on"
+    )
+    parser.add_argument(
+        "--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--tasks", type=int, metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
+    )
+    parser.add_argument(
+        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
+    )
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
     parser.set_defaults(threads=1)  # per agent; they are trained side by side
     add_fields(parser, TrainingConfig, skip=("training_houses",))
@@ -107,11 +152,15 @@ def add_study(parser: argparse.ArgumentParser) -> None:
 def add_eval(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
-    parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)")
+    parser.add_argument(
+        "--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)"
+    )
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
     parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument("--batch", type=int, default=32, help="episodes side by side; no influence on results (default: %(default)s)")
+    parser.add_argument(
+        "--batch", type=int, default=32, help="episodes side by side; no influence on results (default: %(default)s)"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")

@@ -18,7 +18,9 @@ TIMES = {"dawn": 6.5, "morning": 9.0, "noon": 12.5, "afternoon": 15.5, "dusk": 1
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
-    parser.add_argument("--time", metavar="TIME", help=f"one of {', '.join(TIMES)}, or an hour such as 17.5; written into house.json")
+    parser.add_argument(
+        "--time", metavar="TIME", help=f"one of {', '.join(TIMES)}, or an hour such as 17.5; written into house.json"
+    )
     parser.add_argument("--weather", choices=("clear", "hazy", "overcast"), help="written into house.json")
     parser.add_argument("--lamps", choices=("on", "off"), help="switch all lamps; written into house.json")
     parser.add_argument("--draft", action="store_true", help="coarser and several times faster")
@@ -39,8 +41,14 @@ def run(args: argparse.Namespace) -> int:
         changed.save(path)
     with progress_bar() as progress:
         result = bake(changed, catalogue, args.cache, "draft" if args.draft else "normal", progress=progress)
-    facts = {"house": changed.digest, "hour": changed.sky.hour, "weather": changed.sky.weather, "light": result.manifest["key"],
-             "seconds": result.manifest["total_seconds"], "check": result.manifest["check"]}
+    facts = {
+        "house": changed.digest,
+        "hour": changed.sky.hour,
+        "weather": changed.sky.weather,
+        "light": result.manifest["key"],
+        "seconds": result.manifest["total_seconds"],
+        "check": result.manifest["check"],
+    }
     show(args, facts, f"{changed.name} is lit at {changed.sky.hour:g} h, {changed.sky.weather}")
     return 0
 

@@ -15,8 +15,13 @@ from collections.abc import Mapping, Sequence
 METAVARS = {int: "N", float: "X", str: "WORD"}
 
 
-def add_options(parser: argparse.ArgumentParser, kind: type, skip: tuple[str, ...] = (), *,
-                words: Mapping[str, Sequence[str]] | None = None) -> None:
+def add_options(
+    parser: argparse.ArgumentParser,
+    kind: type,
+    skip: tuple[str, ...] = (),
+    *,
+    words: Mapping[str, Sequence[str]] | None = None,
+) -> None:
     """One option per field of the frozen dataclass `kind`; the sentence below a field is its help.
 
     Args:

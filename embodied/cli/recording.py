@@ -17,16 +17,26 @@ def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> No
       default: what --rrd is when it is not given, for the help text.
     """
     group = parser.add_argument_group("recording")
-    group.add_argument("--rrd", type=Path, metavar="FILE",
-                       help="write the Rerun recording here" + (f" (default: {default})" if default else ""))
+    group.add_argument(
+        "--rrd",
+        type=Path,
+        metavar="FILE",
+        help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
+    )
     add_viewers(group)
 
 
 def add_viewers(group: argparse._ActionsContainer) -> None:
     """--spawn, --connect, --serve."""
-    group.add_argument("--spawn", action="store_true", help="open the Rerun viewer, which needs a screen, and watch live")
-    group.add_argument("--connect", metavar="URL", help="send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy")
-    group.add_argument("--serve", action="store_true", help="serve the web viewer, watch in the browser, end with Ctrl-C")
+    group.add_argument(
+        "--spawn", action="store_true", help="open the Rerun viewer, which needs a screen, and watch live"
+    )
+    group.add_argument(
+        "--connect", metavar="URL", help="send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy"
+    )
+    group.add_argument(
+        "--serve", action="store_true", help="serve the web viewer, watch in the browser, end with Ctrl-C"
+    )
 
 
 @contextlib.contextmanager
@@ -40,5 +50,7 @@ def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
 
     with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve) as viewers:
         if args.spawn and gl.info().software:
-            note("this machine draws by software: the native viewer is slow, and fills memory with some drivers; better --serve")
+            note(
+                "this machine draws by software: the native viewer is slow, and fills memory with some drivers; better --serve"
+            )
         yield viewers

@@ -18,10 +18,16 @@ BACKENDS = ("classic", "filament")
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
     parser.add_argument("--size", type=int, default=512, help="side of a cube face in pixels (default: %(default)s)")
-    parser.add_argument("--quality", choices=QUALITIES, default="baked",
-                        help="unlit: at once; baked: global illumination, default; glossy: traced from the bake; "
-                             "reference: path-traced, slow")
-    parser.add_argument("--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan")
+    parser.add_argument(
+        "--quality",
+        choices=QUALITIES,
+        default="baked",
+        help="unlit: at once; baked: global illumination, default; glossy: traced from the bake; "
+        "reference: path-traced, slow",
+    )
+    parser.add_argument(
+        "--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan"
+    )
     parser.add_argument("--node", type=int, help="draw only this viewpoint")
     parser.add_argument("--equirect", type=Path, metavar="PNG", help="where to write the picture of --node")
     add_cache(parser)
@@ -35,13 +41,19 @@ def run(args: argparse.Namespace) -> int:
     if (args.node is None) != (args.equirect is None):
         raise ValueError("--node and --equirect go together: --node 3 --equirect node3.png")
     catalogue = catalogue_of(args)
-    with open_folder(args.folder, catalogue, args.cache, size=args.size, quality=args.quality, backend=args.backend) as world:
+    with open_folder(
+        args.folder, catalogue, args.cache, size=args.size, quality=args.quality, backend=args.backend
+    ) as world:
         fetch(catalogue, world.house)
         if args.node is not None:
             return one(args, world)
         path = world.render_all(progress=True)
-        facts = {"nodes": len(world.graph.ids), "file": str(path), "mib": round(path.stat().st_size / 2**20, 1),
-                 "renderer": world.fingerprint}
+        facts = {
+            "nodes": len(world.graph.ids),
+            "file": str(path),
+            "mib": round(path.stat().st_size / 2**20, 1),
+            "renderer": world.fingerprint,
+        }
     show(args, facts, f"{facts['nodes']} panoramas in {path} ({facts['mib']} MiB)")
     return 0
 

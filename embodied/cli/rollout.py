@@ -22,10 +22,21 @@ def add(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
     parser.add_argument("--episodes", type=int, default=1, metavar="N", help="how many tasks (default: %(default)s)")
-    parser.add_argument("--quality", choices=("unlit", "baked"), default="baked", help="how the house is drawn (default: baked)")
-    parser.add_argument("--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)")
+    parser.add_argument(
+        "--quality", choices=("unlit", "baked"), default="baked", help="how the house is drawn (default: baked)"
+    )
+    parser.add_argument(
+        "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
+    )
     parser.add_argument("--video", type=Path, metavar="MP4", help="write what the agent sees as a video")
-    parser.add_argument("--video-size", type=int, nargs=2, default=(480, 640), metavar=("H", "W"), help="pixels, both even (default: 480 640)")
+    parser.add_argument(
+        "--video-size",
+        type=int,
+        nargs=2,
+        default=(480, 640),
+        metavar=("H", "W"),
+        help="pixels, both even (default: 480 640)",
+    )
     add_sinks(parser)
     add_cache(parser)
     add_packs(parser)
@@ -51,20 +62,36 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
         fetch(world.catalogue, world.house)
         pool = find_pool(world, seed=args.seed)
         if args.episodes > len(pool):
-            raise ValueError(f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house")
+            raise ValueError(
+                f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house"
+            )
         tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
-        episodes = play(lambda: HelpEnv({world.name: world}), policy_of(args.agent), bar(tasks, "episodes", "episode"), seed=args.seed, agent=args.agent)
+        episodes = play(
+            lambda: HelpEnv({world.name: world}),
+            policy_of(args.agent),
+            bar(tasks, "episodes", "episode"),
+            seed=args.seed,
+            agent=args.agent,
+        )
         rows = []
         for number, episode in enumerate(episodes):
             row = {"task": episode.task.id, "request": episode.task.request}
             row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
             if args.video:
-                row["video"] = str(film(world, episode, numbered(args.video, number, args.episodes), tuple(args.video_size)))
+                row["video"] = str(
+                    film(world, episode, numbered(args.video, number, args.episodes), tuple(args.video_size))
+                )
             if args.rrd or viewers:
                 rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
                 row["recording"] = record_episode(world, episode, rrd, viewers)
             rows.append(row)
-        facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint, "episodes": rows}
+        facts = {
+            "agent": args.agent,
+            "seed": args.seed,
+            "world": world.name,
+            "renderer": world.fingerprint,
+            "episodes": rows,
+        }
     lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
     show(args, facts, "\n".join(lines))
     return 0
@@ -118,7 +145,12 @@ def record_episode(world, episode, rrd: Path | None, viewers: tuple[str, ...]) -
     from viz.recording import record
     from viz.sinks import Sinks, open_recording
 
-    with open_recording(Sinks(rrd, viewers), blueprint_of(world.house, episode), name=episode.task.request, properties=texts(world.fingerprint)) as r:
+    with open_recording(
+        Sinks(rrd, viewers),
+        blueprint_of(world.house, episode),
+        name=episode.task.request,
+        properties=texts(world.fingerprint),
+    ) as r:
         for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):
             pass
     return str(rrd or ", ".join(viewers))

@@ -26,7 +26,13 @@ def run(args: argparse.Namespace) -> int:
     from embodied.cli.learning import chosen
 
     setting = Setting(
-        args.data, args.encoder, args.out, chosen(args, SCALES[args.scale]), args.tasks, args.judge_seed, args.device,
+        args.data,
+        args.encoder,
+        args.out,
+        chosen(args, SCALES[args.scale]),
+        args.tasks,
+        args.judge_seed,
+        args.device,
         args.threads,
     )
     for path in run_study(setting, args.tables, workers=args.workers, note=note).values():

@@ -21,11 +21,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     from embodied.cli import learning
 
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    vision = kinds.add_parser("vision", help="the encoder, on renders of a data set's training houses", description=run_vision.__doc__)
+    vision = kinds.add_parser(
+        "vision", help="the encoder, on renders of a data set's training houses", description=run_vision.__doc__
+    )
     learning.add_train_vision(vision)
-    hanna = kinds.add_parser("hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__)
+    hanna = kinds.add_parser(
+        "hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__
+    )
     learning.add_train_hanna(hanna)
-    hanna.add_argument("--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder")
+    hanna.add_argument(
+        "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,7 +53,9 @@ def run_hanna(args: argparse.Namespace) -> int:
     from agents.imitation.run import run_train_hanna
     from embodied.cli.learning import chosen
 
-    return run_train_hanna(args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None)
+    return run_train_hanna(
+        args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None
+    )
 
 
 def _recorder(args: argparse.Namespace):

@@ -19,8 +19,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="RUN", help="a .rrd file, or a folder with episodes*.jsonl")
     parser.add_argument("--episode", type=int, metavar="N", help="record episode N of the list and open it")
     parser.add_argument("--data", type=Path, metavar="DIR", help="data set of the run, for --episode")
-    parser.add_argument("--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings")
-    parser.add_argument("--quality", choices=("unlit", "baked"), default="unlit", help="how --episode draws the house (default: unlit)")
+    parser.add_argument(
+        "--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings"
+    )
+    parser.add_argument(
+        "--quality", choices=("unlit", "baked"), default="unlit", help="how --episode draws the house (default: unlit)"
+    )
     add_sinks(parser, "RUN/recordings/N.rrd")
     add_cache(parser)
     add_packs(parser)
@@ -40,14 +44,20 @@ def run(args: argparse.Namespace) -> int:
         show(args, {"page": str(page), "episodes": len(found)}, f"wrote {page}")
         return 0
     rows = [summary_line(i, e) for i, e in enumerate(found)]
-    show(args, {"episodes": [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]}, "\n".join(rows))
+    show(
+        args,
+        {"episodes": [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]},
+        "\n".join(rows),
+    )
     return 0
 
 
 def show_file(args: argparse.Namespace) -> int:
     """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
     if not args.folder.exists():
-        raise FileNotFoundError(f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`")
+        raise FileNotFoundError(
+            f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`"
+        )
     from viz.sinks import open_file, send_file
 
     if args.connect is None:
@@ -68,12 +78,16 @@ def record_one(args: argparse.Namespace, found) -> int:
     if not 0 <= args.episode < len(found):
         raise ValueError(f"--episode {args.episode} does not exist; this run has the episodes 0 to {len(found) - 1}")
     if args.data is None:
-        raise ValueError("--episode needs --data DIR, the data set that the run was made on: its houses are drawn again")
+        raise ValueError(
+            "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
+        )
     episode = found[args.episode].episode
     path = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
     with viewers_of(args) as viewers:
         catalogue = catalogue_of(args)
-        with Dataset(args.data).open_world(episode.task.world, catalogue, args.cache, quality=args.quality, size=384) as world:
+        with Dataset(args.data).open_world(
+            episode.task.world, catalogue, args.cache, quality=args.quality, size=384
+        ) as world:
             sinks, blueprint, about = Sinks(path, viewers), blueprint_of(world.house, episode), texts(world.fingerprint)
             with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as r:
                 for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):

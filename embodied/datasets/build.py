@@ -31,8 +31,19 @@ from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
-MAKERS = ("assets", "embodied/assistants", "embodied/datasets", "embodied/generate", "embodied/house",
-          "embodied/language", "embodied/navigation", "embodied/render", "embodied/scene", "embodied/tasks", "embodied")
+MAKERS = (
+    "assets",
+    "embodied/assistants",
+    "embodied/datasets",
+    "embodied/generate",
+    "embodied/house",
+    "embodied/language",
+    "embodied/navigation",
+    "embodied/render",
+    "embodied/scene",
+    "embodied/tasks",
+    "embodied",
+)
 """Folders of the code and the catalogue that decide what is in a data set; of the last, its own modules only."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
 SEEDS = 12
@@ -88,8 +99,15 @@ def units(wanted: Scale) -> tuple[Unit, ...]:
 
 
 def build_dataset(
-    config: DatasetConfig, folder: Path, cache: Path, *, workers: int = 1, make_house: HouseMaker | None = None,
-    watch: Watch | None = None, packs: tuple[Path, ...] = (), ray_address: str | None = None,
+    config: DatasetConfig,
+    folder: Path,
+    cache: Path,
+    *,
+    workers: int = 1,
+    make_house: HouseMaker | None = None,
+    watch: Watch | None = None,
+    packs: tuple[Path, ...] = (),
+    ray_address: str | None = None,
 ) -> Path:
     """Build what is missing of the data set in `folder` and write its index; returns the index.
 
@@ -114,8 +132,16 @@ def build_dataset(
 
 
 def draw_panoramas(
-    config: DatasetConfig, folder: Path, cache: Path, *, quality: str, size: int, workers: int = 1,
-    watch: Watch | None = None, packs: tuple[Path, ...] = (), ray_address: str | None = None,
+    config: DatasetConfig,
+    folder: Path,
+    cache: Path,
+    *,
+    quality: str,
+    size: int,
+    workers: int = 1,
+    watch: Watch | None = None,
+    packs: tuple[Path, ...] = (),
+    ray_address: str | None = None,
 ) -> None:
     """Draw the panoramas of all houses into their folders, unless they are there."""
     arguments = (Path(folder), Path(cache), quality, size, packs)
@@ -134,8 +160,13 @@ def draw_unit(unit: Unit, folder: Path, cache: Path, quality: str, size: int, pa
 
 
 def for_each_unit(
-    job: Callable[..., str], work: tuple[Unit, ...], arguments: tuple, *,
-    workers: int, watch: Watch | None, ray_address: str | None,
+    job: Callable[..., str],
+    work: tuple[Unit, ...],
+    arguments: tuple,
+    *,
+    workers: int,
+    watch: Watch | None,
+    ray_address: str | None,
 ) -> None:
     """Run job(unit, *arguments) for every unit, on this machine's processes or on a Ray cluster."""
     if ray_address is not None:
@@ -151,7 +182,7 @@ def for_each_unit(
 
 
 def build_unit(
-    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...] = (),
+    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...] = ()
 ) -> str:
     """Build one house's folder unless it is there; returns its name.
 
@@ -194,7 +225,7 @@ def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: o
 
 
 def _write_unit(
-    unit: Unit, config: DatasetConfig, home: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...],
+    unit: Unit, config: DatasetConfig, home: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...]
 ) -> None:
     catalogue, language = load_catalogue(cache, packs), VOICES[config.language]()
     house, graph = make_house(config.seed, unit.name, config, catalogue)
@@ -211,17 +242,29 @@ def _write_unit(
     with open_world(house, catalogue, cache, graph=graph) as world:
         routes = worded(world, paths, wording, seed=config.seed, language=language)
         tasks = part_tasks(
-            config.kind, world, routes, [(_part(s, unit, config.kind), n) for s, n in shares(unit, config)],
-            seed=config.seed, language=language,
+            config.kind,
+            world,
+            routes,
+            [(_part(s, unit, config.kind), n) for s, n in shares(unit, config)],
+            seed=config.seed,
+            language=language,
         )
     house.save(home / "house.json")
     to_matterport(graph, house, home / "connectivity.json")
     save_lines(home / "routes.jsonl", routes)
-    counts = {s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
-              for s, _ in shares(unit, config)}
+    counts = {
+        s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
+        for s, _ in shares(unit, config)
+    }
     facts = {
-        "version": VERSION, "config": dataclasses.asdict(config), "group": unit.group, "index": unit.index,
-        "house_digest": house.digest, "nodes": len(graph.ids), "routes": len(routes), "tasks": counts,
+        "version": VERSION,
+        "config": dataclasses.asdict(config),
+        "group": unit.group,
+        "index": unit.index,
+        "house_digest": house.digest,
+        "nodes": len(graph.ids),
+        "routes": len(routes),
+        "tasks": counts,
     }
     write_bytes(home / "unit.json", (json.dumps(facts, sort_keys=True, indent=1) + "\n").encode())
 
@@ -267,7 +310,9 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
 def program() -> str:
     """A digest of the code and the catalogue that make data sets: what one of them began, only the same one may finish."""
     root = Path(__file__).parents[2]
-    files = [f for name in MAKERS for f in ((root / name).glob("*") if name == "embodied" else (root / name).rglob("*"))]
+    files = [
+        f for name in MAKERS for f in ((root / name).glob("*") if name == "embodied" else (root / name).rglob("*"))
+    ]
     texts = {f.relative_to(root).as_posix(): digest(f.read_bytes()) for f in files if f.suffix in (".py", ".json")}
     return digest(texts)[:16]
 
@@ -288,8 +333,11 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
                 files[f"{unit.name}/{path.name}"] = digest(path.read_bytes())[:16]
     order = [s.name for s in scale(config.scale, config.kind).splits]
     body = {
-        "version": VERSION, "config": dataclasses.asdict(config), "splits": {n: table[n] for n in order},
-        "digest": digest(files), "files": files,
+        "version": VERSION,
+        "config": dataclasses.asdict(config),
+        "splits": {n: table[n] for n in order},
+        "digest": digest(files),
+        "files": files,
     }
     path = folder / "dataset.json"
     write_bytes(path, (json.dumps(body, indent=1) + "\n").encode())
@@ -298,4 +346,6 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
 
 def missing_units(config: DatasetConfig, folder: Path) -> Iterator[Unit]:
     """The houses that are not built yet."""
-    return (u for u in units(scale(config.scale, config.kind)) if not (folder / "houses" / u.name / "unit.json").exists())
+    return (
+        u for u in units(scale(config.scale, config.kind)) if not (folder / "houses" / u.name / "unit.json").exists()
+    )

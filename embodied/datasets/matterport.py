@@ -39,20 +39,72 @@ if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
 REGIONS = {
-    "bathroom": "a", "main_bedroom": "b", "bedroom": "b", "kids_room": "b", "guest_room": "b", "closet": "c",
-    "dining_room": "d", "family_room": "f", "garage": "g", "hall": "e", "corridor": "h", "library": "i",
-    "laundry_room": "j", "kitchen": "k", "living_room": "l", "study": "o", "sun_room": "p", "playroom": "r",
-    "stairwell": "s", "toilet": "t", "workshop": "u", "pantry": "u", "gym": "w",
+    "bathroom": "a",
+    "main_bedroom": "b",
+    "bedroom": "b",
+    "kids_room": "b",
+    "guest_room": "b",
+    "closet": "c",
+    "dining_room": "d",
+    "family_room": "f",
+    "garage": "g",
+    "hall": "e",
+    "corridor": "h",
+    "library": "i",
+    "laundry_room": "j",
+    "kitchen": "k",
+    "living_room": "l",
+    "study": "o",
+    "sun_room": "p",
+    "playroom": "r",
+    "stairwell": "s",
+    "toilet": "t",
+    "workshop": "u",
+    "pantry": "u",
+    "gym": "w",
 }
 """Our room kinds as Matterport's region letters; anything else is 'z', other room."""
 REGION_NAMES = {
-    "a": "bathroom", "b": "bedroom", "c": "closet", "d": "dining room", "e": "entryway", "f": "family room",
-    "g": "garage", "h": "hallway", "i": "library", "j": "laundry room", "k": "kitchen", "l": "living room",
-    "m": "meeting room", "n": "lounge", "o": "office", "p": "porch", "r": "rec room", "s": "stairs", "t": "toilet",
-    "u": "utility room", "v": "tv room", "w": "gym", "x": "outdoor", "y": "balcony", "z": "other room", "B": "bar",
-    "C": "classroom", "D": "dining booth", "S": "spa", "Z": "junk", "-": "no label",
+    "a": "bathroom",
+    "b": "bedroom",
+    "c": "closet",
+    "d": "dining room",
+    "e": "entryway",
+    "f": "family room",
+    "g": "garage",
+    "h": "hallway",
+    "i": "library",
+    "j": "laundry room",
+    "k": "kitchen",
+    "l": "living room",
+    "m": "meeting room",
+    "n": "lounge",
+    "o": "office",
+    "p": "porch",
+    "r": "rec room",
+    "s": "stairs",
+    "t": "toilet",
+    "u": "utility room",
+    "v": "tv room",
+    "w": "gym",
+    "x": "outdoor",
+    "y": "balcony",
+    "z": "other room",
+    "B": "bar",
+    "C": "classroom",
+    "D": "dining booth",
+    "S": "spa",
+    "Z": "junk",
+    "-": "no label",
 }
-CAMERA = {"left": (0, -1, 0), "right": (0, 1, 0), "up": (0, 0, 1), "down": (0, 0, -1), "forward": (1, 0, 0), "stop": (0, 0, 0)}
+CAMERA = {
+    "left": (0, -1, 0),
+    "right": (0, 1, 0),
+    "up": (0, 0, 1),
+    "down": (0, 0, -1),
+    "forward": (1, 0, 0),
+    "stop": (0, 0, 0),
+}
 """VNLA's words as MatterSim actions: index of the move, sign of the heading change (right is +), of the elevation's."""
 
 
@@ -95,11 +147,16 @@ def action_list(graph: NavGraph, node: int, bin_: int) -> list[dict[str, object]
         index = view_index(int(v))
         relative = float(wrap(heading_of_yaw(y) - bin_ * STEP))
         offset = np.hypot(wrap(y - (v % TURNS) * STEP), p - (v // TURNS - 1) * STEP)
-        actions.append({
-            "relViewIndex": TURNS * (index // TURNS) + (index - bin_) % TURNS, "absViewIndex": index,
-            "nextViewpointId": graph.ids[int(j)], "rel_heading": relative, "rel_elevation": float(p),
-            "distance": float(offset),
-        })
+        actions.append(
+            {
+                "relViewIndex": TURNS * (index // TURNS) + (index - bin_) % TURNS,
+                "absViewIndex": index,
+                "nextViewpointId": graph.ids[int(j)],
+                "rel_heading": relative,
+                "rel_elevation": float(p),
+                "distance": float(offset),
+            }
+        )
     stop = {"relViewIndex": -1, "absViewIndex": bin_, "nextViewpointId": graph.ids[node]}
     return [stop, *sorted(actions, key=lambda a: (abs(a["rel_heading"]), a["nextViewpointId"]))]
 
@@ -139,11 +196,16 @@ def _export_r2r(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]
             graph = data.place(name).graph
             texts = [t.request for t in tasks]
             number += 1
-            items.append({
-                "distance": round(float(graph.distance[path[0], path[-1]]), 4), "scan": scan_name(name),
-                "path_id": number, "path": [graph.ids[v] for v in path], "heading": heading(tasks[0].start),
-                "instructions": [texts[k % len(texts)] for k in range(3)],
-            })
+            items.append(
+                {
+                    "distance": round(float(graph.distance[path[0], path[-1]]), 4),
+                    "scan": scan_name(name),
+                    "path_id": number,
+                    "path": [graph.ids[v] for v in path],
+                    "heading": heading(tasks[0].start),
+                    "instructions": [texts[k % len(texts)] for k in range(3)],
+                }
+            )
         files.append(_json(folder / f"R2R_{split}.json", items))
     return files
 
@@ -151,7 +213,9 @@ def _export_r2r(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]
 def _item(task: Task, number: int, place: Place) -> dict[str, object]:
     ids, graph = place.graph.ids, place.graph
     return {
-        "path_id": number, "scan": scan_name(task.world), "heading": heading(task.start),
+        "path_id": number,
+        "scan": scan_name(task.world),
+        "heading": heading(task.start),
         "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in task.goal_nodes],
         "instructions": [tokenised(task.request)],
     }
@@ -182,16 +246,22 @@ def _export_hanna(data: Dataset, names: Sequence[str], folder: Path) -> list[Pat
     groups = {g: [scan_name(n) for n in names if n.startswith(g)] for g in ("train", "val", "test")}
     objects = sorted({t.goal.object_class for s in data.splits for t in data.tasks(s)})
     return [
-        *files, _json(hanna / "routes.json", routes), _json(hanna / "panoramic_action_space.json", spaces),
-        _json(hanna / "scan_split.json", groups), _text(hanna / "accepted_objects.txt", objects), _regions(hanna),
+        *files,
+        _json(hanna / "routes.json", routes),
+        _json(hanna / "panoramic_action_space.json", spaces),
+        _json(hanna / "scan_split.json", groups),
+        _text(hanna / "accepted_objects.txt", objects),
+        _regions(hanna),
         _text(hanna / "vocab.txt", ["<PAD>", "<UNK>", "<EOS>", *sorted(words, key=lambda w: (-words[w], w))]),
     ]
 
 
 def _route(route: Route, graph: NavGraph) -> dict[str, object]:
     return {
-        "path_id": route.id.replace("_", "-"), "path": [graph.ids[v] for v in route.path],
-        "instruction": tokenised(route.instruction), "split": route.split,
+        "path_id": route.id.replace("_", "-"),
+        "path": [graph.ids[v] for v in route.path],
+        "instruction": tokenised(route.instruction),
+        "split": route.split,
         "view_id": view_index(Pose(0, route.turn, route.tilt).view),
     }
 
@@ -210,8 +280,12 @@ def _export_vnla(data: Dataset, names: Sequence[str], folder: Path) -> list[Path
     for name in names:
         graph, house = data.place(name).graph, data.place(name).house
         kinds = [house.room_by_id[r].kind for r in graph.room_of_node]
-        lines = [f"{k} {key} - {REGIONS.get(kind, 'z')}" for k, (key, kind) in enumerate(zip(graph.ids, kinds, strict=True))]
-        files.append(_text(folder / "v1" / "scans" / scan_name(name) / "house_segmentations" / "panorama_to_region.txt", lines))
+        lines = [
+            f"{k} {key} - {REGIONS.get(kind, 'z')}" for k, (key, kind) in enumerate(zip(graph.ids, kinds, strict=True))
+        ]
+        files.append(
+            _text(folder / "v1" / "scans" / scan_name(name) / "house_segmentations" / "panorama_to_region.txt", lines)
+        )
     vocabulary = ["<PAD>", "<UNK>", "<EOS>", *sorted(words)]
     return [*files, _text(asknav / "train_vocab.txt", vocabulary), _regions(folder)]
 
@@ -223,7 +297,8 @@ def _vnla_fields(task: Task, place: Place, teacher: VnlaTeacher) -> dict[str, ob
     return {
         "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), 200)[0]] for g in task.goal_nodes],
         "start_region_name": _region_name(room[rooms[task.start.node]].kind),
-        "end_region_name": _region_name(room[rooms[task.goal_nodes[0]]].kind), "object_name": task.goal.object_class,
+        "end_region_name": _region_name(room[rooms[task.goal_nodes[0]]].kind),
+        "object_name": task.goal.object_class,
     }
 
 

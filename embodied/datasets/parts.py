@@ -53,8 +53,7 @@ def _vln(world: World, routes: Sequence[Route], part: str, n: int) -> list[Task]
     """Held-out wordings serve the seen splits: every other path validation, the rest test."""
     paths = {p: k for k, p in enumerate(dict.fromkeys(r.path for r in routes))}
     mine = [
-        r for r in routes
-        if r.split in WORDING_OF[part] and (part == "main" or paths[r.path] % 2 == (part == "test"))
+        r for r in routes if r.split in WORDING_OF[part] and (part == "main" or paths[r.path] % 2 == (part == "test"))
     ]
     return [vln_task(world.house.name, r) for r in mine[:n]]
 

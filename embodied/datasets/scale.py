@@ -37,8 +37,10 @@ class Scale:
 
 def _seen_and_unseen(train: int, val_seen: int, val_unseen: int, test_seen: int, test_unseen: int) -> tuple[Split, ...]:
     return (
-        Split("train", "train", train), Split("val_seen", "train", val_seen, "val"),
-        Split("val_unseen", "val", val_unseen), Split("test_seen", "train", test_seen, "test"),
+        Split("train", "train", train),
+        Split("val_seen", "train", val_seen, "val"),
+        Split("val_unseen", "val", val_unseen),
+        Split("test_seen", "train", test_seen, "test"),
         Split("test_unseen", "test", test_unseen),
     )
 
@@ -46,7 +48,8 @@ def _seen_and_unseen(train: int, val_seen: int, val_unseen: int, test_seen: int,
 def _hari(sizes: tuple[int, int, int, tuple[int, int, int], tuple[int, int, int]]) -> tuple[Split, ...]:
     pretrain, pretrain_val, train, val, test = sizes
     splits = [
-        Split("pretrain", "train", pretrain, "pretrain"), Split("pretrain_val", "train", pretrain_val, "pretrain_val"),
+        Split("pretrain", "train", pretrain, "pretrain"),
+        Split("pretrain_val", "train", pretrain_val, "pretrain_val"),
         Split("train", "train", train, groups=("extra",)),
     ]
     for when, (start, other, env) in (("val", val), ("test", test)):
@@ -73,13 +76,18 @@ were published later hold 14,039 and 1,021). Room-to-Room has no seen test split
 of its seen validation split."""
 
 PAPER: Mapping[str, tuple[Mapping[str, int], tuple[Split, ...]]] = {
-    "hanna": TABLE_4_2, "hari": TABLE_E_1, "vln": ROOM_TO_ROOM,
-    "vnla": TABLE_4_2, "find": TABLE_4_2,
+    "hanna": TABLE_4_2,
+    "hari": TABLE_E_1,
+    "vln": ROOM_TO_ROOM,
+    "vnla": TABLE_4_2,
+    "find": TABLE_4_2,
 }
 """VNLA's own sizes are not printed in the dissertation; it gets HANNA's."""
 
 
-def _small(kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int) -> tuple[Mapping[str, int], tuple[Split, ...]]:
+def _small(
+    kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int
+) -> tuple[Mapping[str, int], tuple[Split, ...]]:
     train, extra, val, test = houses
     if kind == "hari":
         third = max(1, judged // 3)

@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 ANNA_SPLIT = {
-    "train": "train_seen", "val_seen": "train_unseen", "test_seen": "train_unseen", "val_unseen": "val",
+    "train": "train_seen",
+    "val_seen": "train_unseen",
+    "test_seen": "train_unseen",
+    "val_unseen": "val",
     "test_unseen": "test",
 }
 """Whose wordings are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
@@ -115,8 +118,10 @@ class Dataset:
         try:
             return list(load_lines(home / file, kind))
         except FileNotFoundError:
-            raise DatasetError(f"{home} has lost its {file}; delete {home} and run the command that built "
-                               f"{self.folder} once more, it builds that house again") from None
+            raise DatasetError(
+                f"{home} has lost its {file}; delete {home} and run the command that built "
+                f"{self.folder} once more, it builds that house again"
+            ) from None
 
     def tasks(self, split: str) -> tuple[Task, ...]:
         """All tasks of a split, house by house.
@@ -124,9 +129,7 @@ class Dataset:
         Raises:
           DatasetError: an unknown split.
         """
-        tasks = [
-            t for name in self.names(split) for t in self._lines(name, f"tasks_{split}.jsonl", Task)
-        ]
+        tasks = [t for name in self.names(split) for t in self._lines(name, f"tasks_{split}.jsonl", Task)]
         if self.kind == "vnla" and split != "train":
             limits = self._vnla_limits()
             tasks = [self._with_limit(t, limits) for t in tasks]
@@ -142,7 +145,10 @@ class Dataset:
         """
         places = worlds or self.places(split)
         return environment_maker(
-            self.kind, places, wording=ANNA_SPLIT.get(split, ""), language=language,
+            self.kind,
+            places,
+            wording=ANNA_SPLIT.get(split, ""),
+            language=language,
             routes={name: self.routes(name) for name in places} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
         )
@@ -185,6 +191,8 @@ def _config(folder: Path) -> DatasetConfig:
         raise DatasetError(f"{folder} holds no data set; build one with `embodied dataset hanna --out {folder}`")
     body = json.loads(path.read_text())
     if body.get("version") != VERSION:
-        raise DatasetError(f"{folder} was built by version {body.get('version')!r} of the format, this is {VERSION}; build it again")
+        raise DatasetError(
+            f"{folder} was built by version {body.get('version')!r} of the format, this is {VERSION}; build it again"
+        )
     fields = body["config"]
     return DatasetConfig(**{**fields, "area": tuple(fields["area"])})

@@ -115,10 +115,21 @@ class HelpEnv:
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
             cost += self._cost_of_limit()
-        self._steps.append(Step(
-            situation.pose, mode, instruction, targets, subtask.id if subtask else "none", before.can_ask,
-            situation.candidate_nodes, action, reply, self.pose, cost,
-        ))
+        self._steps.append(
+            Step(
+                situation.pose,
+                mode,
+                instruction,
+                targets,
+                subtask.id if subtask else "none",
+                before.can_ask,
+                situation.candidate_nodes,
+                action,
+                reply,
+                self.pose,
+                cost,
+            )
+        )
         return self._look() if self.ended is None else None
 
     @property
@@ -143,7 +154,9 @@ class HelpEnv:
 
     def _replied(self, reply: Reply) -> None:
         """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
-        raise TypeError(f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, or override _replied")
+        raise TypeError(
+            f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, or override _replied"
+        )
 
     def _stopped(self) -> None:
         """The agent says it is done."""
@@ -192,15 +205,35 @@ class HelpEnv:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
         self.situation = Situation(
-            self.world, self.task, self.pose, self.mode, self.targets, self.subtask,
-            tuple(p.node for p in poses), candidates, self.time, self.requests, left,
-            tuple(self._trail), self._stack(),
+            self.world,
+            self.task,
+            self.pose,
+            self.mode,
+            self.targets,
+            self.subtask,
+            tuple(p.node for p in poses),
+            candidates,
+            self.time,
+            self.requests,
+            left,
+            tuple(self._trail),
+            self._stack(),
         )
         state, goals = self._descriptions()
         self.observation = Observation(
-            Sight(self.task.world, self.pose.node), self.pose.turn, self.pose.tilt, candidates, self.instruction,
-            self.target, self.mode, self._askable(self.situation),
-            left, self.time, self.time_on_task, state, goals,
+            Sight(self.task.world, self.pose.node),
+            self.pose.turn,
+            self.pose.tilt,
+            candidates,
+            self.instruction,
+            self.target,
+            self.mode,
+            self._askable(self.situation),
+            left,
+            self.time,
+            self.time_on_task,
+            state,
+            goals,
         )
         return self.observation
 
@@ -235,12 +268,12 @@ def check_task(task: Task, worlds: Mapping[str, World]) -> None:
     n = len(world.graph.positions)
     nodes = (task.start.node, *task.goal_nodes)
     if not task.goal_nodes or not all(0 <= v < n for v in nodes):
-        raise TaskError(f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again")
+        raise TaskError(
+            f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again"
+        )
     if isinstance(task.goal, FindObject):
         gone = [p for p in task.goal.placements if p not in world.house.placement_by_id]
         if gone:
             raise TaskError(f"task {task.id!r} looks for {gone}, not in the house {task.world!r}; sample it again")
     if task.horizon < 1 or (task.budget is not None and task.budget < 0):
-        raise TaskError(
-            f"task {task.id!r} needs horizon >= 1 and budget >= 0, got {task.horizon} and {task.budget}"
-        )
+        raise TaskError(f"task {task.id!r} needs horizon >= 1 and budget >= 0, got {task.horizon} and {task.budget}")

@@ -57,16 +57,35 @@ class RollingBody(composer.Entity):
         body = root.worldbody.add("body", name="chassis", pos=[0, 0, WHEEL])
         body.add("geom", name="base", type="cylinder", size=[RADIUS, 0.04], pos=[0, 0, 0.04], mass=18, **SLIPPERY)
         half = (HEIGHT - 0.3) / 2
-        body.add("geom", name="mast", type="cylinder", size=[RADIUS * 0.8, half], pos=[0, 0, 0.2 + half], mass=2, **SLIPPERY)
+        body.add(
+            "geom", name="mast", type="cylinder", size=[RADIUS * 0.8, half], pos=[0, 0, 0.2 + half], mass=2, **SLIPPERY
+        )
         body.add("camera", name="eye", pos=[0, 0, 1.5 - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
         for side, y in (("left", TRACK / 2), ("right", -TRACK / 2)):
             wheel = body.add("body", name=f"{side}_wheel", pos=[0, y, 0])
             wheel.add("joint", name=f"{side}_axle", type="hinge", axis=[0, 1, 0], damping=0.02)
-            wheel.add("geom", name=f"{side}_tyre", type="cylinder", size=[WHEEL, 0.02], euler=[math.pi / 2, 0, 0], mass=0.8,
-                      friction=[1.4, 0.01, 0.0005])
-            root.actuator.add("velocity", name=side, joint=f"{side}_axle", kv=6.0, ctrlrange=[-40, 40], forcerange=[-12, 12])
+            wheel.add(
+                "geom",
+                name=f"{side}_tyre",
+                type="cylinder",
+                size=[WHEEL, 0.02],
+                euler=[math.pi / 2, 0, 0],
+                mass=0.8,
+                friction=[1.4, 0.01, 0.0005],
+            )
+            root.actuator.add(
+                "velocity", name=side, joint=f"{side}_axle", kv=6.0, ctrlrange=[-40, 40], forcerange=[-12, 12]
+            )
         for where, x in (("front", RADIUS * 0.8), ("back", -RADIUS * 0.8)):
-            body.add("geom", name=f"{where}_caster", type="sphere", size=[0.03], pos=[x, 0, 0.032 - WHEEL], mass=0.3, **SLIPPERY)
+            body.add(
+                "geom",
+                name=f"{where}_caster",
+                type="sphere",
+                size=[0.03],
+                pos=[x, 0, 0.032 - WHEEL],
+                mass=0.3,
+                **SLIPPERY,
+            )
         root.compiler.angle = "radian"
         self._root = root
 
@@ -185,7 +204,9 @@ def house_arena(house: House, catalogue: object) -> tuple[composer.Arena, dict[s
             continue
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[g])
-        root.worldbody.add("geom", name=f"box{g}", type="box", size=model.geom_size[g], pos=data.geom_xpos[g], quat=quat)
+        root.worldbody.add(
+            "geom", name=f"box{g}", type="box", size=model.geom_size[g], pos=data.geom_xpos[g], quat=quat
+        )
         owners[f"box{g}"] = owner_of_name(model.geom(g).name)
     return arena, owners
 
@@ -250,4 +271,3 @@ def driven(kind: type[_Driven], catalogue: object, *arguments: object, **options
 def total_bumps(env: _Driven) -> int:
     """Collisions of the current episode."""
     return sum(len(d.bumps) for d in env.drives)
-

@@ -13,18 +13,7 @@ from typing import TYPE_CHECKING
 from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
 from embodied.envs.base import HelpEnv
-from embodied.interface import (
-    Action,
-    Ask,
-    Assistant,
-    Description,
-    Episode,
-    Intention,
-    Mode,
-    Move,
-    Reply,
-    Stop,
-)
+from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Reply, Stop
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:
@@ -66,8 +55,13 @@ class HariEnv(HelpEnv):
     """
 
     def __init__(
-        self, worlds: Mapping[str, World], assistant: Assistant, describer: Describer,
-        *, costs: Costs = Costs(), moves: Moves | None = None,
+        self,
+        worlds: Mapping[str, World],
+        assistant: Assistant,
+        describer: Describer,
+        *,
+        costs: Costs = Costs(),
+        moves: Moves | None = None,
     ) -> None:
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs

@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 
 
 def environment_maker(
-    kind: str, worlds: Mapping[str, World], *, routes: Mapping[str, Sequence[Route]] | None = None,
-    wording: str = "test", describer: Describer | None = None, language: Language | None = None,
+    kind: str,
+    worlds: Mapping[str, World],
+    *,
+    routes: Mapping[str, Sequence[Route]] | None = None,
+    wording: str = "test",
+    describer: Describer | None = None,
+    language: Language | None = None,
 ) -> Callable[[], HelpEnv]:
     """A maker of environments for a kind of task; all it makes share assistant and caches.
 

@@ -45,7 +45,10 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Policy]]] = {
     "vnla": {
         "random walk": RandomWalk,
         "shortest": lambda: Shortest(VnlaTeacher()),
-        **{f"listener, {ask}": lambda ask=ask: VnlaAsking(SubgoalListener(), ask) for ask in ("none", "first", "random", "teacher")},
+        **{
+            f"listener, {ask}": lambda ask=ask: VnlaAsking(SubgoalListener(), ask)
+            for ask in ("none", "first", "random", "teacher")
+        },
     },
     "hari": {"random walk": RandomWalk, "shortest": Shortest, "half-way sub-goals": HalfwaySkyline},
 }
@@ -76,9 +79,16 @@ def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
 
 
 def evaluate(
-    data: Dataset, split: str, agents: Mapping[str, Policy], *,
-    seed: int = 0, limit: int | None = None, batch: int = 1, keep: Callable[[str, Sequence[Episode]], None] | None = None,
-    watch: Callable[[Iterable[str]], Iterable[str]] = iter, worlds: Mapping[str, World] | None = None,
+    data: Dataset,
+    split: str,
+    agents: Mapping[str, Policy],
+    *,
+    seed: int = 0,
+    limit: int | None = None,
+    batch: int = 1,
+    keep: Callable[[str, Sequence[Episode]], None] | None = None,
+    watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    worlds: Mapping[str, World] | None = None,
 ) -> list[Row]:
     """One row per agent, over the same tasks.
 

@@ -159,8 +159,13 @@ def route_sdtw(episode: Episode, graph: NavGraph) -> float:
 
 
 PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
-    "success": success, "spl": spl, "navigation error": navigation_error, "requests": requests,
-    "oracle success": oracle_success, "path length": path_length, "steps": steps,
+    "success": success,
+    "spl": spl,
+    "navigation error": navigation_error,
+    "requests": requests,
+    "oracle success": oracle_success,
+    "path length": path_length,
+    "steps": steps,
 }
 """The numbers every task reports, by name, in the order of their columns."""
 PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {

@@ -27,8 +27,13 @@ class Frame:
 
 
 def rollout(
-    make_env: Callable[[], HelpEnv], policy: Policy, tasks: Iterable[Task], *,
-    seed: int, batch: int = 1, agent: str = "",
+    make_env: Callable[[], HelpEnv],
+    policy: Policy,
+    tasks: Iterable[Task],
+    *,
+    seed: int,
+    batch: int = 1,
+    agent: str = "",
 ) -> Iterator[Frame]:
     """Play `tasks`, `batch` at a time; frames of one episode come in order.
 
@@ -50,8 +55,13 @@ def rollout(
 
 
 def play(
-    make_env: Callable[[], HelpEnv], policy: Policy, tasks: Iterable[Task], *,
-    seed: int, batch: int = 1, agent: str = "",
+    make_env: Callable[[], HelpEnv],
+    policy: Policy,
+    tasks: Iterable[Task],
+    *,
+    seed: int,
+    batch: int = 1,
+    agent: str = "",
 ) -> list[Episode]:
     """The finished episodes of `rollout`, in the order of the tasks."""
     done = {f.index: f.episode for f in rollout(make_env, policy, tasks, seed=seed, batch=batch, agent=agent)}
@@ -59,14 +69,16 @@ def play(
 
 
 def _play(
-    make_env: Callable[[], HelpEnv], envs: list[HelpEnv], policy: Policy,
-    group: Sequence[tuple[int, Task]], seed: int, agent: str,
+    make_env: Callable[[], HelpEnv],
+    envs: list[HelpEnv],
+    policy: Policy,
+    group: Sequence[tuple[int, Task]],
+    seed: int,
+    agent: str,
 ) -> Iterator[Frame]:
     while len(envs) < len(group):
         envs.append(make_env())
-    observations: list[Observation | None] = [
-        env.reset(task, seed=seed) for env, (_, task) in zip(envs, group)
-    ]
+    observations: list[Observation | None] = [env.reset(task, seed=seed) for env, (_, task) in zip(envs, group)]
     rngs = [stream(seed, "policy", task.id) for _, task in group]
     memory = None
     while any(o is not None for o in observations):

@@ -128,15 +128,23 @@ def as_csv(rows: Sequence[Row]) -> str:
     writer.writerow(["agent", "split", "seed", "episodes", "houses", "metric", "mean", "half_width_95", "n"])
     for r in rows:
         for name, v in r.values.items():
-            writer.writerow([r.agent, r.split, r.seed, r.episodes, r.houses, name, _number(v.mean), _number(v.half), v.n])
+            writer.writerow(
+                [r.agent, r.split, r.seed, r.episodes, r.houses, name, _number(v.mean), _number(v.half), v.n]
+            )
     return out.getvalue()
 
 
 def as_json(rows: Sequence[Row]) -> str:
     body = [
         {
-            "agent": r.agent, "split": r.split, "seed": r.seed, "episodes": r.episodes, "houses": r.houses,
-            "values": {k: {"mean": _number(v.mean), "half_width_95": _number(v.half), "n": v.n} for k, v in r.values.items()},
+            "agent": r.agent,
+            "split": r.split,
+            "seed": r.seed,
+            "episodes": r.episodes,
+            "houses": r.houses,
+            "values": {
+                k: {"mean": _number(v.mean), "half_width_95": _number(v.half), "n": v.n} for k, v in r.values.items()
+            },
         }
         for r in rows
     ]

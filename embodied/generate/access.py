@@ -28,16 +28,40 @@ ENTERED_FROM: dict[str, dict[str, float]] = {
     "pantry": {"kitchen": 0.0, "corridor": 1.0, "hall": 1.5, "dining_room": 2.5},
     "closet": {"hall": 0.0, "corridor": 0.0, "living_room": 3.0, "study": 2.0, "family_room": 3.0},
     "garage": {"laundry_room": 0.1, "hall": 0.2, "corridor": 0.2, "kitchen": 0.8, "workshop": 0.5},
-    "sun_room": {"living_room": 0.0, "dining_room": 0.2, "family_room": 0.2, "kitchen": 0.8, "corridor": 0.8,
-                 "hall": 1.0, "library": 1.0},
-    "corridor": {"hall": 0.0, "corridor": 0.0, "living_room": 1.5, "family_room": 2.0, "dining_room": 2.5, "kitchen": 5.0},
+    "sun_room": {
+        "living_room": 0.0,
+        "dining_room": 0.2,
+        "family_room": 0.2,
+        "kitchen": 0.8,
+        "corridor": 0.8,
+        "hall": 1.0,
+        "library": 1.0,
+    },
+    "corridor": {
+        "hall": 0.0,
+        "corridor": 0.0,
+        "living_room": 1.5,
+        "family_room": 2.0,
+        "dining_room": 2.5,
+        "kitchen": 5.0,
+    },
     "hall": {"corridor": 0.0, "living_room": 1.0},
 }
 """Room kind to the kinds it may be entered from, with a cost; an owned room is entered from its owner."""
-JOINS = {("kitchen", "dining_room"): 16, ("dining_room", "living_room"): 16, ("kitchen", "living_room"): 16,
-         ("family_room", "kitchen"): 16, ("family_room", "dining_room"): 16, ("hall", "living_room"): 12,
-         ("living_room", "sun_room"): 14, ("dining_room", "sun_room"): 14, ("hall", "corridor"): 9,
-         ("corridor", "corridor"): 9, ("family_room", "sun_room"): 14, ("library", "living_room"): 18}
+JOINS = {
+    ("kitchen", "dining_room"): 16,
+    ("dining_room", "living_room"): 16,
+    ("kitchen", "living_room"): 16,
+    ("family_room", "kitchen"): 16,
+    ("family_room", "dining_room"): 16,
+    ("hall", "living_room"): 12,
+    ("living_room", "sun_room"): 14,
+    ("dining_room", "sun_room"): 14,
+    ("hall", "corridor"): 9,
+    ("corridor", "corridor"): 9,
+    ("family_room", "sun_room"): 14,
+    ("library", "living_room"): 18,
+}
 """Kinds joined wherever their shared wall is at least so long, decimetres."""
 NEEDED = {"toilet": 11, "closet": 11, "pantry": 11}
 """Shortest shared wall, decimetres, that holds the kind's door; 12 for the others."""
@@ -82,8 +106,12 @@ def outer_stretches(cells: list[Cell], walls: dict[tuple[int, int], Wall], i: in
     x0, y0, x1, y1 = cells[i].rect
     taken = [w for pair, w in walls.items() if i in pair]
     found = []
-    for axis, across, low, high, side in (("x", y0, x0, x1, -1), ("y", x1, y0, y1, 1), ("x", y1, x0, x1, 1),
-                                          ("y", x0, y0, y1, -1)):
+    for axis, across, low, high, side in (
+        ("x", y0, x0, x1, -1),
+        ("y", x1, y0, y1, 1),
+        ("x", y1, x0, x1, 1),
+        ("y", x0, y0, y1, -1),
+    ):
         at = low
         for _, _, p, q in sorted(w for w in taken if w[0] == axis and w[1] == across):
             if p > at:
@@ -156,8 +184,11 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall], links: 
         ways = [k.parent if k.child == i else k.child for k in links if i in (k.child, k.parent)]
         if any(cells[k].kind in ("hall", "corridor") for k in ways):
             continue
-        beside = [(cells[j + k - i].kind != "hall", -(w[3] - w[2]), j + k - i, w) for (j, k), w in walls.items()
-                  if i in (j, k) and cells[j + k - i].kind in ("hall", "corridor") and w[3] - w[2] >= 12]
+        beside = [
+            (cells[j + k - i].kind != "hall", -(w[3] - w[2]), j + k - i, w)
+            for (j, k), w in walls.items()
+            if i in (j, k) and cells[j + k - i].kind in ("hall", "corridor") and w[3] - w[2] >= 12
+        ]
         if beside:
             _, _, other, wall = min(beside)
             found.append(Link(i, other, wall, False))
@@ -175,7 +206,11 @@ def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
     if c.owner is not None:
         return 0.0 if c.owner == parent else None
     if p.kind not in THROUGH and (p.kind, c.kind) not in (
-            ("laundry_room", "garage"), ("garage", "workshop"), ("workshop", "garage"), ("laundry_room", "workshop"),
-            ("library", "sun_room")):
+        ("laundry_room", "garage"),
+        ("garage", "workshop"),
+        ("workshop", "garage"),
+        ("laundry_room", "workshop"),
+        ("library", "sun_room"),
+    ):
         return None
     return ENTERED_FROM[c.kind].get(p.kind)

@@ -33,8 +33,10 @@ def cleared(house: House) -> House:
                 break
             blocking = _blocking(house, storey, closed, grid.xy[reach])
             if not blocking:
-                raise HouseError(f"room {rooms[closed[0]].id!r} cannot be entered on foot although no object is in the "
-                                 "way; its door or corridor is too narrow")
+                raise HouseError(
+                    f"room {rooms[closed[0]].id!r} cannot be entered on foot although no object is in the "
+                    "way; its door or corridor is too narrow"
+                )
             house = without(house, blocking)
         else:
             raise HouseError(f"rooms {[rooms[k].id for k in closed]} stay closed after {ROUNDS} rounds of clearing")
@@ -47,8 +49,10 @@ def without(house: House, names: tuple[str, ...]) -> House:
     for _ in range(8):
         gone |= {p.id for p in house.placements if p.parent in gone}
     return dataclasses.replace(
-        house, placements=tuple(p for p in house.placements if p.id not in gone),
-        lights=tuple(x for x in house.lights if x.placement not in gone))
+        house,
+        placements=tuple(p for p in house.placements if p.id not in gone),
+        lights=tuple(x for x in house.lights if x.placement not in gone),
+    )
 
 
 def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarray) -> tuple[str, ...]:
@@ -61,8 +65,11 @@ def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarr
     grid, room_of_cell, _ = reachable(dataclasses.replace(house, placements=()), storey)
     floor = house.storeys[storey].elevation
     ids = {r.id for r in house.rooms if r.storey == storey}
-    things = [p for p in house.placements if p.room in ids and p.position[2] - floor < HEAD
-              and p.position[2] + p.size[2] - floor > STEP]
+    things = [
+        p
+        for p in house.placements
+        if p.room in ids and p.position[2] - floor < HEAD and p.position[2] + p.size[2] - floor > STEP
+    ]
     toll = np.zeros(len(grid.xy))
     covered = []
     for p in things:

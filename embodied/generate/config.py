@@ -61,21 +61,30 @@ class HouseConfig:
         if self.shape not in (None, *SHAPES):
             raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
         if self.storeys != 1:
-            raise HouseError(f"storeys={self.storeys} cannot be built yet: the generator draws single-storey houses; "
-                             "use storeys=1")
+            raise HouseError(
+                f"storeys={self.storeys} cannot be built yet: the generator draws single-storey houses; use storeys=1"
+            )
         if self.rooms is not None and self.bedrooms is not None and self.bedrooms > self.rooms - 1:
-            raise HouseError(f"{self.bedrooms} bedrooms do not fit in {self.rooms} main rooms, one of which is "
-                             "the living room; raise rooms or lower bedrooms")
+            raise HouseError(
+                f"{self.bedrooms} bedrooms do not fit in {self.rooms} main rooms, one of which is "
+                "the living room; raise rooms or lower bedrooms"
+            )
         if self.rooms is not None and self.bedrooms is not None and self.rooms - self.bedrooms > OTHERS:
-            raise HouseError(f"{self.rooms} main rooms with only {self.bedrooms} bedrooms leave more than {OTHERS} other "
-                             "rooms to invent; lower rooms or raise bedrooms")
+            raise HouseError(
+                f"{self.rooms} main rooms with only {self.bedrooms} bedrooms leave more than {OTHERS} other "
+                "rooms to invent; lower rooms or raise bedrooms"
+            )
         needed = self.least_area()
         if self.area is not None and self.area[1] < needed:
-            raise HouseError(f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r} need at least "
-                             f"{needed:.0f} m2, area allows {self.area[1]:.0f}; raise area or ask for fewer rooms")
+            raise HouseError(
+                f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r} need at least "
+                f"{needed:.0f} m2, area allows {self.area[1]:.0f}; raise area or ask for fewer rooms"
+            )
         if self.area is not None and self.rooms is not None and self.area[0] > self.most_area():
-            raise HouseError(f"rooms={self.rooms} fill at most {self.most_area():.0f} m2, area asks for "
-                             f"{self.area[0]:.0f}; lower area or ask for more rooms")
+            raise HouseError(
+                f"rooms={self.rooms} fill at most {self.most_area():.0f} m2, area asks for "
+                f"{self.area[0]:.0f}; lower area or ask for more rooms"
+            )
 
     def least_area(self) -> float:
         """The smallest total area, square metres, that holds what is asked for."""

@@ -46,76 +46,174 @@ def _all(stem: str, count: int) -> tuple[str, ...]:
 
 STYLES: Mapping[str, Taste] = {
     "light": Taste(
-        ("light_oak_planks/0", "ash_planks/0", "light_oak_herringbone/0", "maple_planks/0", "ash_chevron/0",
-         "beech_strips/0", "light_oak_laminate/0"),
+        (
+            "light_oak_planks/0",
+            "ash_planks/0",
+            "light_oak_herringbone/0",
+            "maple_planks/0",
+            "ash_chevron/0",
+            "beech_strips/0",
+            "light_oak_laminate/0",
+        ),
         ("stoneware_tiles/3", "stoneware_tiles/0", "terrazzo/0", "long_stoneware_tiles/3"),
         ("carpet/0", "carpet/2", "sisal/0"),
-        ("paint_white/0", "paint_warm_white/0", "paint_pale_grey/0", "paint_ivory/0", "paint_pale_blue/0", "paint_mint/0"),
+        (
+            "paint_white/0",
+            "paint_warm_white/0",
+            "paint_pale_grey/0",
+            "paint_ivory/0",
+            "paint_pale_blue/0",
+            "paint_mint/0",
+        ),
         ("paint_dusty_blue/0", "paint_sage_green/0", "paint_blush_pink/0", "paint_taupe/0", "brick_white/0"),
         ("grasscloth/1", "wallpaper_leaves/0", "wallpaper_scallops/2", "wallpaper_stripes/2"),
         ("stoneware_tiles/3", "hex_tiles/1", "hex_tiles/0", "terrazzo/0", "marble_tiles/0"),
         ("metro_tiles/0", "square_tiles/0", "mosaic_tiles/1", "long_stoneware_tiles/3", "square_tiles/2"),
         ("paint_white/0", "paint_white/0", "ash/0", "light_oak/0", "beech/0"),
-        ("paint_dusty_blue/0", "paint_sage_green/0", "light_oak/0", "paint_charcoal/0")),
+        ("paint_dusty_blue/0", "paint_sage_green/0", "light_oak/0", "paint_charcoal/0"),
+    ),
     "warm": Taste(
-        ("oak_planks/0", "oak_planks/1", "oak_herringbone/0", "pine_planks/0", "cherry_planks/0", "oak_strips/0",
-         "oak_mosaic_parquet/0"),
+        (
+            "oak_planks/0",
+            "oak_planks/1",
+            "oak_herringbone/0",
+            "pine_planks/0",
+            "cherry_planks/0",
+            "oak_strips/0",
+            "oak_mosaic_parquet/0",
+        ),
         ("terracotta_tiles/0", "terracotta_tiles/1", "travertine_tiles/0", "stoneware_tiles/1", "slate_tiles/0"),
         ("carpet/0", "carpet/7", "sisal/0"),
-        ("paint_warm_white/0", "paint_ivory/0", "paint_sand/0", "paint_beige/0", "paint_peach/0", "plaster_white/0",
-         "paint_butter_yellow/0"),
+        (
+            "paint_warm_white/0",
+            "paint_ivory/0",
+            "paint_sand/0",
+            "paint_beige/0",
+            "paint_peach/0",
+            "plaster_white/0",
+            "paint_butter_yellow/0",
+        ),
         ("paint_terracotta/0", "paint_olive/0", "plaster_ochre/0", "brick_red/0", "paint_ochre/0", "plaster_rose/0"),
         ("wallpaper_leaves/2", "grasscloth/0", "wallpaper_trellis/2", "wallpaper_floral/0"),
         ("travertine_tiles/0", "stoneware_tiles/1", "hex_tiles/2", "terracotta_tiles/0"),
         ("square_tiles/1", "travertine_tiles/0", "metro_tiles/0", "long_stoneware_tiles/1", "metro_tiles/1"),
         ("oak/0", "pine/0", "paint_ivory/0", "paint_warm_white/0", "beech/0"),
         ("oak/0", "paint_sage_green/0", "mahogany/0", "cherry/0"),
-        ("paint_white/0", "oak/0", "paint_ivory/0")),
+        ("paint_white/0", "oak/0", "paint_ivory/0"),
+    ),
     "dark": Taste(
-        ("walnut_planks/0", "smoked_oak_planks/0", "walnut_chevron/0", "smoked_oak_herringbone/0", "grey_oak_planks/0",
-         "wenge_planks/0", "grey_oak_chevron/0"),
+        (
+            "walnut_planks/0",
+            "smoked_oak_planks/0",
+            "walnut_chevron/0",
+            "smoked_oak_herringbone/0",
+            "grey_oak_planks/0",
+            "wenge_planks/0",
+            "grey_oak_chevron/0",
+        ),
         ("concrete/1", "stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "long_stoneware_tiles/2"),
         ("carpet/1", "carpet/3", "sisal/1"),
         ("paint_white/0", "paint_pale_grey/0", "paint_greige/0", "plaster_white/0", "paint_warm_white/0"),
-        ("paint_charcoal/0", "paint_navy_blue/0", "paint_forest_green/0", "plaster_grey/0", "paint_aubergine/0",
-         "brick_brown/0"),
+        (
+            "paint_charcoal/0",
+            "paint_navy_blue/0",
+            "paint_forest_green/0",
+            "plaster_grey/0",
+            "paint_aubergine/0",
+            "brick_brown/0",
+        ),
         ("grasscloth/2", "wallpaper_damask/3", "wallpaper_trellis/0", "wallpaper_scallops/0"),
         ("stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "concrete/1", "hex_tiles/0"),
         ("marble_tiles/2", "long_stoneware_tiles/0", "metro_tiles/4", "metro_tiles/0", "mosaic_tiles/2"),
         ("paint_white/0", "walnut/0", "smoked_oak/0", "paint_charcoal/0", "grey_oak/0"),
         ("paint_charcoal/0", "walnut/0", "lacquer_black/0"),
-        ("paint_white/0", "lacquer_anthracite/0")),
+        ("paint_white/0", "lacquer_anthracite/0"),
+    ),
     "classic": Taste(
-        ("oak_herringbone/0", "oak_basket/0", "walnut_herringbone/0", "mahogany_basket/0", "oak_chevron/0",
-         "cherry_planks/0"),
+        (
+            "oak_herringbone/0",
+            "oak_basket/0",
+            "walnut_herringbone/0",
+            "mahogany_basket/0",
+            "oak_chevron/0",
+            "cherry_planks/0",
+        ),
         ("marble_tiles/1", "checker_tiles/0", "marble_tiles/0", "travertine_tiles/0"),
         ("carpet/2", "carpet/5", "carpet/6", "carpet/4"),
         ("paint_ivory/0", "paint_warm_white/0", "paint_beige/0", "paint_greige/0", "paint_sand/0"),
-        ("wallpaper_damask/0", "wallpaper_damask/1", "wallpaper_stripes/3", "paint_forest_green/0", "paint_navy_blue/0"),
-        ("wallpaper_damask/1", "wallpaper_stripes/0", "wallpaper_stripes/3", "wallpaper_floral/1", "wallpaper_trellis/1",
-         "wallpaper_damask/2"),
+        (
+            "wallpaper_damask/0",
+            "wallpaper_damask/1",
+            "wallpaper_stripes/3",
+            "paint_forest_green/0",
+            "paint_navy_blue/0",
+        ),
+        (
+            "wallpaper_damask/1",
+            "wallpaper_stripes/0",
+            "wallpaper_stripes/3",
+            "wallpaper_floral/1",
+            "wallpaper_trellis/1",
+            "wallpaper_damask/2",
+        ),
         ("marble_tiles/0", "marble_tiles/1", "checker_tiles/0", "hex_tiles/1"),
         ("marble_tiles/0", "square_tiles/0", "metro_tiles/0", "square_tiles/1", "marble_tiles/1"),
         ("paint_white/0", "paint_ivory/0", "mahogany/0", "oak/0"),
-        ("mahogany/0", "lacquer_black/0", "paint_dusty_blue/0", "oak/0")),
+        ("mahogany/0", "lacquer_black/0", "paint_dusty_blue/0", "oak/0"),
+    ),
     "colourful": Taste(
-        ("oak_planks/2", "maple_strips/0", "teak_narrow_planks/0", "beech_narrow_planks/0", "teak_mosaic_parquet/0",
-         "pine_narrow_planks/0", "oak_small_herringbone/0"),
+        (
+            "oak_planks/2",
+            "maple_strips/0",
+            "teak_narrow_planks/0",
+            "beech_narrow_planks/0",
+            "teak_mosaic_parquet/0",
+            "pine_narrow_planks/0",
+            "oak_small_herringbone/0",
+        ),
         ("terrazzo/2", "hex_tiles/3", "terrazzo/1", "checker_tiles/0", "stoneware_tiles/3"),
         ("carpet/4", "carpet/6", "carpet/1"),
-        ("paint_white/0", "paint_warm_white/0", "paint_mint/0", "paint_blush_pink/0", "paint_pale_blue/0",
-         "paint_butter_yellow/0", "paint_lavender/0", "paint_peach/0"),
-        ("paint_teal/0", "paint_ochre/0", "paint_terracotta/0", "paint_dusty_blue/0", "paint_aubergine/0", "paint_olive/0"),
-        ("wallpaper_scallops/0", "wallpaper_floral/2", "wallpaper_leaves/1", "wallpaper_stripes/1", "wallpaper_scallops/1"),
+        (
+            "paint_white/0",
+            "paint_warm_white/0",
+            "paint_mint/0",
+            "paint_blush_pink/0",
+            "paint_pale_blue/0",
+            "paint_butter_yellow/0",
+            "paint_lavender/0",
+            "paint_peach/0",
+        ),
+        (
+            "paint_teal/0",
+            "paint_ochre/0",
+            "paint_terracotta/0",
+            "paint_dusty_blue/0",
+            "paint_aubergine/0",
+            "paint_olive/0",
+        ),
+        (
+            "wallpaper_scallops/0",
+            "wallpaper_floral/2",
+            "wallpaper_leaves/1",
+            "wallpaper_stripes/1",
+            "wallpaper_scallops/1",
+        ),
         ("hex_tiles/3", "terrazzo/2", "terrazzo/0", "hex_tiles/1", "stoneware_tiles/0"),
         ("metro_tiles/1", "metro_tiles/2", "metro_tiles/3", "mosaic_tiles/0", "square_tiles/3", "mosaic_tiles/3"),
         ("paint_white/0", "maple/0", "paint_sage_green/0", "paint_dusty_blue/0"),
-        ("lacquer_red/0", "lacquer_navy_blue/0", "paint_sage_green/0", "teak/0")),
+        ("lacquer_red/0", "lacquer_navy_blue/0", "paint_sage_green/0", "teak/0"),
+    ),
 }
 """Style name to taste; the names are those of embodied.generate.furnish.style."""
 ROUGH = ("concrete/0", "concrete/1", "concrete/3")
-KIDS = ("paint_mint/0", "paint_pale_blue/0", "paint_butter_yellow/0", "paint_blush_pink/0", "paint_lavender/0",
-        "paint_peach/0")
+KIDS = (
+    "paint_mint/0",
+    "paint_pale_blue/0",
+    "paint_butter_yellow/0",
+    "paint_blush_pink/0",
+    "paint_lavender/0",
+    "paint_peach/0",
+)
 KIDS_PAPERS = (*_all("wallpaper_scallops", 3), "wallpaper_stripes/1", "wallpaper_stripes/2", "wallpaper_leaves/0")
 
 
@@ -164,10 +262,24 @@ def draw_palette(style: str | None, *, rng: np.random.Generator) -> Palette:
     door = _one(taste.doors, rng)
     frame = _one(taste.frames, rng)
     return Palette(
-        name, floor, hall, kitchen, private, _some(taste.wet_floors, 2, rng), _one(ROUGH, rng), _some(taste.walls, 3, rng),
-        _some(taste.wet_walls, 2, rng), _some(taste.accents, 2, rng), _some(taste.papers, 2, rng),
-        _one(taste.ceilings, rng), "paint_white/0" if "paint" in door or rng.random() < 0.5 else door, door,
-        _one(taste.front_doors, rng), frame, float(rng.uniform(0.1, 0.6)))
+        name,
+        floor,
+        hall,
+        kitchen,
+        private,
+        _some(taste.wet_floors, 2, rng),
+        _one(ROUGH, rng),
+        _some(taste.walls, 3, rng),
+        _some(taste.wet_walls, 2, rng),
+        _some(taste.accents, 2, rng),
+        _some(taste.papers, 2, rng),
+        _one(taste.ceilings, rng),
+        "paint_white/0" if "paint" in door or rng.random() < 0.5 else door,
+        door,
+        _one(taste.front_doors, rng),
+        frame,
+        float(rng.uniform(0.1, 0.6)),
+    )
 
 
 def dressed(house: House, palette: Palette, *, rng: np.random.Generator) -> House:
@@ -180,9 +292,17 @@ def dressed(house: House, palette: Palette, *, rng: np.random.Generator) -> Hous
         accent, accent_finish = _accent(room, house, palette, rng)
         skirting = palette.skirting if room.kind not in (*WET, "garage") else floor
         ceiling = "paint_white/0" if room.kind in (*WET, "garage") else palette.ceiling
-        rooms.append(dataclasses.replace(
-            room, floor_finish=floor, wall_finish=wall, ceiling_finish=ceiling, skirting_finish=skirting,
-            accent_wall=accent, accent_finish=accent_finish))
+        rooms.append(
+            dataclasses.replace(
+                room,
+                floor_finish=floor,
+                wall_finish=wall,
+                ceiling_finish=ceiling,
+                skirting_finish=skirting,
+                accent_wall=accent,
+                accent_finish=accent_finish,
+            )
+        )
     return dataclasses.replace(house, rooms=tuple(rooms))
 
 
@@ -207,11 +327,22 @@ def _floor(room: Room, house: House, palette: Palette) -> str:
     if kind == "sun_room":
         return palette.kitchen_floor
     if kind == "closet":
-        inside = next((o.rooms[1] if o.rooms[0] == room.id else o.rooms[0] for o in house.openings
-                       if room.id in o.rooms and o.rooms[1] is not None), None)
+        inside = next(
+            (
+                o.rooms[1] if o.rooms[0] == room.id else o.rooms[0]
+                for o in house.openings
+                if room.id in o.rooms and o.rooms[1] is not None
+            ),
+            None,
+        )
         other = house.room_by_id[inside].kind if inside else "corridor"
-        return palette.private_floor if other in BEDROOMS else palette.hall_floor if other in ("hall", "corridor") else (
-            palette.floor)
+        return (
+            palette.private_floor
+            if other in BEDROOMS
+            else palette.hall_floor
+            if other in ("hall", "corridor")
+            else (palette.floor)
+        )
     return palette.private_floor if kind in (*BEDROOMS, "playroom", "gym") else palette.floor
 
 
@@ -240,7 +371,7 @@ def _accent(room: Room, house: House, palette: Palette, rng: np.random.Generator
     openings = [shapely.LineString([o.a, o.b]) for o in house.openings if room.id in o.rooms]
     walls = []
     for k in range(len(room.polygon)):
-        edge = shapely.LineString(corners[k:k + 2]).buffer(1e-3)
+        edge = shapely.LineString(corners[k : k + 2]).buffer(1e-3)
         if not any(edge.covers(o) for o in openings) and math.dist(corners[k], corners[k + 1]) > 2.2:
             walls.append(k)
     if not walls:

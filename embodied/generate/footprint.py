@@ -209,8 +209,14 @@ def _winged(area: float, shape: str, rng: np.random.Generator) -> Footprint:
             long = wing + other + gap
             rest = max(area * 100 - long * deep, 35 * (wing + other))
         share = rng.uniform(0.4, 0.6)
-        return _u(long, top, bottom, corridor, (out, inner, round(rest * share / other)),
-                  (left, right, round(rest * (1 - share) / wing)))
+        return _u(
+            long,
+            top,
+            bottom,
+            corridor,
+            (out, inner, round(rest * share / other)),
+            (left, right, round(rest * (1 - share) / wing)),
+        )
     share = float(rng.uniform(0.6, 0.72))
     long = max(round(area * 100 * share / deep), wing + 35)
     drop = max(30, round((area * 100 - long * deep) / wing))
@@ -233,8 +239,9 @@ def _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng) ->
     a_left = Strip("x", cap, 1, xb - cap, bottom, -1, bottom, cap, 0, 0)
     b_left = Strip("y", 0, -1, drop - foot, xb, -1, left, xb + bottom, 1, bottom)
     if shape == "L":
-        b_right = Strip("y", bottom + corridor, -1, drop + bottom + corridor - foot, xb + corridor, 1, right, xb, 1,
-                        -corridor)
+        b_right = Strip(
+            "y", bottom + corridor, -1, drop + bottom + corridor - foot, xb + corridor, 1, right, xb, 1, -corridor
+        )
         strips = (a_top, a_left, b_left, b_right)
     else:
         a_right = Strip("x", xb + corridor, 1, long - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - cap)
@@ -264,7 +271,9 @@ def _u(long, top, bottom, corridor, public, private) -> Footprint:
         Strip("x", 0, 1, long, bottom + corridor, 1, top, far - xa, 1, -xa),
         Strip("x", xa + corridor, 1, xb - xa - corridor, bottom, -1, bottom, far, 1, corridor),
         Strip("y", 0, -1, fall, xb, -1, left, far + xb - xa + bottom, 2, bottom),
-        Strip("y", bottom + corridor, -1, fall + bottom + corridor, xb + corridor, 1, right, far + xb - xa, 2, -corridor),
+        Strip(
+            "y", bottom + corridor, -1, fall + bottom + corridor, xb + corridor, 1, right, far + xb - xa, 2, -corridor
+        ),
     )
     return Footprint("U", strips, (band_p, band_a, band_q), (), corridor)
 
@@ -321,7 +330,9 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     if day:
         caps.append(Cap(0, True, "y", (0, 0, day, deep), (bottom, roof)))
     if head:
-        caps.append(Cap(2, True, "x", (x_above, deep + above - head, x_above + rise, deep + above), (xc, xc + corridor)))
+        caps.append(
+            Cap(2, True, "x", (x_above, deep + above - head, x_above + rise, deep + above), (xc, xc + corridor))
+        )
     if night:
         caps.append(Cap(0, False, "y", (stop, 0, long, deep), (bottom, roof)))
     if foot:

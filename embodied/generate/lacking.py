@@ -9,7 +9,11 @@ from embodied.house.house import House
 BEDS = ("bed", "child bed", "bunk bed", "loft bed", "day bed", "sofa bed", "crib", "cradle")
 NEEDS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "kitchen": (("kitchen sink",), ("cooker", "cooktop"), ("fridge",)),
-    "bathroom": (("toilet",), ("washbasin", "wall washbasin", "basin", "bathroom vanity", "double vanity"), ("bathtub", "corner bathtub", "shower")),
+    "bathroom": (
+        ("toilet",),
+        ("washbasin", "wall washbasin", "basin", "bathroom vanity", "double vanity"),
+        ("bathtub", "corner bathtub", "shower"),
+    ),
     "toilet": (("toilet",),),
     "main_bedroom": (BEDS,),
     "bedroom": (BEDS,),
@@ -28,5 +32,9 @@ def lacking(house: House) -> tuple[str, ...]:
     there: dict[str, set[str]] = {}
     for p in house.placements:
         there.setdefault(p.room, set()).add(p.object_class)
-    return tuple(f"{r.id}: {group[0]}" for r in house.rooms for group in NEEDS.get(r.kind, ())
-                 if there.get(r.id, set()).isdisjoint(group))
+    return tuple(
+        f"{r.id}: {group[0]}"
+        for r in house.rooms
+        for group in NEEDS.get(r.kind, ())
+        if there.get(r.id, set()).isdisjoint(group)
+    )

@@ -16,9 +16,26 @@ from embodied.generate.program import Space
 from embodied.generate.score import score
 
 ZONE = {
-    "living_room": 0.0, "sun_room": 0.2, "family_room": 0.6, "dining_room": 0.5, "kitchen": 0.9, "hall": 1.2,
-    "garage": 1.2, "library": 1.3, "toilet": 1.4, "workshop": 1.5, "pantry": 1.0, "laundry_room": 1.7, "study": 1.9,
-    "gym": 2.2, "guest_room": 2.5, "playroom": 2.6, "bathroom": 3.0, "kids_room": 3.2, "bedroom": 3.1, "closet": 3.0,
+    "living_room": 0.0,
+    "sun_room": 0.2,
+    "family_room": 0.6,
+    "dining_room": 0.5,
+    "kitchen": 0.9,
+    "hall": 1.2,
+    "garage": 1.2,
+    "library": 1.3,
+    "toilet": 1.4,
+    "workshop": 1.5,
+    "pantry": 1.0,
+    "laundry_room": 1.7,
+    "study": 1.9,
+    "gym": 2.2,
+    "guest_room": 2.5,
+    "playroom": 2.6,
+    "bathroom": 3.0,
+    "kids_room": 3.2,
+    "bedroom": 3.1,
+    "closet": 3.0,
     "main_bedroom": 3.7,
 }
 """How private a room kind is: 0 at the public end of the spine."""
@@ -52,8 +69,9 @@ class Genome:
     """What is added to each space's ZONE."""
 
 
-def draw_plan(footprints: Sequence[Footprint], spaces: tuple[Space, ...], tries: int, *,
-              rng: np.random.Generator) -> Plan | None:
+def draw_plan(
+    footprints: Sequence[Footprint], spaces: tuple[Space, ...], tries: int, *, rng: np.random.Generator
+) -> Plan | None:
     """The best of `tries` candidates: random ones first, then changes of the best so far.
 
     Returns:
@@ -120,8 +138,11 @@ def with_short_corridors(plan: Plan) -> Plan:
         cuts = [low]
         for k in range(1, pieces):
             ideal = low + along * k / pieces
-            options = [at for at in range(int(ideal) - 12, int(ideal) + 13)
-                       if all(at - a >= 13 or b - at >= 13 for _, _, a, b in walls if a < at < b)]
+            options = [
+                at
+                for at in range(int(ideal) - 12, int(ideal) + 13)
+                if all(at - a >= 13 or b - at >= 13 for _, _, a, b in walls if a < at < b)
+            ]
             if options:
                 cuts.append(min(options, key=lambda at: abs(at - ideal)))
         edges = [*cuts, low + along]
@@ -147,10 +168,12 @@ def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
     rects = [move(c.rect) for c in plan.cells]
     dx, dy = min(r[0] for r in rects), min(r[1] for r in rects)
     cells = tuple(
-        Cell(c.kind, (r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy), c.area, c.owner) for c, r in zip(plan.cells, rects))
+        Cell(c.kind, (r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy), c.area, c.owner) for c, r in zip(plan.cells, rects)
+    )
     walls = walls_between(list(cells))
     links = tuple(
-        Link(k.child, k.parent, walls[min(k.child, k.parent), max(k.child, k.parent)], k.tree) for k in plan.links)
+        Link(k.child, k.parent, walls[min(k.child, k.parent), max(k.child, k.parent)], k.tree) for k in plan.links
+    )
     return Plan(cells, links, plan.score)
 
 
@@ -163,8 +186,9 @@ def _candidate(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome) 
         if chosen is None:
             return None
         modules = [m for m in modules if m not in chosen]
-    rows = _assign(footprint, modules, {id(s): p for s, p in zip(spaces, genome.privacy)},
-                   np.random.default_rng(genome.rows))
+    rows = _assign(
+        footprint, modules, {id(s): p for s, p in zip(spaces, genome.privacy)}, np.random.default_rng(genome.rows)
+    )
     if rows is None:
         return None
     return _lay(footprint, rows, cells, np.random.default_rng(genome.cuts))
@@ -176,11 +200,27 @@ def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random
     area = (x1 - x0) * (y1 - y0) / 100
     by_kind = {m.main.kind: m for m in reversed(modules)}
     if cap.at_start:
-        options = [("living_room",), ("living_room", "dining_room"), ("living_room", "kitchen"),
-                   ("family_room", "living_room"), ("living_room", "library"), ("garage", "kitchen"), ("garage",)]
+        options = [
+            ("living_room",),
+            ("living_room", "dining_room"),
+            ("living_room", "kitchen"),
+            ("family_room", "living_room"),
+            ("living_room", "library"),
+            ("garage", "kitchen"),
+            ("garage",),
+        ]
     else:
-        options = [("main_bedroom",), ("main_bedroom", "bathroom"), ("gym",), ("bedroom", "bedroom"), ("living_room",),
-                   ("family_room",), ("guest_room",), ("library",), ("playroom",)]
+        options = [
+            ("main_bedroom",),
+            ("main_bedroom", "bathroom"),
+            ("gym",),
+            ("bedroom", "bedroom"),
+            ("living_room",),
+            ("family_room",),
+            ("guest_room",),
+            ("library",),
+            ("playroom",),
+        ]
     fits = []
     for option in options:
         if option == ("main_bedroom", "bathroom"):
@@ -226,12 +266,15 @@ def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random
     a, b = (x0, x1) if cap.axis == "y" else (y0, y1)
     mid = a + round(across * parts[1].area / (parts[1].area + parts[2].area))
     for s, (p, q) in zip(parts[1:], ((a, mid), (mid, b))):
-        cells.append(Cell(s.kind, (p, rest[0], q, rest[1]) if cap.axis == "y" else (rest[0], p, rest[1], q), s.area, owner))
+        cells.append(
+            Cell(s.kind, (p, rest[0], q, rest[1]) if cap.axis == "y" else (rest[0], p, rest[1], q), s.area, owner)
+        )
     return cells
 
 
-def _assign(footprint: Footprint, modules: list[Module], privacy: dict[int, float],
-            rng: np.random.Generator) -> list[list[tuple[Module, int]]] | None:
+def _assign(
+    footprint: Footprint, modules: list[Module], privacy: dict[int, float], rng: np.random.Generator
+) -> list[list[tuple[Module, int]]] | None:
     """Modules with their wanted widths to rows, from the public end to the private one."""
     keys = [ZONE[m.main.kind] + privacy[id(m.main)] for m in modules]
     order = sorted(range(len(modules)), key=lambda k: keys[k])
@@ -242,8 +285,9 @@ def _assign(footprint: Footprint, modules: list[Module], privacy: dict[int, floa
     noise = rng.exponential(14.0, (len(modules), len(rows))).tolist()
     for k in order:
         m = modules[k]
-        by_depth = {d: (width(m, d, corridor), _slimness(m, d + (corridor if m.main.kind == "hall" else 0)))
-                    for d in depths}
+        by_depth = {
+            d: (width(m, d, corridor), _slimness(m, d + (corridor if m.main.kind == "hall" else 0))) for d in depths
+        }
         best, least = None, 1e9
         for i, s in enumerate(strips):
             w, slim = by_depth[s.depth]
@@ -273,8 +317,9 @@ def _slimness(m: Module, depth: int) -> float:
     return 45 * max(0.0, max(depth / own, own / depth) - 1.7)
 
 
-def _lay(footprint: Footprint, rows: list[list[tuple[Module, int]]], cells: list[Cell],
-         rng: np.random.Generator) -> list[Cell] | None:
+def _lay(
+    footprint: Footprint, rows: list[list[tuple[Module, int]]], cells: list[Cell], rng: np.random.Generator
+) -> list[Cell] | None:
     """Cut the rows into rooms, let end rooms take the corridor's ends, and cut the corridor by the hall."""
     corridor = footprint.corridor
     cuts: list[list[tuple[int, int]]] = []
@@ -293,8 +338,16 @@ def _lay(footprint: Footprint, rows: list[list[tuple[Module, int]]], cells: list
     halls: list[tuple[int, int, int]] = []
     for i, (s, row) in enumerate(zip(footprint.strips, rows)):
         for k, (m, wanted) in enumerate(row):
-            made = arrange(m, s, *cuts[i][k], corridor, wanted, mirrored=flips.pop() < 0.5,
-                           inner=reach.get((i, k), 0), first=len(cells))
+            made = arrange(
+                m,
+                s,
+                *cuts[i][k],
+                corridor,
+                wanted,
+                mirrored=flips.pop() < 0.5,
+                inner=reach.get((i, k), 0),
+                first=len(cells),
+            )
             if made is None:
                 return None
             if m.main.kind == "hall" and corridor:

@@ -52,8 +52,11 @@ def draw_modules(spaces: tuple[Space, ...], *, rng: np.random.Generator) -> list
     pool = [i for i, s in enumerate(spaces) if s.owner is None and s.kind in ("bathroom", "toilet", "laundry_room")]
     pool = [pool[k] for k in rng.permutation(len(pool))]
     taken: dict[int, Space] = {}
-    hosts = [i for i, s in enumerate(spaces) if s.owner is None and s.kind in (*BEDROOMS, "kitchen", "hall", "study")
-             and len(owned.get(i, ())) < 2]
+    hosts = [
+        i
+        for i, s in enumerate(spaces)
+        if s.owner is None and s.kind in (*BEDROOMS, "kitchen", "hall", "study") and len(owned.get(i, ())) < 2
+    ]
     for k in rng.permutation(len(hosts)):
         host = hosts[k]
         if pool and rng.random() < (0.75 if owned.get(host) else 0.25):
@@ -64,7 +67,8 @@ def draw_modules(spaces: tuple[Space, ...], *, rng: np.random.Generator) -> list
     guests = {id(s) for s in taken.values()}
     return [
         Module(s, tuple(owned.get(i, ())), taken.get(i))
-        for i, s in enumerate(spaces) if s.owner is None and id(s) not in guests
+        for i, s in enumerate(spaces)
+        if s.owner is None and id(s) not in guests
     ]
 
 
@@ -85,8 +89,18 @@ def _column(items: tuple[Space, ...], depth: int) -> int:
     return sum(max(LEAST[s.kind], round(s.area * 100 / depth)) for s in items)
 
 
-def arrange(module: Module, strip: Strip, u0: int, u1: int, corridor: int, wanted: int, *, mirrored: bool, inner: int = 0,
-            first: int = 0) -> list[Cell] | None:
+def arrange(
+    module: Module,
+    strip: Strip,
+    u0: int,
+    u1: int,
+    corridor: int,
+    wanted: int,
+    *,
+    mirrored: bool,
+    inner: int = 0,
+    first: int = 0,
+) -> list[Cell] | None:
     """The module's cells between u0 and u1 of `strip`; None where it does not fit.
 
     Args:

@@ -18,9 +18,25 @@ NIB = 0.16
 DOOR = {"bathroom": 0.8, "toilet": 0.75, "closet": 0.75, "pantry": 0.75, "laundry_room": 0.8}
 """Clear width of a room's door, metres; 0.85 for the others."""
 OPEN_KINDS = ("living_room", "dining_room", "kitchen", "family_room", "sun_room", "library")
-GLASS = {"living_room": 0.2, "family_room": 0.18, "dining_room": 0.17, "sun_room": 0.4, "kitchen": 0.13, "study": 0.15,
-         "library": 0.14, "gym": 0.14, "playroom": 0.15, "workshop": 0.1, "garage": 0.03, "laundry_room": 0.1,
-         "bathroom": 0.1, "toilet": 0.15, "hall": 0.08, "corridor": 0.1, **{k: 0.14 for k in BEDROOMS}}
+GLASS = {
+    "living_room": 0.2,
+    "family_room": 0.18,
+    "dining_room": 0.17,
+    "sun_room": 0.4,
+    "kitchen": 0.13,
+    "study": 0.15,
+    "library": 0.14,
+    "gym": 0.14,
+    "playroom": 0.15,
+    "workshop": 0.1,
+    "garage": 0.03,
+    "laundry_room": 0.1,
+    "bathroom": 0.1,
+    "toilet": 0.15,
+    "hall": 0.08,
+    "corridor": 0.1,
+    **{k: 0.14 for k in BEDROOMS},
+}
 """Window area as a share of the floor area."""
 
 
@@ -39,8 +55,13 @@ class OuterWall:
 
 def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], Wall]) -> list[list[OuterWall]]:
     """For each cell its stretches of outer wall, longest first."""
-    return [[OuterWall(i, w[0], w[1] / 10, w[2] / 10, w[3] / 10, side)
-             for w, side in outer_stretches(list(cells), walls, i)] for i in range(len(cells))]
+    return [
+        [
+            OuterWall(i, w[0], w[1] / 10, w[2] / 10, w[3] / 10, side)
+            for w, side in outer_stretches(list(cells), walls, i)
+        ]
+        for i in range(len(cells))
+    ]
 
 
 @dataclass
@@ -64,8 +85,15 @@ class _Draft:
         return f"{kind}_{self.counts[kind]}"
 
 
-def draw_openings(plan: Plan, names: tuple[str, ...], leaves: tuple[str, str, str], height: float, open_plan: bool, *,
-                  rng: np.random.Generator) -> tuple[Opening, ...]:
+def draw_openings(
+    plan: Plan,
+    names: tuple[str, ...],
+    leaves: tuple[str, str, str],
+    height: float,
+    open_plan: bool,
+    *,
+    rng: np.random.Generator,
+) -> tuple[Opening, ...]:
     """All openings of a plan.
 
     Args:
@@ -94,8 +122,9 @@ def draw_openings(plan: Plan, names: tuple[str, ...], leaves: tuple[str, str, st
 
 def _is_wide(plan: Plan, link) -> bool:
     kinds = {plan.cells[link.child].kind, plan.cells[link.parent].kind}
-    return kinds <= {*OPEN_KINDS, "hall", "corridor"} and (kinds <= set(OPEN_KINDS) or kinds <= {"hall", "corridor"}
-                                                          or kinds == {"hall", "living_room"})
+    return kinds <= {*OPEN_KINDS, "hall", "corridor"} and (
+        kinds <= set(OPEN_KINDS) or kinds <= {"hall", "corridor"} or kinds == {"hall", "living_room"}
+    )
 
 
 def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[tuple, tuple]:
@@ -118,8 +147,12 @@ def _passage(plan: Plan, link, draft: _Draft, height: float, open_plan: bool, rn
     elif "library" in kinds or "sun_room" in kinds:
         width = min(room, float(rng.choice([1.4, 1.8])))
     else:
-        width = min(room, max(1.4, round(float(rng.uniform(0.65, 0.95)) * room, 1)) if open_plan
-                    else float(rng.choice([0.9, 1.2, 1.6])))
+        width = min(
+            room,
+            max(1.4, round(float(rng.uniform(0.65, 0.95)) * room, 1))
+            if open_plan
+            else float(rng.choice([0.9, 1.2, 1.6])),
+        )
     tight = any(c.kind == "kitchen" and _area(c) < 9.5 for c in (a, b))  # its units need the wall
     if tight:
         width = min(width, 1.2)
@@ -130,8 +163,18 @@ def _passage(plan: Plan, link, draft: _Draft, height: float, open_plan: bool, rn
     p, q = _jambs(a, axis, across, start, start + width)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
     draft.zones += _fronts(axis, across, start, start + width)
-    draft.openings.append(Opening(draft.name("passage"), "passage", (draft.names[link.child], draft.names[link.parent]),
-                                  rounded(p), rounded(q), 0.0, head, None))
+    draft.openings.append(
+        Opening(
+            draft.name("passage"),
+            "passage",
+            (draft.names[link.child], draft.names[link.parent]),
+            rounded(p),
+            rounded(q),
+            0.0,
+            head,
+            None,
+        )
+    )
 
 
 def _area(cell) -> float:
@@ -196,9 +239,11 @@ def _door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> None:
     p, q = _jambs(cell, axis, across, start, start + width)
     hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
-    draft.openings.append(Opening(
-        draft.name("door"), "door", ends, rounded(p), rounded(q), 0.0,
-        2.05, draft.leaf, hinge, rounded(open_by)))
+    draft.openings.append(
+        Opening(
+            draft.name("door"), "door", ends, rounded(p), rounded(q), 0.0, 2.05, draft.leaf, hinge, rounded(open_by)
+        )
+    )
 
 
 def _is_tiny(cell: Cell) -> bool:
@@ -216,8 +261,11 @@ def _folded_door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> b
     side = 1 if ((y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2) > across else -1
     width = min(DOOR[plan.cells[link.child].kind], high - low - 2 * NIB)
     k = 0 if axis == "x" else 1
-    taken = [sorted((o.a[k], o.b[k])) for o in draft.openings
-             if abs(o.a[1 - k] - across) < 0.01 and abs(o.b[1 - k] - across) < 0.01]
+    taken = [
+        sorted((o.a[k], o.b[k]))
+        for o in draft.openings
+        if abs(o.a[1 - k] - across) < 0.01 and abs(o.b[1 - k] - across) < 0.01
+    ]
     spots = []
     for start in (low + NIB, high - NIB - width):
         for at_low in (True, False):
@@ -233,9 +281,20 @@ def _folded_door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> b
     hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
     draft.swings.append(_swing(axis, across, start, start + width, side))
     draft.zones += _fronts(axis, across, start, start + width)
-    draft.openings.append(Opening(
-        draft.name("door"), "door", (draft.names[link.parent], draft.names[link.child]), rounded(p), rounded(q), 0.0, 2.05,
-        draft.leaf, hinge, rounded(math.radians(float(rng.uniform(164, 174))))))
+    draft.openings.append(
+        Opening(
+            draft.name("door"),
+            "door",
+            (draft.names[link.parent], draft.names[link.child]),
+            rounded(p),
+            rounded(q),
+            0.0,
+            2.05,
+            draft.leaf,
+            hinge,
+            rounded(math.radians(float(rng.uniform(164, 174)))),
+        )
+    )
     return True
 
 
@@ -249,8 +308,19 @@ def _take(free: list[tuple[float, float]], low: float, high: float, margin: floa
 def _add_outer(plan, i, k, w: OuterWall, kind, start, width, sill, head, leaf, free, draft: _Draft, **more) -> None:
     p, q = _jambs(plan.cells[i], w.axis, w.across, start, start + width)
     free[i, k] = _take(free[i, k], start, start + width)
-    draft.openings.append(Opening(draft.name(kind), kind, (draft.names[i], None), rounded(p), rounded(q), rounded(sill),
-                                  rounded(head), leaf, **more))
+    draft.openings.append(
+        Opening(
+            draft.name(kind),
+            kind,
+            (draft.names[i], None),
+            rounded(p),
+            rounded(q),
+            rounded(sill),
+            rounded(head),
+            leaf,
+            **more,
+        )
+    )
     if kind in ("front_door", "back_door"):
         draft.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
 
@@ -263,8 +333,21 @@ def _front_door(plan, outside, free, draft: _Draft, rng: np.random.Generator) ->
     width = 1.0 if w.high - w.low > 1.5 else 0.9
     slack = w.high - w.low - 2 * 0.2 - width
     start = round(w.low + 0.2 + slack * (0.5 if slack < 0.6 else float(rng.choice([0.15, 0.5, 0.85]))), 2)
-    _add_outer(plan, i, k, w, "front_door", start, width, 0.0, 2.1, draft.outer_leaf, free, draft,
-               hinge=str(rng.choice(["a", "b"])))
+    _add_outer(
+        plan,
+        i,
+        k,
+        w,
+        "front_door",
+        start,
+        width,
+        0.0,
+        2.1,
+        draft.outer_leaf,
+        free,
+        draft,
+        hinge=str(rng.choice(["a", "b"])),
+    )
 
 
 def _outer_doors(plan, outside, free, draft: _Draft, rng: np.random.Generator) -> None:
@@ -278,8 +361,20 @@ def _outer_doors(plan, outside, free, draft: _Draft, rng: np.random.Generator) -
             if fits:
                 k, w = min(fits, key=lambda kw: (kw[1].high - kw[1].low < wide + 0.3, kw[1].high - kw[1].low, kw[0]))
                 width = min(wide, w.high - w.low - 0.4)
-                _add_outer(plan, i, k, w, "garage_door", (w.low + w.high - width) / 2, width, 0.0, 2.2,
-                           draft.window_leaf, free, draft)
+                _add_outer(
+                    plan,
+                    i,
+                    k,
+                    w,
+                    "garage_door",
+                    (w.low + w.high - width) / 2,
+                    width,
+                    0.0,
+                    2.2,
+                    draft.window_leaf,
+                    free,
+                    draft,
+                )
         elif c.kind in ("living_room", "sun_room", "family_room", "dining_room", "library", "main_bedroom"):
             chance = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35}.get(c.kind, 0.12)
             if c.kind == "main_bedroom" and (x1 - x0) * (y1 - y0) < 15.0:
@@ -290,16 +385,41 @@ def _outer_doors(plan, outside, free, draft: _Draft, rng: np.random.Generator) -
                 width = min(room, float(rng.choice([1.6, 1.8, 2.4, 3.0] if c.kind != "main_bedroom" else [1.4, 1.6])))
                 two = room > 2 * width + 1.0
                 at = float(rng.choice([0.18, 0.5, 0.82])) if two else 0.5
-                _add_outer(plan, i, 0, w, "french_window", round(w.low + 0.4 + (room - width) * at, 2), width, 0.0, 2.2,
-                           draft.window_leaf, free, draft)
+                _add_outer(
+                    plan,
+                    i,
+                    0,
+                    w,
+                    "french_window",
+                    round(w.low + 0.4 + (room - width) * at, 2),
+                    width,
+                    0.0,
+                    2.2,
+                    draft.window_leaf,
+                    free,
+                    draft,
+                )
         elif c.kind in ("kitchen", "laundry_room", "workshop") and not back and rng.random() < 0.3:
             fits = [(k, w) for k, w in enumerate(outside[i]) if w.high - w.low > 2.4]
             if fits:
                 back = True
                 k, w = fits[-1]
                 start = w.low + 0.3 if rng.random() < 0.5 else w.high - 1.2
-                _add_outer(plan, i, k, w, "back_door", start, 0.9, 0.0, 2.1, draft.outer_leaf, free, draft,
-                           hinge=str(rng.choice(["a", "b"])))
+                _add_outer(
+                    plan,
+                    i,
+                    k,
+                    w,
+                    "back_door",
+                    start,
+                    0.9,
+                    0.0,
+                    2.1,
+                    draft.outer_leaf,
+                    free,
+                    draft,
+                    hinge=str(rng.choice(["a", "b"])),
+                )
 
 
 def _sill_head(kind: str, low_sill: bool) -> tuple[float, float]:
@@ -314,7 +434,9 @@ def _sill_head(kind: str, low_sill: bool) -> tuple[float, float]:
     return (0.45 if low_sill and kind in OPEN_KINDS else 0.9), 2.15
 
 
-def _windows(plan, i: int, walls: list[OuterWall], free, draft: _Draft, height: float, rng: np.random.Generator) -> None:
+def _windows(
+    plan, i: int, walls: list[OuterWall], free, draft: _Draft, height: float, rng: np.random.Generator
+) -> None:
     """Windows for one room: as much glass as its floor asks for, centred on the free stretches of outer wall."""
     c = plan.cells[i]
     share = GLASS.get(c.kind)
@@ -322,14 +444,19 @@ def _windows(plan, i: int, walls: list[OuterWall], free, draft: _Draft, height: 
         return
     x0, y0, x1, y1 = (v / 10 for v in c.rect)
     wanted = share * (x1 - x0) * (y1 - y0) * float(rng.uniform(0.85, 1.2))
-    glazed = sum(o.head * math.dist(o.a, o.b) for o in draft.openings
-                 if o.rooms[0] == draft.names[i] and o.kind == "french_window")
+    glazed = sum(
+        o.head * math.dist(o.a, o.b)
+        for o in draft.openings
+        if o.rooms[0] == draft.names[i] and o.kind == "french_window"
+    )
     sill, head = _sill_head(c.kind, bool(rng.random() < 0.4))
     widest = {"bathroom": 0.9, "toilet": 0.6, "hall": 0.8, "corridor": 0.9, "garage": 1.2}.get(c.kind, 2.4)
     most = {"bathroom": 1, "toilet": 1, "hall": 1, "corridor": 2, "garage": 2, "laundry_room": 1}.get(c.kind, 5)
     left = wanted - 0.6 * glazed
-    stretches = sorted(((b - a, k, a, b) for k, _ in enumerate(walls) for a, b in free[i, k] if b - a > 1.0),
-                       key=lambda s: (-s[0], s[1], s[2]))
+    stretches = sorted(
+        ((b - a, k, a, b) for k, _ in enumerate(walls) for a, b in free[i, k] if b - a > 1.0),
+        key=lambda s: (-s[0], s[1], s[2]),
+    )
     placed = 0
     for length, k, a, b in stretches:
         if left < 0.25 * wanted and placed or placed >= most or (left < 0.1 * wanted and glazed):
@@ -342,7 +469,19 @@ def _windows(plan, i: int, walls: list[OuterWall], free, draft: _Draft, height: 
         width = round(max(width, min(0.6, room)) * 10) / 10
         for n in range(count):
             start = round(a + length * (n + 0.5) / count - width / 2, 2)
-            _add_outer(plan, i, k, walls[k], "window", start, width, sill, min(head, height - 0.15), draft.window_leaf,
-                       free, draft)
+            _add_outer(
+                plan,
+                i,
+                k,
+                walls[k],
+                "window",
+                start,
+                width,
+                sill,
+                min(head, height - 0.15),
+                draft.window_leaf,
+                free,
+                draft,
+            )
             left -= width * (head - sill)
             placed += 1

@@ -69,7 +69,10 @@ def meet(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> d
         if found is not None:
             people.append(dataclasses.replace(found, id=f"{CLASS}_{len(people) + 1}"))
     people = _passable(house, people)
-    met = {n: _nearest(people, house.room_by_id[graph.room_of_node[n]], graph.positions[n, :2]) for n in range(len(graph.positions))}
+    met = {
+        n: _nearest(people, house.room_by_id[graph.room_of_node[n]], graph.positions[n, :2])
+        for n in range(len(graph.positions))
+    }
     return {n: p for n, p in met.items() if p is not None}
 
 
@@ -83,8 +86,12 @@ def add_people(house: House, met: Mapping[int, Placement], starts: Iterable[int]
 
 def stands(asset: Asset) -> bool:
     """Whether a figure stands on its own feet; those that sit or lie need something to do it on."""
-    return (asset.support == "floor" and "sitting" not in asset.tags
-            and asset.size[2] >= STANDING and max(asset.size[:2]) <= 2 * STANDING / 3)
+    return (
+        asset.support == "floor"
+        and "sitting" not in asset.tags
+        and asset.size[2] >= STANDING
+        and max(asset.size[:2]) <= 2 * STANDING / 3
+    )
 
 
 def sits(asset: Asset) -> bool:
@@ -115,7 +122,9 @@ class _Site:
         around = _disc(eye, 2 * FARTHEST)
         self.eye, self.room, self.floor = eye, room, house.storey_of(room).elevation
         self.edges, self.ring = ways.intersection(around), _disc(eye, FARTHEST).difference(_disc(eye, NEAREST))
-        self.others = [_disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST]
+        self.others = [
+            _disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST
+        ]
         self.open = house.floor(room).intersection(around)
         self.things = [p for p in house.placements if p.room == room.id and _in_the_way(p)]
 
@@ -139,21 +148,35 @@ class _Site:
 
     def sit(self, figures: Sequence[Asset], seats: Sequence[_Seat], rng: np.random.Generator) -> Placement | None:
         """The first figure that finds a seat with nothing on it and nothing where its legs go."""
-        choices = [(seat, figures[int(i)]) for seat in seats if seat.room == self.room.id for i in rng.permutation(len(figures))]
+        choices = [
+            (seat, figures[int(i)])
+            for seat in seats
+            if seat.room == self.room.id
+            for i in rng.permutation(len(figures))
+        ]
         for seat, asset in choices:
             yaw = seat.placement.yaw
             lean = LEAN if seat.deep and asset.size[1] > GROWN else 0.0
             spot = seat.spot + rotation(yaw) @ np.array([0.0, lean - asset.size[1] / 2])
             body = shapely.Polygon(rectangle(*spot, *asset.size[:2], yaw))
             below = self.floor + asset.size[2]
-            taken = [*self.others, *(_ground(p) for p in self.things if p is not seat.placement and p.position[2] < below)]
-            if (self.ring.contains(shapely.Point(spot)) and self.open.buffer(0.02).contains(body)
-                    and self.edges.distance(body) >= RADIUS and not any(body.intersects(x) for x in taken)):
+            taken = [
+                *self.others,
+                *(_ground(p) for p in self.things if p is not seat.placement and p.position[2] < below),
+            ]
+            if (
+                self.ring.contains(shapely.Point(spot))
+                and self.open.buffer(0.02).contains(body)
+                and self.edges.distance(body) >= RADIUS
+                and not any(body.intersects(x) for x in taken)
+            ):
                 return self._placed(asset, spot, self.floor + seat.lift, yaw)
         return None
 
     def _placed(self, asset: Asset, spot: Sequence[float], z: float, yaw: float) -> Placement:
-        return Placement(CLASS, asset.key, CLASS, self.room.id, rounded((spot[0], spot[1], z)), rounded(yaw), asset.size)
+        return Placement(
+            CLASS, asset.key, CLASS, self.room.id, rounded((spot[0], spot[1], z)), rounded(yaw), asset.size
+        )
 
 
 def _seats(house: House, catalogue: Catalogue) -> list[_Seat]:

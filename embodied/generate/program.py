@@ -87,7 +87,9 @@ def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[Space]:
     main = float(np.clip(rng.normal(0.11, 0.01) * area, 11.0, 20.0)) if area > 45 else 0.3 * area
     spaces = [Space("main_bedroom", main)]
     for k in range(1, count):
-        kind = str(rng.choice(["bedroom", "kids_room", "guest_room"], p=[0.45, 0.4, 0.15] if k < 3 else [0.4, 0.3, 0.3]))
+        kind = str(
+            rng.choice(["bedroom", "kids_room", "guest_room"], p=[0.45, 0.4, 0.15] if k < 3 else [0.4, 0.3, 0.3])
+        )
         spaces.append(Space(kind, float(np.clip(rng.normal(11.0, 0.8) + (area - 120) * 0.008, 9.0, 15.0))))
     return spaces
 
@@ -99,12 +101,36 @@ def _bathrooms(area: float, bedrooms: int, rng: np.random.Generator) -> int:
 
 def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.random.Generator) -> list[Space]:
     """`spaces` and further rooms until the area is used (or the asked number of main rooms is there)."""
-    least = {"study": 80, "garage": 105, "sun_room": 120, "family_room": 150, "workshop": 130, "playroom": 150,
-             "library": 165, "gym": 175}
-    size = {"study": 9, "garage": 19, "sun_room": 11, "family_room": 17, "workshop": 11, "playroom": 13,
-            "library": 14, "gym": 14}
-    likely = {"study": 3.0, "garage": 1.6, "sun_room": 0.8, "family_room": 1.0, "workshop": 0.6, "playroom": 0.8,
-              "library": 0.8, "gym": 0.7}
+    least = {
+        "study": 80,
+        "garage": 105,
+        "sun_room": 120,
+        "family_room": 150,
+        "workshop": 130,
+        "playroom": 150,
+        "library": 165,
+        "gym": 175,
+    }
+    size = {
+        "study": 9,
+        "garage": 19,
+        "sun_room": 11,
+        "family_room": 17,
+        "workshop": 11,
+        "playroom": 13,
+        "library": 14,
+        "gym": 14,
+    }
+    likely = {
+        "study": 3.0,
+        "garage": 1.6,
+        "sun_room": 0.8,
+        "family_room": 1.0,
+        "workshop": 0.6,
+        "playroom": 0.8,
+        "library": 0.8,
+        "gym": 0.7,
+    }
     budget = 0.925 * area
     grow = float(np.clip((area - 150) / 450, 0, 1))
     open_kinds = [k for k in least]
@@ -113,8 +139,12 @@ def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.rando
         if config.rooms is not None and main >= config.rooms:
             return spaces
         free = budget - sum(s.area for s in spaces)
-        fits = [k for k in open_kinds if (config.rooms is not None or area >= least[k]) and
-                (size[k] * 0.8 <= free or (config.rooms is not None and k != "garage"))]
+        fits = [
+            k
+            for k in open_kinds
+            if (config.rooms is not None or area >= least[k])
+            and (size[k] * 0.8 <= free or (config.rooms is not None and k != "garage"))
+        ]
         if config.rooms is None and free < 7.0:
             return spaces
         if not fits:
@@ -122,8 +152,11 @@ def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.rando
                 return spaces
             beds = sum(s.kind in BEDROOMS for s in spaces)
             most = 0.5 * config.rooms if config.rooms is not None else area / 62
-            seconds = [k for k in ("study", "family_room", "workshop", "playroom", "sun_room", "library")
-                       if sum(s.kind == k for s in spaces) < 2 and (config.rooms is not None or area > 2 * least[k])]
+            seconds = [
+                k
+                for k in ("study", "family_room", "workshop", "playroom", "sun_room", "library")
+                if sum(s.kind == k for s in spaces) < 2 and (config.rooms is not None or area > 2 * least[k])
+            ]
             if (beds < most and config.bedrooms is None) or (not seconds and config.rooms is not None):
                 spaces.append(Space("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow))
             elif not seconds:

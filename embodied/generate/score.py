@@ -8,15 +8,36 @@ from embodied.generate.access import Wall
 from embodied.generate.kinds import BEDROOMS, SIZES
 from embodied.generate.modules import Cell
 
-DAYLIT = (*BEDROOMS, "living_room", "dining_room", "kitchen", "family_room", "study", "library", "playroom", "sun_room",
-          "gym", "workshop")
+DAYLIT = (
+    *BEDROOMS,
+    "living_room",
+    "dining_room",
+    "kitchen",
+    "family_room",
+    "study",
+    "library",
+    "playroom",
+    "sun_room",
+    "gym",
+    "workshop",
+)
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
 NEAR = {
-    ("dining_room", "kitchen"): 2.6, ("dining_room", "living_room"): 1.8, ("kitchen", "living_room"): 0.8,
-    ("hall", "living_room"): 1.8, ("garage", "hall"): 0.6, ("garage", "laundry_room"): 0.8, ("garage", "kitchen"): 0.5,
-    ("kitchen", "laundry_room"): 0.4, ("family_room", "kitchen"): 0.7, ("garage", "workshop"): 0.8,
-    ("living_room", "sun_room"): 0.8, ("hall", "toilet"): 0.6, ("library", "living_room"): 0.3,
-    ("hall", "study"): 0.2, ("kitchen", "pantry"): 0.5,
+    ("dining_room", "kitchen"): 2.6,
+    ("dining_room", "living_room"): 1.8,
+    ("kitchen", "living_room"): 0.8,
+    ("hall", "living_room"): 1.8,
+    ("garage", "hall"): 0.6,
+    ("garage", "laundry_room"): 0.8,
+    ("garage", "kitchen"): 0.5,
+    ("kitchen", "laundry_room"): 0.4,
+    ("family_room", "kitchen"): 0.7,
+    ("garage", "workshop"): 0.8,
+    ("living_room", "sun_room"): 0.8,
+    ("hall", "toilet"): 0.6,
+    ("library", "living_room"): 0.3,
+    ("hall", "study"): 0.2,
+    ("kitchen", "pantry"): 0.5,
     **{tuple(sorted((k, "bathroom"))): 0.35 for k in BEDROOMS},
     **{tuple(sorted((k, "kitchen"))): -0.7 for k in BEDROOMS},
     **{tuple(sorted((k, "garage"))): -0.6 for k in BEDROOMS},

@@ -58,13 +58,15 @@ def footprint(draft: Draft) -> Draft:
     rng = stream(draft.seed, "house", "footprint")
     shape = draw_shape(area, draft.config, rng=rng)
     return dataclasses.replace(
-        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(30)))
+        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(30))
+    )
 
 
 def program(draft: Draft) -> Draft:
     """The rooms wanted."""
     return dataclasses.replace(
-        draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program")))
+        draft, spaces=draw_program(draft.area, draft.config, rng=stream(draft.seed, "house", "program"))
+    )
 
 
 def rooms(draft: Draft) -> Draft:
@@ -78,8 +80,10 @@ def rooms(draft: Draft) -> Draft:
         plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
         if plan is not None:
             return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
-    raise HouseError(f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
-                     f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms")
+    raise HouseError(
+        f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
+        f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms"
+    )
 
 
 def openings(draft: Draft) -> Draft:
@@ -111,12 +115,31 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
     made = []
     for c, name in zip(draft.plan.cells, names):
         x0, y0, x1, y1 = (v / 10 for v in c.rect)
-        made.append(Room(name, c.kind, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), palette.floor, palette.walls[0],
-                         palette.ceiling, palette.skirting))
-    doors = draw_openings(draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height,
-                          open_plan, rng=rng)
-    return House(draft.seed, _title(draft), (Storey(0.0, height),), tuple(made), doors, (), (),
-                 style=palette.style, disorder=disorder)
+        made.append(
+            Room(
+                name,
+                c.kind,
+                ((x0, y0), (x1, y0), (x1, y1), (x0, y1)),
+                palette.floor,
+                palette.walls[0],
+                palette.ceiling,
+                palette.skirting,
+            )
+        )
+    doors = draw_openings(
+        draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height, open_plan, rng=rng
+    )
+    return House(
+        draft.seed,
+        _title(draft),
+        (Storey(0.0, height),),
+        tuple(made),
+        doors,
+        (),
+        (),
+        style=palette.style,
+        disorder=disorder,
+    )
 
 
 def finishes(draft: Draft) -> Draft:
@@ -158,13 +181,23 @@ def checking(draft: Draft) -> Draft:
 
 
 STAGES: Mapping[str, Callable[[Draft], Draft]] = {
-    "footprint": footprint, "program": program, "rooms": rooms, "openings": openings, "finishes": finishes,
-    "furnish": furnishing, "clear": clearing, "check": checking,
+    "footprint": footprint,
+    "program": program,
+    "rooms": rooms,
+    "openings": openings,
+    "finishes": finishes,
+    "furnish": furnishing,
+    "clear": clearing,
+    "check": checking,
 }
 
 
-def generate_house(seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None,
-                   stages: Mapping[str, Callable[[Draft], Draft]] = STAGES) -> House:
+def generate_house(
+    seed: int,
+    config: HouseConfig = DEFAULT,
+    catalogue: Catalogue | None = None,
+    stages: Mapping[str, Callable[[Draft], Draft]] = STAGES,
+) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
     Rooms are drawn anew where furniture that makes a room what it is (lacking.py) found no place; of

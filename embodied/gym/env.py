@@ -50,8 +50,15 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - as Gymnasium wants it
 
     def __init__(
-        self, make_env: Callable[[], HelpEnv], tasks: Sequence[Task], source: FeatureSource, *,
-        layout: Layout = LAYOUT, shaping: bool = False, strict: bool = False, patience: int = 20,
+        self,
+        make_env: Callable[[], HelpEnv],
+        tasks: Sequence[Task],
+        source: FeatureSource,
+        *,
+        layout: Layout = LAYOUT,
+        shaping: bool = False,
+        strict: bool = False,
+        patience: int = 20,
         render_mode: str | None = None,
     ) -> None:
         """
@@ -92,7 +99,13 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
             if self._strict or self._env.ended is not None:
                 raise
             self._invalid += 1
-            return self._encoded(self._o), -STEP_COST, False, self._invalid >= self._patience, {"invalid_action": str(e)}
+            return (
+                self._encoded(self._o),
+                -STEP_COST,
+                False,
+                self._invalid >= self._patience,
+                {"invalid_action": str(e)},
+            )
         ended = self._env.ended
         info = {} if ended is None else self._judged()
         hari = self._env.task.kind == "hari"
@@ -130,7 +143,12 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
     plan = draw_plan(
-        env.world.house, pixels_per_metre=28, graph=env.world.graph, path=tuple(nodes), facing=env.pose.yaw, titles=False,
+        env.world.house,
+        pixels_per_metre=28,
+        graph=env.world.graph,
+        path=tuple(nodes),
+        facing=env.pose.yaw,
+        titles=False,
     )
     scale = VIEW[0] / plan.height
     plan = plan.convert("RGB").resize((max(1, round(plan.width * scale)), VIEW[0]), Image.Resampling.LANCZOS)
@@ -162,8 +180,16 @@ def _wrapped(text: str, width: int) -> str:
 
 
 def make(
-    kind: str, *, data: str | Path | None = None, split: str = "train", seed: int = 0, cache: str | Path | None = None,
-    source: FeatureSource | None = None, worlds: Mapping[str, World] | None = None, wheels: bool = False, **options: Any,
+    kind: str,
+    *,
+    data: str | Path | None = None,
+    split: str = "train",
+    seed: int = 0,
+    cache: str | Path | None = None,
+    source: FeatureSource | None = None,
+    worlds: Mapping[str, World] | None = None,
+    wheels: bool = False,
+    **options: Any,
 ) -> HelpGymEnv:
     """The environment of a kind of task over a data set, or over one generated house without `data`.
 
@@ -178,8 +204,13 @@ def make(
       ValueError: wheels for a kind of task that cannot have them.
     """
     play = make_playground(
-        kind, Path(data) if data else None, split, seed=seed, cache=Path(cache) if cache else default_cache(),
-        worlds=worlds, with_features=source is None,
+        kind,
+        Path(data) if data else None,
+        split,
+        seed=seed,
+        cache=Path(cache) if cache else default_cache(),
+        worlds=worlds,
+        with_features=source is None,
     )
     layout = options.pop("layout", Layout(descriptions=kind == "hari"))
     make_env = _on_wheels(kind, play.make_env, Path(cache) if cache else default_cache()) if wheels else play.make_env

@@ -45,7 +45,13 @@ class Playground:
 
 
 def make_playground(
-    kind: str, data: Path | None, split: str, *, seed: int, cache: Path, worlds: Mapping[str, World] | None = None,
+    kind: str,
+    data: Path | None,
+    split: str,
+    *,
+    seed: int,
+    cache: Path,
+    worlds: Mapping[str, World] | None = None,
     with_features: bool = True,
 ) -> Playground:
     """A split of a data set, or one flat generated from `seed` where `data` is None.
@@ -69,7 +75,11 @@ def make_playground(
 def seen_features(world: World, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
-    path = cache / "semantic" / f"{digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes)[:32]}.npy"
+    path = (
+        cache
+        / "semantic"
+        / f"{digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes)[:32]}.npy"
+    )
     with contextlib.suppress(OSError, ValueError, EOFError):  # absent or damaged: made anew
         known = np.load(path, allow_pickle=False)
         if known.ndim == 3 and known.shape[::2] == (len(world.graph.positions), len(classes) + len(ROOM_KINDS)):

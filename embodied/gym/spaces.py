@@ -149,8 +149,10 @@ def decode(action: int, layout: Layout) -> Action:
       ActionError: no such number.
     """
     if not 0 <= action <= layout.candidates + len(INTENTIONS):
-        raise ActionError(f"action {action} does not exist; use 0 to {layout.candidates + len(INTENTIONS)}: "
-                          f"{layout.candidates} candidates, stop, and the {len(INTENTIONS)} ways to ask")
+        raise ActionError(
+            f"action {action} does not exist; use 0 to {layout.candidates + len(INTENTIONS)}: "
+            f"{layout.candidates} candidates, stop, and the {len(INTENTIONS)} ways to ask"
+        )
     if action < layout.candidates:
         return Move(int(action))
     if action == layout.candidates:
@@ -185,8 +187,11 @@ class Numbers(gym.ObservationWrapper):
         for word in text_of(observation["instruction"]).lower().split():
             words[_stable(word) % self._vocabulary] += 1.0
         parts = (
-            words, np.ravel(observation["candidates"]), [observation["has_target"], observation["mode"]],
-            np.minimum(observation["clock"], 100.0) / 100.0, observation["action_mask"],
+            words,
+            np.ravel(observation["candidates"]),
+            [observation["has_target"], observation["mode"]],
+            np.minimum(observation["clock"], 100.0) / 100.0,
+            observation["action_mask"],
             np.mean(observation["panorama"], axis=0),
         )
         return np.nan_to_num(np.concatenate([np.ravel(p) for p in parts])).astype(np.float32)

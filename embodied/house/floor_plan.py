@@ -1,6 +1,6 @@
 """The floor plan as a picture: walls with thickness, door swings, windows, furniture, names and areas, scale and north.
 
-    draw_plan(house).save("plan.png")
+draw_plan(house).save("plan.png")
 """
 
 from __future__ import annotations
@@ -21,20 +21,45 @@ from embodied.house.house import House, Opening, Placement, Room
 
 PAPER, INK, SOFT = (250, 248, 243), (52, 50, 56), (128, 124, 122)
 ROOM_COLOURS = {
-    "living_room": (250, 236, 208), "family_room": (248, 232, 205), "dining_room": (249, 228, 200),
-    "kitchen": (247, 220, 196), "sun_room": (253, 243, 205), "library": (236, 224, 205),
-    "main_bedroom": (214, 225, 238), "bedroom": (220, 230, 241), "kids_room": (226, 225, 243),
-    "guest_room": (221, 228, 236), "bathroom": (204, 231, 232), "toilet": (204, 231, 232),
-    "laundry_room": (214, 232, 226), "hall": (240, 237, 230), "corridor": (240, 237, 230), "study": (224, 234, 214),
-    "playroom": (232, 226, 240), "gym": (226, 232, 220), "garage": (228, 227, 226), "workshop": (230, 226, 218),
-    "pantry": (236, 228, 214), "closet": (228, 226, 232), "stairwell": (240, 237, 230),
+    "living_room": (250, 236, 208),
+    "family_room": (248, 232, 205),
+    "dining_room": (249, 228, 200),
+    "kitchen": (247, 220, 196),
+    "sun_room": (253, 243, 205),
+    "library": (236, 224, 205),
+    "main_bedroom": (214, 225, 238),
+    "bedroom": (220, 230, 241),
+    "kids_room": (226, 225, 243),
+    "guest_room": (221, 228, 236),
+    "bathroom": (204, 231, 232),
+    "toilet": (204, 231, 232),
+    "laundry_room": (214, 232, 226),
+    "hall": (240, 237, 230),
+    "corridor": (240, 237, 230),
+    "study": (224, 234, 214),
+    "playroom": (232, 226, 240),
+    "gym": (226, 232, 220),
+    "garage": (228, 227, 226),
+    "workshop": (230, 226, 218),
+    "pantry": (236, 228, 214),
+    "closet": (228, 226, 232),
+    "stairwell": (240, 237, 230),
 }
 SMALL = 3
 """Draw at this many times the final resolution, then shrink: smooth lines."""
 
 
-def draw_plan(house: House, *, storey: int = 0, pixels_per_metre: float = 48.0, furniture: bool = True, graph=None,
-              path: tuple[int, ...] = (), facing: float | None = None, titles: bool = True) -> Image.Image:
+def draw_plan(
+    house: House,
+    *,
+    storey: int = 0,
+    pixels_per_metre: float = 48.0,
+    furniture: bool = True,
+    graph=None,
+    path: tuple[int, ...] = (),
+    facing: float | None = None,
+    titles: bool = True,
+) -> Image.Image:
     """A plan of one storey.
 
     Args:
@@ -82,7 +107,9 @@ def save_plan(house: House, path: Path, **options) -> None:
 
 def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     """DejaVu Sans as Matplotlib ships it, so that pictures agree between machines."""
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size))
+    return ImageFont.truetype(
+        str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size)
+    )
 
 
 class _Sheet:
@@ -105,7 +132,9 @@ class _Sheet:
         self.draw.polygon([self.xy(p) for p in points], **style)
 
     def line(self, points, metres: float, colour=INK) -> None:
-        self.draw.line([self.xy(p) for p in points], fill=colour, width=max(1, round(metres * self.scale)), joint="curve")
+        self.draw.line(
+            [self.xy(p) for p in points], fill=colour, width=max(1, round(metres * self.scale)), joint="curve"
+        )
 
     def shape(self, shape, fill) -> None:
         """Fill a shapely polygon with holes."""
@@ -176,8 +205,15 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
             mid = (a + b) / 2
             sheet.line((mid + low * n, mid + high * n), 0.03)
             for end, sign in ((a, 1), (b, -1)):
-                _arc(sheet, end + high * n, (b - a) / np.linalg.norm(b - a) * sign, n, np.linalg.norm(b - a) / 2, 1.4,
-                     (150, 175, 190))
+                _arc(
+                    sheet,
+                    end + high * n,
+                    (b - a) / np.linalg.norm(b - a) * sign,
+                    n,
+                    np.linalg.norm(b - a) / 2,
+                    1.4,
+                    (150, 175, 190),
+                )
     elif o.kind == "garage_door":
         for v in np.linspace(low, high, 4):
             sheet.line((a + v * n, b + v * n), 0.02, SOFT)
@@ -216,7 +252,9 @@ def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
 def _draw_person(sheet: _Sheet, p: Placement) -> None:
     """Shoulders and a head with the face to the front, as architects draw people from above."""
     t = np.linspace(0, 2 * math.pi, 28)
-    oval = lambda rx, ry, dy: np.asarray(p.position[:2]) + np.stack([rx * np.cos(t), ry * np.sin(t) + dy], 1) @ rotation(p.yaw).T
+    oval = lambda rx, ry, dy: (
+        np.asarray(p.position[:2]) + np.stack([rx * np.cos(t), ry * np.sin(t) + dy], 1) @ rotation(p.yaw).T
+    )
     for shape, fill in ((oval(0.23, 0.12, 0.0), (233, 138, 60)), (oval(0.1, 0.11, -0.05), (92, 62, 44))):
         sheet.polygon(shape, fill=fill)
         sheet.line(shape, 0.014, (96, 52, 20))
@@ -232,12 +270,31 @@ def _draw_walker(sheet: _Sheet, at: np.ndarray, facing: float) -> None:
 TINTS = (
     (("bed", "sofa", "couch", "armchair", "ottoman", "pouf"), (188, 200, 222)),
     (("chair", "stool", "bench"), (214, 192, 164)),
-    (("table", "desk", "cabinet", "dresser", "wardrobe", "book", "shel", "sideboard", "chest", "stand", "console"),
-     (208, 182, 148)),
+    (
+        ("table", "desk", "cabinet", "dresser", "wardrobe", "book", "shel", "sideboard", "chest", "stand", "console"),
+        (208, 182, 148),
+    ),
     (("rug", "carpet", "mat"), (222, 205, 205)),
     (("plant", "flower", "tree"), (172, 204, 162)),
-    (("bath", "toilet", "basin", "sink", "shower", "bidet", "washing", "dryer", "fridge", "refrigerator", "cooker", "oven",
-      "stove", "dishwasher"), (238, 240, 242)),
+    (
+        (
+            "bath",
+            "toilet",
+            "basin",
+            "sink",
+            "shower",
+            "bidet",
+            "washing",
+            "dryer",
+            "fridge",
+            "refrigerator",
+            "cooker",
+            "oven",
+            "stove",
+            "dishwasher",
+        ),
+        (238, 240, 242),
+    ),
     (("lamp", "light"), (250, 226, 140)),
     (("television", "screen", "computer", "laptop"), (110, 112, 120)),
 )
@@ -311,7 +368,11 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
         width = max(sheet.draw.textlength(name, font=face), 0.8 * sheet.draw.textlength(area, font=face))
         if width < 0.94 * (x1 - x0) * sheet.scale:
             break
-        if y1 - y0 > 1.5 * (x1 - x0) and width < 0.94 * (y1 - y0) * sheet.scale and 2.4 * size < (x1 - x0) * sheet.scale:
+        if (
+            y1 - y0 > 1.5 * (x1 - x0)
+            and width < 0.94 * (y1 - y0) * sheet.scale
+            and 2.4 * size < (x1 - x0) * sheet.scale
+        ):
             turned = True
             break
         size *= 0.92
@@ -328,17 +389,24 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
     if turned:
         tile = tile.rotate(90, expand=True)
     x, y = sheet.xy(centre)
-    x = float(np.clip(x, sheet.xy((x0, 0))[0] + tile.width / 2, sheet.xy((x1, 0))[0] - tile.width / 2)) if (
-        tile.width < (x1 - x0) * sheet.scale) else sheet.xy(((x0 + x1) / 2, 0))[0]
+    x = (
+        float(np.clip(x, sheet.xy((x0, 0))[0] + tile.width / 2, sheet.xy((x1, 0))[0] - tile.width / 2))
+        if (tile.width < (x1 - x0) * sheet.scale)
+        else sheet.xy(((x0 + x1) / 2, 0))[0]
+    )
     sheet.image.paste(tile, (round(x - tile.width / 2), round(y - tile.height / 2)), tile)
 
 
 def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float, float]:
     """Near the middle, but off furniture where the room leaves a choice."""
-    things = shapely.union_all([
-        shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
-        for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7
-    ] or [shapely.Point(1e6, 1e6)])
+    things = shapely.union_all(
+        [
+            shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
+            for p in house.placements
+            if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7
+        ]
+        or [shapely.Point(1e6, 1e6)]
+    )
     x0, y0, x1, y1 = inside.bounds
     best, least = ((x0 + x1) / 2, (y0 + y1) / 2), math.inf
     for u in np.linspace(0.5, 0.15, 5):
@@ -360,17 +428,23 @@ def _legend(sheet: _Sheet, house: House, titles: bool) -> None:
     base = height - 0.55 * s
     length = 5 if (sheet.high - sheet.low)[0] > 9 else 2
     for k in range(length):
-        sheet.draw.rectangle((0.6 * s + k * s, base, 0.6 * s + (k + 1) * s, base + 0.1 * s),
-                             fill=INK if k % 2 == 0 else PAPER, outline=INK)
+        sheet.draw.rectangle(
+            (0.6 * s + k * s, base, 0.6 * s + (k + 1) * s, base + 0.1 * s),
+            fill=INK if k % 2 == 0 else PAPER,
+            outline=INK,
+        )
     for k in (0, length):
-        sheet.draw.text((0.6 * s + k * s, base - 0.08 * s), f"{k}" + (" m" if k else ""), font=small, fill=INK, anchor="md")
+        sheet.draw.text(
+            (0.6 * s + k * s, base - 0.08 * s), f"{k}" + (" m" if k else ""), font=small, fill=INK, anchor="md"
+        )
     x, y, r = width - 1.0 * s, height - 0.85 * s, 0.5 * s
     d = np.array([math.cos(house.sky.north), -math.sin(house.sky.north)])
     n = np.array([-d[1], d[0]])
     c = np.array([x, y])
     sheet.draw.polygon([tuple(c + r * d), tuple(c - 0.6 * r * d + 0.45 * r * n), tuple(c - 0.3 * r * d)], fill=INK)
-    sheet.draw.polygon([tuple(c + r * d), tuple(c - 0.6 * r * d - 0.45 * r * n), tuple(c - 0.3 * r * d)], outline=INK,
-                       fill=PAPER)
+    sheet.draw.polygon(
+        [tuple(c + r * d), tuple(c - 0.6 * r * d - 0.45 * r * n), tuple(c - 0.3 * r * d)], outline=INK, fill=PAPER
+    )
     sheet.draw.text(tuple(c + 1.35 * r * d), "N", font=small, fill=INK, anchor="mm")
     if titles:
         floor = sum(house.floor(r).area for r in house.rooms)

@@ -222,8 +222,7 @@ class House:
             raise HouseError("house file has no 'schema' field; write it with House.save")
         if (schema := body.pop("schema")) != SCHEMA:
             raise HouseError(
-                f"house file has schema {schema!r}, this version reads {SCHEMA}; "
-                "generate the house again from its seed"
+                f"house file has schema {schema!r}, this version reads {SCHEMA}; generate the house again from its seed"
             )
         house = _read(House, body, "house")
         check(house)
@@ -240,7 +239,9 @@ class House:
         try:
             return House.from_json(Path(path).read_text(encoding="utf-8"))
         except FileNotFoundError as e:
-            raise FileNotFoundError(f"{path} does not exist; make one with `embodied house --seed 7 --out {Path(path).parent}`") from e
+            raise FileNotFoundError(
+                f"{path} does not exist; make one with `embodied house --seed 7 --out {Path(path).parent}`"
+            ) from e
         except UnicodeDecodeError as e:
             raise HouseError(f"{path} is not text in UTF-8 ({e}); write it with House.save") from e
         except HouseError as e:
@@ -262,8 +263,7 @@ def check(house: House) -> None:
         polygon = shapely.Polygon(room.polygon if len(room.polygon) > 2 else ())
         if not polygon.is_valid or polygon.area < 0.5 or not shapely.is_ccw(polygon.exterior):
             raise HouseError(
-                f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, "
-                f"got {room.polygon}"
+                f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, got {room.polygon}"
             )
         polygons[room.id] = polygon
     _check_overlaps(house, polygons)
@@ -274,7 +274,9 @@ def check(house: House) -> None:
         room = house.room_by_id[p.room]
         storey, above = house.storey_of(room), 0.5
         if not storey.elevation - above <= p.position[2] <= storey.elevation + storey.height + above:
-            raise HouseError(f"object {p.id!r} stands at {p.position} below or above its room {p.room!r}; change its height")
+            raise HouseError(
+                f"object {p.id!r} stands at {p.position} below or above its room {p.room!r}; change its height"
+            )
         if polygons[p.room].distance(shapely.Point(p.position[:2])) > house.outer_wall:
             raise HouseError(
                 f"object {p.id!r} stands at {p.position} outside its room {p.room!r}; "
@@ -288,7 +290,9 @@ def _check_numbers(house: House) -> None:
     if not 0 <= house.disorder <= 1:
         raise HouseError(f"disorder should lie between 0 and 1, got {house.disorder}")
     if not 0 < house.inner_wall < 1 or not house.inner_wall <= house.outer_wall < 2:
-        raise HouseError(f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}")
+        raise HouseError(
+            f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}"
+        )
     if house.sky.weather not in WEATHERS or not 0 <= house.sky.hour < 24:
         raise HouseError(f"sky should have a weather of {WEATHERS} and an hour in [0, 24), got {house.sky}")
     numbers = [(p.id, (*p.position, p.yaw, *p.size)) for p in house.placements]
@@ -299,10 +303,14 @@ def _check_numbers(house: House) -> None:
             raise HouseError(f"{name!r} has a number that is not finite: {values}")
     for p in house.placements:
         if not all(0 < s <= LARGEST for s in p.size):
-            raise HouseError(f"object {p.id!r} has the size {p.size}; all three must be positive and at most {LARGEST} m")
+            raise HouseError(
+                f"object {p.id!r} has the size {p.size}; all three must be positive and at most {LARGEST} m"
+            )
     for x in house.lights:
         if x.power < 0 or not all(0 <= c <= 1 for c in x.color):
-            raise HouseError(f"light {x.id!r} should have a power of at least 0 and a colour in [0, 1], got {x.power}, {x.color}")
+            raise HouseError(
+                f"light {x.id!r} should have a power of at least 0 and a colour in [0, 1], got {x.power}, {x.color}"
+            )
 
 
 def _check_ids(house: House) -> None:
@@ -322,16 +330,22 @@ def _check_ids(house: House) -> None:
         if r.kind not in ROOM_KINDS:
             raise HouseError(f"room {r.id!r} has the unknown kind {r.kind!r}; use one of {ROOM_KINDS}")
         if r.accent_wall is not None and not 0 <= r.accent_wall < len(r.polygon):
-            raise HouseError(f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}")
+            raise HouseError(
+                f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}"
+            )
     for x in (*house.placements, *house.lights):
         if x.room not in rooms:
             raise HouseError(f"{x.id!r} names the unknown room {x.room!r}; rooms are {sorted(rooms)}")
     for x in house.lights:
         if x.placement is not None and x.placement not in house.placement_by_id:
-            raise HouseError(f"light {x.id!r} belongs to the unknown object {x.placement!r}; place that lamp or name none")
+            raise HouseError(
+                f"light {x.id!r} belongs to the unknown object {x.placement!r}; place that lamp or name none"
+            )
     for s in house.stairs:
         if not set(s.rooms) <= rooms or len(s.path) < 2 or s.width <= 0 or s.risers < 1:
-            raise HouseError(f"stair {s.id!r} should join two of the rooms {sorted(rooms)} by a path of two points or more, got {s}")
+            raise HouseError(
+                f"stair {s.id!r} should join two of the rooms {sorted(rooms)} by a path of two points or more, got {s}"
+            )
     for p in house.placements:
         if p.parent is not None and p.parent not in house.placement_by_id:
             raise HouseError(f"object {p.id!r} rests on the unknown object {p.parent!r}")
@@ -387,9 +401,13 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
         if line.length < 0.2:
             raise HouseError(f"opening {o.id!r} is {line.length:.2f} m wide; at least 0.2 m is needed")
         if o.head > house.storey_of(first).height + 1e-6:
-            raise HouseError(f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high")
+            raise HouseError(
+                f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high"
+            )
         if o.hinge not in ("a", "b") or not 0 <= o.angle <= math.pi:
-            raise HouseError(f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}")
+            raise HouseError(
+                f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}"
+            )
         if o.rooms[1] is not None:
             if o.rooms[0] == o.rooms[1] or house.room_by_id[o.rooms[1]].storey != first.storey:
                 raise HouseError(f"opening {o.id!r} should join two rooms of one storey, got {o.rooms}")
@@ -398,16 +416,23 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
             continue
         for j in sorted(tree.query(line.buffer(1e-3))):
             other = house.rooms[j]
-            if other.id != first.id and other.storey == first.storey and polygons[other.id].buffer(1e-3).intersection(
-                    line).length > 0.01:
+            if (
+                other.id != first.id
+                and other.storey == first.storey
+                and polygons[other.id].buffer(1e-3).intersection(line).length > 0.01
+            ):
                 raise HouseError(f"{o.kind} {o.id!r} should lead outdoors, behind its wall lies room {other.id!r}")
     near = shapely.STRtree(lines)
     for i, o in enumerate(house.openings):
         for j in sorted(near.query(lines[i].buffer(1e-3))):
             other = house.openings[j]
             same = house.room_by_id[o.rooms[0]].storey == house.room_by_id[other.rooms[0]].storey
-            if j > i and same and lines[i].buffer(1e-3).intersection(lines[j]).length > 0.01 and (
-                    min(o.head, other.head) > max(o.sill, other.sill)):
+            if (
+                j > i
+                and same
+                and lines[i].buffer(1e-3).intersection(lines[j]).length > 0.01
+                and (min(o.head, other.head) > max(o.sill, other.sill))
+            ):
                 raise HouseError(f"openings {o.id!r} and {other.id!r} overlap; move one along the wall")
 
 

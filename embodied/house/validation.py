@@ -34,7 +34,13 @@ def check_known(house: House, catalogue: Catalogue) -> None:
     if house.style not in STYLES:
         raise HouseError(f"the house has the unknown style {house.style!r}; use one of {tuple(STYLES)}")
     for room in house.rooms:
-        for finish in (room.floor_finish, room.wall_finish, room.ceiling_finish, room.skirting_finish, room.accent_finish):
+        for finish in (
+            room.floor_finish,
+            room.wall_finish,
+            room.ceiling_finish,
+            room.skirting_finish,
+            room.accent_finish,
+        ):
             _check_material(f"room {room.id!r}", finish)
     for opening in house.openings:
         _check_material(f"opening {opening.id!r}", opening.leaf_finish)
@@ -50,20 +56,30 @@ def _check_material(owner: str, key: str | None) -> None:
 def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
     asset = catalogue.assets.get(p.asset)
     if asset is None:
-        raise HouseError(f"object {p.id!r} is the unknown asset {p.asset!r}; {_near(p.asset, catalogue.assets)}; "
-                         "`embodied assets list` names them all, --own adds folders of your own")
+        raise HouseError(
+            f"object {p.id!r} is the unknown asset {p.asset!r}; {_near(p.asset, catalogue.assets)}; "
+            "`embodied assets list` names them all, --own adds folders of your own"
+        )
     if p.object_class != asset.object_class:
-        raise HouseError(f"object {p.id!r} is called a {p.object_class!r}, its asset {p.asset!r} is a {asset.object_class!r}")
+        raise HouseError(
+            f"object {p.id!r} is called a {p.object_class!r}, its asset {p.asset!r} is a {asset.object_class!r}"
+        )
     if p.surface is not None:
         names = _surfaces(house, p, catalogue)
         if p.surface not in names:
-            raise HouseError(f"object {p.id!r} lies on the unknown surface {p.surface!r} of {p.parent!r}, which has {names}; "
-                             "name one of these")
+            raise HouseError(
+                f"object {p.id!r} lies on the unknown surface {p.surface!r} of {p.parent!r}, which has {names}; "
+                "name one of these"
+            )
     known = catalogue.parameters(p.asset)
     for name, value in p.params:
         if name not in known:
-            raise HouseError(f"object {p.id!r} has the unknown parameter {name!r}; {p.asset!r} takes {sorted(known) or 'none'}")
-        if isinstance(value, str) != isinstance(known[name], str) or (isinstance(value, float) and not math.isfinite(value)):
+            raise HouseError(
+                f"object {p.id!r} has the unknown parameter {name!r}; {p.asset!r} takes {sorted(known) or 'none'}"
+            )
+        if isinstance(value, str) != isinstance(known[name], str) or (
+            isinstance(value, float) and not math.isfinite(value)
+        ):
             raise HouseError(f"object {p.id!r} has {name}={value!r}; a value like {known[name]!r} is wanted")
         if isinstance(known[name], str) and known[name] in MATERIALS:
             _check_material(f"object {p.id!r}", value)

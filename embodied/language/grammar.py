@@ -65,8 +65,18 @@ def kind_of(clause: Clause) -> str:
         return "past" if clause.side is None else "past_side"
     if isinstance(clause, Enter):
         return "door" if clause.nth else "enter"
-    return {Exit: "exit", Cross: "cross", Forward: "forward", Metres: "metres", To: "to", Avoid: "avoid", Notice: "notice",
-            StopBy: "stop_by", StopIn: "stop_in", StopHere: "stop_here"}[type(clause)]
+    return {
+        Exit: "exit",
+        Cross: "cross",
+        Forward: "forward",
+        Metres: "metres",
+        To: "to",
+        Avoid: "avoid",
+        Notice: "notice",
+        StopBy: "stop_by",
+        StopIn: "stop_in",
+        StopHere: "stop_here",
+    }[type(clause)]
 
 
 _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
@@ -80,17 +90,30 @@ PLAIN = 3.0
 
 # Saying -----------------------------------------------------------------------------------------
 
+
 def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
     """Sentences in the speaker's habits, e.g. 'Leave the bedroom and turn left at once. Stop by the sofa.'"""
     pieces = []
     i, again = 0, _again(phrases)
     while i < len(phrases):
-        pair = tuple(kind_of(p.clause) for p in phrases[i:i + 2])
-        if len(pair) == 2 and pair in _BY_KINDS and rng.random() < speaker.joining and not _misleads(pair, phrases[i + 2:]):
-            pieces.append((_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i:i + 2], again[i:i + 2], speaker, rng), pair))
+        pair = tuple(kind_of(p.clause) for p in phrases[i : i + 2])
+        if (
+            len(pair) == 2
+            and pair in _BY_KINDS
+            and rng.random() < speaker.joining
+            and not _misleads(pair, phrases[i + 2 :])
+        ):
+            pieces.append(
+                (_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i : i + 2], again[i : i + 2], speaker, rng), pair)
+            )
             i += 2
         else:
-            pieces.append((_fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i:i + 1], again[i:i + 1], speaker, rng), pair[:1]))
+            pieces.append(
+                (
+                    _fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i : i + 1], again[i : i + 1], speaker, rng),
+                    pair[:1],
+                )
+            )
             i += 1
     return _slip(_sentences(pieces, speaker, rng), speaker, rng)
 
@@ -105,7 +128,9 @@ def _again(phrases: Sequence[Phrase]) -> list[str]:
     found, here = [], None
     for p in phrases:
         kind = getattr(p.clause, "kind", None)
-        found.append(("next " if kind in PASSAGES else "other ") if kind == here and isinstance(p.clause, Enter) else "")
+        found.append(
+            ("next " if kind in PASSAGES else "other ") if kind == here and isinstance(p.clause, Enter) else ""
+        )
         here = kind if isinstance(p.clause, Enter | Exit | Cross) else here
     return found
 
@@ -116,7 +141,9 @@ def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Genera
     return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
 
 
-def _fill(template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator) -> str:
+def _fill(
+    template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator
+) -> str:
     verbs = VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS
     slots = {
         "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
@@ -146,7 +173,12 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
     current, length, hedged, links = "", 0, False, set()
     for n, (text, kinds) in enumerate(pieces):
         last, before = pieces[n - 1] if n else ("", ())
-        if n and length < speaker.clauses_per_sentence and rng.random() < 0.85 and not _stands_alone(text, kinds, last, before):
+        if (
+            n
+            and length < speaker.clauses_per_sentence
+            and rng.random() < 0.85
+            and not _stands_alone(text, kinds, last, before)
+        ):
             link = _link(speaker, bool(set(before) & ARRIVING), rng)
             link = "then" if link in links else link  # nobody says 'next' twice
             links |= {link} - {"and", "then", ""}
@@ -154,7 +186,9 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
                 current += f", {text}"
             elif link in ("and", "then", "and then"):
                 current += f"{',' if hedged or rng.random() > 0.6 else ''} {link} {text}"
-            elif " " not in link or rng.random() < 0.4:  # 'next', 'after that', 'once there': no comma alone can join with these
+            elif (
+                " " not in link or rng.random() < 0.4
+            ):  # 'next', 'after that', 'once there': no comma alone can join with these
                 sentences.append(current)
                 current, length = f"{link}, {text}", 0
             else:
@@ -199,6 +233,7 @@ def _slip(text: str, speaker: Speaker, rng: np.random.Generator) -> str:
 
 # Reading back -----------------------------------------------------------------------------------
 
+
 def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
     """The clauses that a text means; what no template accounts for is passed over.
 
@@ -212,9 +247,11 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
             rest = rest.partition(" ")[2]
             continue
         clauses += _clauses(heard)
-        rest = rest[heard.length:].lstrip()
+        rest = rest[heard.length :].lstrip()
     if not clauses:
-        raise ValueError(f"no part of {text!r} is a route instruction; expected words such as 'turn left and go to the sofa'")
+        raise ValueError(
+            f"no part of {text!r} is a route instruction; expected words such as 'turn left and go to the sofa'"
+        )
     return RouteInstruction(tuple(clauses))
 
 
@@ -230,7 +267,9 @@ def normalised(text: str) -> str:
 
 
 _JOINING = (*FILLERS.values(), *LINKS.values(), *ARRIVED_LINKS.values())
-_EMPTY = sorted({h.lower() for h in HEDGES} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s))
+_EMPTY = sorted(
+    {h.lower() for h in HEDGES} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s)
+)
 
 
 @dataclass(frozen=True)
@@ -273,7 +312,7 @@ def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _Heard | None:
         return None
     if pattern.after is None:
         return _Heard(pattern.template, start.end(), start.groupdict(), None)
-    for words, thing in lexicon.things_at(text[start.end():]):
+    for words, thing in lexicon.things_at(text[start.end() :]):
         end = pattern.after.match(text, start.end() + len(words))
         if end is not None:
             return _Heard(pattern.template, end.end(), start.groupdict() | end.groupdict(), thing)
@@ -284,9 +323,16 @@ def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _Heard | None:
 def _patterns() -> tuple[_Pattern, ...]:
     """Every template as patterns."""
     rooms, again = _any(ROOM_OF_NOUN), "(?:next |other )?"
-    slots = {"side": "(?P<side>left|right)", "room": f"{again}(?P<room>{rooms})", "other": f"{again}(?P<other>{rooms})",
-             "metres": rf"(?P<n>\d+|{_any(NUMBERS)}) meters?", "steps": rf"(?P<n>\d+|{_any(NUMBERS)}) big steps?",
-             "nth": f"(?P<nth>{_any(ORDINALS)})", "walk": f"(?:{_any(VERBS + PLAYFUL)})", "soon": f"(?:{_any(SOON)})"}
+    slots = {
+        "side": "(?P<side>left|right)",
+        "room": f"{again}(?P<room>{rooms})",
+        "other": f"{again}(?P<other>{rooms})",
+        "metres": rf"(?P<n>\d+|{_any(NUMBERS)}) meters?",
+        "steps": rf"(?P<n>\d+|{_any(NUMBERS)}) big steps?",
+        "nth": f"(?P<nth>{_any(ORDINALS)})",
+        "walk": f"(?:{_any(VERBS + PLAYFUL)})",
+        "soon": f"(?:{_any(SOON)})",
+    }
     found = []
     for t in TEMPLATES:
         text = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
@@ -295,8 +341,14 @@ def _patterns() -> tuple[_Pattern, ...]:
         before, thing, after = text.partition("{thing}")
         first = t.text.split(" ", 1)[0].lower()
         whole = r"(?![\w-])"
-        found.append(_Pattern(t, "" if first.startswith("{") else first, re.compile(before + ("the " if thing else whole)),
-                              re.compile(after + whole) if thing else None))
+        found.append(
+            _Pattern(
+                t,
+                "" if first.startswith("{") else first,
+                re.compile(before + ("the " if thing else whole)),
+                re.compile(after + whole) if thing else None,
+            )
+        )
     return tuple(found)
 
 
@@ -311,11 +363,22 @@ def _clauses(heard: _Heard) -> list[Clause]:
     count = said.get("n")
     number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
     make = {
-        "turn": lambda: Turn(side), "slight": lambda: Turn(side, 45), "around": lambda: Turn(LEFT, 180),
-        "exit": lambda: Exit(next(rooms)), "enter": lambda: Enter(next(rooms)), "cross": lambda: Cross(next(rooms)),
+        "turn": lambda: Turn(side),
+        "slight": lambda: Turn(side, 45),
+        "around": lambda: Turn(LEFT, 180),
+        "exit": lambda: Exit(next(rooms)),
+        "enter": lambda: Enter(next(rooms)),
+        "cross": lambda: Cross(next(rooms)),
         "door": lambda: Enter(next(rooms), side, ORDINALS.index(said["nth"])),
-        "forward": Forward, "metres": lambda: Metres(number), "to": lambda: To(thing), "past": lambda: Past(thing),
-        "past_side": lambda: Past(thing, side), "avoid": lambda: Avoid(next(rooms)), "notice": lambda: Notice(thing), "stop_by": lambda: StopBy(thing),
-        "stop_in": lambda: StopIn(next(rooms)), "stop_here": StopHere,
+        "forward": Forward,
+        "metres": lambda: Metres(number),
+        "to": lambda: To(thing),
+        "past": lambda: Past(thing),
+        "past_side": lambda: Past(thing, side),
+        "avoid": lambda: Avoid(next(rooms)),
+        "notice": lambda: Notice(thing),
+        "stop_by": lambda: StopBy(thing),
+        "stop_in": lambda: StopIn(next(rooms)),
+        "stop_here": StopHere,
     }
     return [make[kind]() for kind in heard.template.kinds]

@@ -49,11 +49,29 @@ PASSAGES = frozenset({"corridor", "hall", "stairwell"})
 """Kinds of room that one is in only to go elsewhere."""
 MOST_WORDS = 8
 """Longest wording of a thing: three adjectives of up to two words, then a noun."""
-UNFIT = frozenset({
-    "person", "wall socket", "double socket", "network socket", "aerial socket", "light switch", "double light switch",
-    "dimmer switch", "smoke detector", "ceiling lamp", "strip light", "spotlight", "track light", "fluorescent lamp",
-    "security camera", "thermometer", "toilet paper holder", "keys", "cap",
-})
+UNFIT = frozenset(
+    {
+        "person",
+        "wall socket",
+        "double socket",
+        "network socket",
+        "aerial socket",
+        "light switch",
+        "double light switch",
+        "dimmer switch",
+        "smoke detector",
+        "ceiling lamp",
+        "strip light",
+        "spotlight",
+        "track light",
+        "fluorescent lamp",
+        "security camera",
+        "thermometer",
+        "toilet paper holder",
+        "keys",
+        "cap",
+    }
+)
 """Classes that nobody would steer by."""
 
 
@@ -61,7 +79,9 @@ EMPTY = frozenset({*PRAISE, *SEAT_PRAISE, *BODY_PRAISE, *SIZES})
 """Adjectives that a listener passes over."""
 
 
-SEATS = frozenset({"sofa", "armchair", "chair", "bed", "bench", "stool", "ottoman", "pouf", "futon", "loveseat", "recliner", "chaise"})
+SEATS = frozenset(
+    {"sofa", "armchair", "chair", "bed", "bench", "stool", "ottoman", "pouf", "futon", "loveseat", "recliner", "chaise"}
+)
 """Words in the names of classes that one sits or lies on."""
 
 
@@ -167,7 +187,14 @@ class Lexicon:
         """Tokens as adjectives, the longest first ('dark brown', 'wood'); None if they are none."""
         words = []
         while tokens:
-            n = next((n for n in range(len(tokens), 0, -1) if " ".join(tokens[:n]) in self.adjectives or " ".join(tokens[:n]) in EMPTY), None)
+            n = next(
+                (
+                    n
+                    for n in range(len(tokens), 0, -1)
+                    if " ".join(tokens[:n]) in self.adjectives or " ".join(tokens[:n]) in EMPTY
+                ),
+                None,
+            )
             if n is None:
                 return None
             words.append(" ".join(tokens[:n]))

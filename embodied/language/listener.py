@@ -102,7 +102,9 @@ def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
     return tuple(kept)
 
 
-def _onward(eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing: float, k: int, begun: int, pending: float):
+def _onward(
+    eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing: float, k: int, begun: int, pending: float
+):
     """All ways to go on: finish this clause, or take a step within it.
 
     `begun` is the index in `path` where clause k began, `pending` the turn (radians) that was asked
@@ -118,7 +120,14 @@ def _onward(eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing
         return
     steps = len(path) - 1 - begun
     if steps:
-        yield walk_cost(clause, eyes, path[begun:]) + count_cost(clause, eyes, path), path, facing, k + 1, len(path) - 1, 0.0
+        yield (
+            walk_cost(clause, eyes, path[begun:]) + count_cost(clause, eyes, path),
+            path,
+            facing,
+            k + 1,
+            len(path) - 1,
+            0.0,
+        )
     elif isinstance(clause, To | Past):
         yield 0.8 + walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, pending
     if steps < LONGEST:
@@ -147,7 +156,11 @@ def walk_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
     if isinstance(clause, Exit):
         return MISSING * (first.kind != clause.kind) + MISSING * (not any(crossings)) + 1.0 * (sum(crossings) > 1)
     if isinstance(clause, Enter):
-        return MISSING * (last.kind != clause.kind) + MISSING * (not (crossings and crossings[-1])) + 0.8 * (sum(crossings) > 1)
+        return (
+            MISSING * (last.kind != clause.kind)
+            + MISSING * (not (crossings and crossings[-1]))
+            + 0.8 * (sum(crossings) > 1)
+        )
     if isinstance(clause, Cross):
         kinds = [eyes.at(n).kind for n in path]
         return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])
@@ -223,5 +236,3 @@ class _Led(Eyes):
         seen = super().at(node)
         onward = self._next.get(node)
         return dataclasses.replace(seen, ways=tuple(w for w in seen.ways if w.node == onward))
-
-

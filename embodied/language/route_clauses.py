@@ -42,9 +42,30 @@ if TYPE_CHECKING:
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""
-PRIVATE = frozenset({"bedroom", "main_bedroom", "kids_room", "guest_room", "bathroom", "toilet", "closet", "study", "laundry_room",
-                     "pantry", "garage", "gym", "library", "playroom", "workshop", "kitchen", "dining_room", "sun_room", "living_room",
-                     "family_room"})
+PRIVATE = frozenset(
+    {
+        "bedroom",
+        "main_bedroom",
+        "kids_room",
+        "guest_room",
+        "bathroom",
+        "toilet",
+        "closet",
+        "study",
+        "laundry_room",
+        "pantry",
+        "garage",
+        "gym",
+        "library",
+        "playroom",
+        "workshop",
+        "kitchen",
+        "dining_room",
+        "sun_room",
+        "living_room",
+        "family_room",
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -113,7 +134,9 @@ def plan(world: World, path: Sequence[int], yaw: float, speaker: Speaker, *, rng
         phrases.append(remark)
     if rng.random() < speaker.avoids and (wrong := _wrong_room(eyes, path, kind)):
         phrases.append(Phrase(Avoid(wrong)))
-    phrases.append(_stop(eyes, lexicon, path, kind(path[-1]), legs[-1].crosses if legs else False, phrases, speaker, used, rng))
+    phrases.append(
+        _stop(eyes, lexicon, path, kind(path[-1]), legs[-1].crosses if legs else False, phrases, speaker, used, rng)
+    )
     return phrases
 
 
@@ -138,7 +161,9 @@ _DROPPABLE = (
     lambda c, after: isinstance(c, Turn) and c.angle == 45,
     lambda c, after: isinstance(c, Forward | Metres),
     lambda c, after: isinstance(c, Cross),
-    lambda c, after: isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To) and not getattr(after, "nth", 0),
+    lambda c, after: (
+        isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To) and not getattr(after, "nth", 0)
+    ),
     lambda c, after: isinstance(c, Past),
     lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not c.nth and not isinstance(after, STOPS),
     lambda c, after: isinstance(c, To) and not isinstance(after, STOPS),
@@ -155,8 +180,17 @@ def _turn(angle: float) -> list[Phrase]:
     return [Phrase(Turn(side, 45))] if abs(angle) >= SLIGHT else []
 
 
-def _crossing(eyes: Eyes, lexicon: Lexicon, leg: Leg, here: str, there: str, first: bool, speaker: Speaker, used: set[str],
-              rng: np.random.Generator) -> list[Phrase]:
+def _crossing(
+    eyes: Eyes,
+    lexicon: Lexicon,
+    leg: Leg,
+    here: str,
+    there: str,
+    first: bool,
+    speaker: Speaker,
+    used: set[str],
+    rng: np.random.Generator,
+) -> list[Phrase]:
     """Out of one room into another, perhaps past something on the way to the door."""
     phrases = []
     if len(leg.nodes) > 2 and rng.random() < 0.6 * speaker.landmarks:
@@ -175,16 +209,24 @@ def _counted(eyes: Eyes, walked: Sequence[int], crossing: list[Phrase]) -> list[
     return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
 
 
-def _mark(eyes: Eyes, lexicon: Lexicon, leg: Leg, speaker: Speaker, used: set[str], rng: np.random.Generator, *, needed: bool) -> Phrase | None:
+def _mark(
+    eyes: Eyes, lexicon: Lexicon, leg: Leg, speaker: Speaker, used: set[str], rng: np.random.Generator, *, needed: bool
+) -> Phrase | None:
     """Something to walk to, or past, on a leg within one room."""
     if not needed and rng.random() >= speaker.landmarks:
         return None
     start, end = eyes.at(leg.nodes[0]), eyes.at(leg.nodes[-1])
     at_start = {t.placement: t for t in start.things}
     heading = next(w.yaw for w in start.ways if w.node == leg.nodes[1])
-    good = [t for t in end.things if t.distance <= NEAR and t.placement in at_start and t.placement not in used
-            and abs(float(wrap(at_start[t.placement].yaw - heading))) < math.radians(50)
-            and at_start[t.placement].distance > t.distance + 0.4]
+    good = [
+        t
+        for t in end.things
+        if t.distance <= NEAR
+        and t.placement in at_start
+        and t.placement not in used
+        and abs(float(wrap(at_start[t.placement].yaw - heading))) < math.radians(50)
+        and at_start[t.placement].distance > t.distance + 0.4
+    ]
     for thing in _ranked(good, rng):
         if (word := _name(thing, start, lexicon, speaker, rng)) is not None:
             used.add(thing.placement)
@@ -193,7 +235,9 @@ def _mark(eyes: Eyes, lexicon: Lexicon, leg: Leg, speaker: Speaker, used: set[st
     return passing[0] if passing else None
 
 
-def _passing(eyes: Eyes, lexicon: Lexicon, nodes: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator) -> list[Phrase]:
+def _passing(
+    eyes: Eyes, lexicon: Lexicon, nodes: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator
+) -> list[Phrase]:
     """Something beside the way, with its side where that is clear."""
     found: dict[str, tuple[SeenThing, str, Seen]] = {}
     for a, b in itertools.pairwise(nodes):
@@ -201,7 +245,11 @@ def _passing(eyes: Eyes, lexicon: Lexicon, nodes: Sequence[int], speaker: Speake
         ahead = next(w.yaw for w in eyes.at(a).ways if w.node == b)
         for t in seen.things:
             bearing = float(wrap(t.yaw - ahead))
-            if t.distance <= BESIDE - 0.4 and math.radians(40) < abs(bearing) < math.radians(150) and t.placement not in used:
+            if (
+                t.distance <= BESIDE - 0.4
+                and math.radians(40) < abs(bearing) < math.radians(150)
+                and t.placement not in used
+            ):
                 found.setdefault(t.placement, (t, LEFT if bearing > 0 else RIGHT, eyes.at(a)))
     for thing in _ranked([t for t, _, _ in found.values()], rng):
         _, side, before = found[thing.placement]
@@ -213,12 +261,23 @@ def _passing(eyes: Eyes, lexicon: Lexicon, nodes: Sequence[int], speaker: Speake
     return []
 
 
-def _stop(eyes: Eyes, lexicon: Lexicon, path: Sequence[int], room: str, crossed: bool, phrases: Sequence[Phrase], speaker: Speaker,
-          used: set[str], rng: np.random.Generator) -> Phrase:
+def _stop(
+    eyes: Eyes,
+    lexicon: Lexicon,
+    path: Sequence[int],
+    room: str,
+    crossed: bool,
+    phrases: Sequence[Phrase],
+    speaker: Speaker,
+    used: set[str],
+    rng: np.random.Generator,
+) -> Phrase:
     """Where to stop: by something near the end that can be seen before, else in the room, else here."""
     if phrases and isinstance(phrases[-1].clause, To) and rng.random() < 0.7:
         return Phrase(StopHere())
-    crossed = crossed and not (phrases and isinstance(phrases[-1].clause, Enter))  # 'enter the hall and stop in the hall'
+    crossed = crossed and not (
+        phrases and isinstance(phrases[-1].clause, Enter)
+    )  # 'enter the hall and stop in the hall'
     end = eyes.at(path[-1])
     before = {t.placement for n in path[-3:-1] for t in eyes.at(n).things}
     near = [t for t in end.things if t.distance <= NEAR]
@@ -240,7 +299,11 @@ def _name(thing: SeenThing, view: Seen, lexicon: Lexicon, speaker: Speaker, rng:
         word = lexicon.words_for(thing.asset, rng, adjectives=adjectives, ornament=speaker.ornament)
         if not says(thing.asset, meant := lexicon.thing(word)):
             continue
-        others = [t for t in view.things if t.placement != thing.placement and says(t.asset, meant) and t.asset.key != thing.asset.key]
+        others = [
+            t
+            for t in view.things
+            if t.placement != thing.placement and says(t.asset, meant) and t.asset.key != thing.asset.key
+        ]
         if not others:
             return word
     return None
@@ -248,16 +311,23 @@ def _name(thing: SeenThing, view: Seen, lexicon: Lexicon, speaker: Speaker, rng:
 
 def _ranked(things: Sequence[SeenThing], rng: np.random.Generator) -> list[SeenThing]:
     """Things in the order somebody would think of them: large ones mostly first."""
-    weights = {t.placement: math.log(t.pixels + 1) * (1 + 1.2 * float(rng.random())) for t in sorted(things, key=lambda t: t.placement)}
+    weights = {
+        t.placement: math.log(t.pixels + 1) * (1 + 1.2 * float(rng.random()))
+        for t in sorted(things, key=lambda t: t.placement)
+    }
     return sorted(things, key=lambda t: (-weights[t.placement], t.placement))
 
 
-def _remark(eyes: Eyes, lexicon: Lexicon, path: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator) -> Phrase | None:
+def _remark(
+    eyes: Eyes, lexicon: Lexicon, path: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator
+) -> Phrase | None:
     """Any thing in view near the end, large or small."""
     things = [t for t in eyes.at(path[-1 - int(rng.integers(2))]).things if t.placement not in used]
     if not things:
         return None
-    word = lexicon.words_for(things[int(rng.integers(len(things)))].asset, rng, adjectives=int(rng.integers(2)), ornament=speaker.ornament)
+    word = lexicon.words_for(
+        things[int(rng.integers(len(things)))].asset, rng, adjectives=int(rng.integers(2)), ornament=speaker.ornament
+    )
     return Phrase(Notice(lexicon.thing(word)), word)
 
 

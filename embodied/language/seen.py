@@ -100,25 +100,45 @@ def look(world: World, node: int) -> Seen:
     """What is seen from `node`, the largest things first."""
     graph, house, assets = world.graph, world.house, world.catalogue.assets
     things = tuple(
-        SeenThing(s.placement, assets[house.placement_by_id[s.placement].asset], s.yaw, s.distance * math.cos(s.pitch), s.pixels)
-        for s in world.sightings(node) if s.pixels >= SMALLEST and s.object_class not in UNFIT
+        SeenThing(
+            s.placement,
+            assets[house.placement_by_id[s.placement].asset],
+            s.yaw,
+            s.distance * math.cos(s.pitch),
+            s.pixels,
+        )
+        for s in world.sightings(node)
+        if s.pixels >= SMALLEST and s.object_class not in UNFIT
     )
     here, room = np.asarray(graph.positions[node]), graph.room_of_node[node]
     ways, doors = [], _doors(world, room)
     for n in graph.neighbours(node):
         step = np.asarray(graph.positions[n]) - here
         other = graph.room_of_node[n]
-        between = [(float(np.hypot(*(at - here[:2] - step[:2] / 2))), name) for name, beyond, at in doors if beyond == other]
-        ways.append(Way(int(n), math.atan2(step[1], step[0]), float(np.hypot(step[0], step[1])), house.room_by_id[other].kind,
-                        other != room, min(between)[1] if between else None))
+        between = [
+            (float(np.hypot(*(at - here[:2] - step[:2] / 2))), name) for name, beyond, at in doors if beyond == other
+        ]
+        ways.append(
+            Way(
+                int(n),
+                math.atan2(step[1], step[0]),
+                float(np.hypot(step[0], step[1])),
+                house.room_by_id[other].kind,
+                other != room,
+                min(between)[1] if between else None,
+            )
+        )
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)
     return Seen(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
 
 
 def _doors(world: World, room: str) -> list[tuple[str, str, np.ndarray]]:
     """(id, room beyond, middle in x and y) of the doorways of a room that lead to another."""
-    return [(o.id, o.rooms[0] if o.rooms[1] == room else o.rooms[1], (np.asarray(o.a) + np.asarray(o.b)) / 2)
-            for o in world.house.openings if o.kind == "door" and room in o.rooms and None not in o.rooms]
+    return [
+        (o.id, o.rooms[0] if o.rooms[1] == room else o.rooms[1], (np.asarray(o.a) + np.asarray(o.b)) / 2)
+        for o in world.house.openings
+        if o.kind == "door" and room in o.rooms and None not in o.rooms
+    ]
 
 
 def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
@@ -130,7 +150,7 @@ def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
     if not steps or None in steps or steps[-1].door is None:
         return None
     first = max((i + 1 for i, s in enumerate(steps[:-1]) if s.leaves), default=0)
-    along = steps[first:-1] or steps[first - 1:first]
+    along = steps[first:-1] or steps[first - 1 : first]
     if not along:
         return None
     x, y = (sum(s.length * f(s.yaw) for s in along) for f in (math.cos, math.sin))
@@ -139,7 +159,10 @@ def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
         return None
     sides: dict[str, list[tuple[float, str]]] = {LEFT: [], RIGHT: []}
     for door in eyes.at(path[first]).doors:
-        ahead, across = (door.offset[0] * x + door.offset[1] * y) / size, (door.offset[1] * x - door.offset[0] * y) / size
+        ahead, across = (
+            (door.offset[0] * x + door.offset[1] * y) / size,
+            (door.offset[1] * x - door.offset[0] * y) / size,
+        )
         if ahead > 0.3 and abs(across) > 0.3:
             sides[LEFT if across > 0 else RIGHT].append((ahead, door.id))
     for side, found in sides.items():

@@ -42,9 +42,43 @@ class Speaker:
 
 SPEAKERS: tuple[tuple[float, Speaker], ...] = (
     (0.28, Speaker("", clauses=3, clauses_per_sentence=3)),
-    (0.16, Speaker("terse", clauses=3, remarks=0.05, landmarks=0.75, colours=0.15, joining=0.5, clauses_per_sentence=3, openings=0.0, hedges=0.0, plainness=0.9)),
-    (0.18, Speaker("chatty", clauses=4, landmarks=0.9, ornament=0.35, remarks=0.2, colours=0.45, avoids=0.15, openings=0.45, hedges=0.12, slips=0.03, plainness=0.5)),
-    (0.12, Speaker("formal", clauses=3, landmarks=0.7, metres=0.6, openings=0.25, hedges=0.0, slips=0.0, clauses_per_sentence=2)),
+    (
+        0.16,
+        Speaker(
+            "terse",
+            clauses=3,
+            remarks=0.05,
+            landmarks=0.75,
+            colours=0.15,
+            joining=0.5,
+            clauses_per_sentence=3,
+            openings=0.0,
+            hedges=0.0,
+            plainness=0.9,
+        ),
+    ),
+    (
+        0.18,
+        Speaker(
+            "chatty",
+            clauses=4,
+            landmarks=0.9,
+            ornament=0.35,
+            remarks=0.2,
+            colours=0.45,
+            avoids=0.15,
+            openings=0.45,
+            hedges=0.12,
+            slips=0.03,
+            plainness=0.5,
+        ),
+    ),
+    (
+        0.12,
+        Speaker(
+            "formal", clauses=3, landmarks=0.7, metres=0.6, openings=0.25, hedges=0.0, slips=0.0, clauses_per_sentence=2
+        ),
+    ),
     (0.16, Speaker("", landmarks=1.0, remarks=0.2, colours=0.6, joining=0.3, avoids=0.08)),
     (0.10, Speaker("", clauses=3, landmarks=0.45, metres=0.7, counts=0.7, joining=0.55, clauses_per_sentence=2)),
 )

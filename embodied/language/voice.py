@@ -50,7 +50,7 @@ class People:
         """
         speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
         wanted = max(round(rng.normal(speaker.clauses - 1, 1.0)), 2)
-        for more in GROWTH[:self.tries]:
+        for more in GROWTH[: self.tries]:
             phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + more)
             text = say(phrases, speaker, rng=rng)
             if self.tries == 1:

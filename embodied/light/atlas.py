@@ -92,8 +92,13 @@ class Texels:
 
 
 def things_of(
-    parts: Sequence, *, density: float, budget: float, cache: Path, finest: int = 8,
-    progress: Callable[[int, int], None] = lambda i, n: None
+    parts: Sequence,
+    *,
+    density: float,
+    budget: float,
+    cache: Path,
+    finest: int = 8,
+    progress: Callable[[int, int], None] = lambda i, n: None,
 ) -> tuple[Thing, ...]:
     """Group parts by owner and unwrap each; furniture from the cache.
 
@@ -117,7 +122,9 @@ def things_of(
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            things.append(Thing(owner, room, kind, flat, finishes, min(finest, _fineness(kind, flat, finishes, density)), glass))
+            things.append(
+                Thing(owner, room, kind, flat, finishes, min(finest, _fineness(kind, flat, finishes, density)), glass)
+            )
     return tuple(things)
 
 
@@ -161,7 +168,9 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000)
             tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in mine)))
             inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(mine, places)]
             if not any(inside):
-                raise ValueError(f"{mine[0].owner!r} needs an atlas of {mine[0].flat.size} luxels, over {limit}; lower the density")
+                raise ValueError(
+                    f"{mine[0].owner!r} needs an atlas of {mine[0].flat.size} luxels, over {limit}; lower the density"
+                )
             pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
             mine = [t for t, ok in zip(mine, inside) if not ok]
     return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
@@ -172,8 +181,23 @@ def _sheet(sizes: np.ndarray, places: np.ndarray) -> int:
     return int((places + sizes).max(0).prod())
 
 
-OFFSETS = ((0.0, 0.0), (-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0),
-           (0.45, 0.45), (-0.45, -0.45), (0.45, -0.45), (-0.45, 0.45), (0.15, -0.15), (-0.15, 0.15))
+OFFSETS = (
+    (0.0, 0.0),
+    (-0.3, -0.3),
+    (0.3, 0.3),
+    (-0.3, 0.3),
+    (0.3, -0.3),
+    (0.0, 0.47),
+    (0.0, -0.47),
+    (0.47, 0.0),
+    (-0.47, 0.0),
+    (0.45, 0.45),
+    (-0.45, -0.45),
+    (0.45, -0.45),
+    (-0.45, 0.45),
+    (0.15, -0.15),
+    (-0.15, 0.15),
+)
 """Where in a texel a face is looked for, one after the other: slivers that miss all centres still get texels of their own."""
 
 
@@ -209,7 +233,9 @@ def _straight_down(scene, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
 
 def nearest(mask: np.ndarray) -> np.ndarray:
     """(h, w) int64: flat position of the nearest true pixel of a mask that has any."""
-    _, labels = cv2.distanceTransformWithLabels((~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    _, labels = cv2.distanceTransformWithLabels(
+        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
     at = np.zeros(int(labels.max()) + 1, np.int64)
     flat = np.nonzero(mask.ravel())[0]
     at[labels.ravel()[flat]] = flat
@@ -219,7 +245,9 @@ def nearest(mask: np.ndarray) -> np.ndarray:
 def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:
     """Barycentric mean of per-corner values (m, 3, c) at n points: (n, c) float32."""
     values = corners[face]
-    return (weights[:, :1] * values[:, 0] + weights[:, 1:2] * values[:, 1] + weights[:, 2:] * values[:, 2]).astype(np.float32)
+    return (weights[:, :1] * values[:, 0] + weights[:, 1:2] * values[:, 1] + weights[:, 2:] * values[:, 2]).astype(
+        np.float32
+    )
 
 
 def albedo(page: Page, texels: Texels, read: Callable[[str], np.ndarray]) -> np.ndarray:
@@ -310,8 +338,18 @@ def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: boo
     width = max(int(x + t.flat.size[0]) for t, (x, _) in zip(things, places))
     height = max(int(y + t.flat.size[1]) for t, (_, y) in zip(things, places))
     return Page(
-        width, height, fineness, glass, join("corners"), join("normals"), np.concatenate(luxels), join("uv"),
-        join("thin"), np.concatenate(which), tuple(finishes), np.concatenate(owner),
+        width,
+        height,
+        fineness,
+        glass,
+        join("corners"),
+        join("normals"),
+        np.concatenate(luxels),
+        join("uv"),
+        join("thin"),
+        np.concatenate(which),
+        tuple(finishes),
+        np.concatenate(owner),
     )
 
 

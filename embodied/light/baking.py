@@ -67,7 +67,17 @@ class Bake:
         pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
         with np.load(self.folder / "meshes.npz", allow_pickle=False) as z:
             meshes = tuple(
-                LitMesh(m["owner"], m["kind"], m["room"], m["page"], z[f"v{i}"], z[f"f{i}"], z[f"t{i}"], m["alpha"], m["gloss"])
+                LitMesh(
+                    m["owner"],
+                    m["kind"],
+                    m["room"],
+                    m["page"],
+                    z[f"v{i}"],
+                    z[f"f{i}"],
+                    z[f"t{i}"],
+                    m["alpha"],
+                    m["gloss"],
+                )
                 for i, m in enumerate(self.manifest["meshes"])
             )
         return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
@@ -91,15 +101,23 @@ class Bake:
         return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
 
-STAGES = {"unwrapping": (0.0, 0.2), "direct light": (0.2, 0.4), "bounces": (0.4, 0.65), "smoothing": (0.65, 0.75),
-          "pages": (0.75, 1.0), "done": (1.0, 1.0)}
+STAGES = {
+    "unwrapping": (0.0, 0.2),
+    "direct light": (0.2, 0.4),
+    "bounces": (0.4, 0.65),
+    "smoothing": (0.65, 0.75),
+    "pages": (0.75, 1.0),
+    "done": (1.0, 1.0),
+}
 """Where each stage lies on the progress bar: its rough share of a bake's time."""
 
 
 @contextlib.contextmanager
 def progress_bar() -> Iterator[Progress]:
     """A bar on stderr for `bake`; silent where stderr is no terminal."""
-    with tqdm(total=100, desc="light", unit="%", disable=None, bar_format="{desc:<20}{percentage:3.0f}%|{bar}| {elapsed}") as bar:
+    with tqdm(
+        total=100, desc="light", unit="%", disable=None, bar_format="{desc:<20}{percentage:3.0f}%|{bar}| {elapsed}"
+    ) as bar:
 
         def tell(stage: str, done: float) -> None:
             start, end = STAGES[stage]
@@ -111,7 +129,9 @@ def progress_bar() -> Iterator[Progress]:
 
 def key_of(house: House, catalogue, settings: Settings) -> str:
     """What a bake is filed under: another catalogue, model or material makes another bake."""
-    return digest("light", VERSION, house.digest, looks_of(house_parts(house, catalogue)), dataclasses.asdict(settings))[:24]
+    return digest(
+        "light", VERSION, house.digest, looks_of(house_parts(house, catalogue)), dataclasses.asdict(settings)
+    )[:24]
 
 
 def looks_of(parts: Sequence[Part]) -> str:
@@ -120,13 +140,24 @@ def looks_of(parts: Sequence[Part]) -> str:
     meshes: dict[int, str] = {}
     for mesh in (p.mesh for p in parts):
         if id(mesh) not in meshes:
-            finish = dataclasses.replace(mesh.finish, texture=maps.get(mesh.finish.texture), normal_map=None, roughness_map=None)
-            meshes[id(mesh)] = digest(*(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)), repr(finish))
+            finish = dataclasses.replace(
+                mesh.finish, texture=maps.get(mesh.finish.texture), normal_map=None, roughness_map=None
+            )
+            meshes[id(mesh)] = digest(
+                *(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)),
+                repr(finish),
+            )
     return digest([meshes[id(p.mesh)] for p in parts])
 
 
-def bake(house: House, catalogue, cache: Path, settings: Settings | str = "normal", *,
-         progress: Progress = lambda stage, done: None) -> Bake:
+def bake(
+    house: House,
+    catalogue,
+    cache: Path,
+    settings: Settings | str = "normal",
+    *,
+    progress: Progress = lambda stage, done: None,
+) -> Bake:
     """Light `house`, or open the bake that is already there.
 
     Args:
@@ -156,7 +187,9 @@ def open_bake(folder: Path, house: House) -> Bake:
     except (OSError, ValueError, KeyError, TypeError) as e:
         raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
     if manifest.get("version") != VERSION:
-        raise StaleBake(f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; run `embodied light` again")
+        raise StaleBake(
+            f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; run `embodied light` again"
+        )
     if manifest.get("house") != house.digest:
         raise StaleBake(
             f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: it was edited "
@@ -195,17 +228,30 @@ def _drop_damaged(folder: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder: Path | None = None, *,
-                read: Callable[[str], np.ndarray] | None = None, progress: Progress = lambda s, d: None,
-                took: dict[str, float] | None = None) -> Solved:
+def solve_house(
+    house: House,
+    catalogue,
+    cache: Path,
+    settings: Settings,
+    folder: Path | None = None,
+    *,
+    read: Callable[[str], np.ndarray] | None = None,
+    progress: Progress = lambda s, d: None,
+    took: dict[str, float] | None = None,
+) -> Solved:
     """Everything up to the light of every luxel; stages are kept in `folder` where one is given."""
     took = {} if took is None else took
     read = read or _reader()
     clock = _Clock(took)
     parts = tuple(p for p in house_parts(house, catalogue) if p.kind != "outdoor" and len(p.mesh.faces))
     clock("parts")
-    things = things_of(parts, density=settings.density, budget=settings.budget, cache=Path(cache) / "light",
-                       progress=lambda i, n: progress("unwrapping", i / n))
+    things = things_of(
+        parts,
+        density=settings.density,
+        budget=settings.budget,
+        cache=Path(cache) / "light",
+        progress=lambda i, n: progress("unwrapping", i / n),
+    )
     clock("unwrap")
     atlas = atlas_of(coarsened(things, settings.texels))
     if folder is not None:
@@ -220,7 +266,9 @@ def solve_house(house: House, catalogue, cache: Path, settings: Settings, folder
     stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))
     light = solve(house, atlas, lux, outdoors, lamps, settings, stage, progress)
     clock("smooth")
-    exposure = expose(house, _light_of_rooms(house, atlas, lux, light), np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0))
+    exposure = expose(
+        house, _light_of_rooms(house, atlas, lux, light), np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
+    )
     return Solved(house, atlas, lux, light, outdoors, lamps, exposure)
 
 
@@ -245,8 +293,15 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
             one = page_of(i, s, space, settings, read)
             _write_page(folder, i, one, settings.jpeg)
     clock("pages")
-    outer, outer_pages, dome = surroundings(house, [p for p in house_parts(house, catalogue) if p.kind == "outdoor" and len(p.mesh.faces)],
-                                            s.atlas, s.outdoors, s.exposure, cache / "light", read)
+    outer, outer_pages, dome = surroundings(
+        house,
+        [p for p in house_parts(house, catalogue) if p.kind == "outdoor" and len(p.mesh.faces)],
+        s.atlas,
+        s.outdoors,
+        s.exposure,
+        cache / "light",
+        read,
+    )
     first = len(s.atlas.pages)
     for i, picture in enumerate([*outer_pages, dome], first):
         _write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
@@ -258,27 +313,52 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
     meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
     with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, **{f"{k}{i}": a for i, m in enumerate(meshes)
-                                  for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))},
-                            **{f"g{i}": g for i, g in enumerate(gloss)})
+        np.savez_compressed(
+            f,
+            **{f"{k}{i}": a for i, m in enumerate(meshes) for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))},
+            **{f"g{i}": g for i, g in enumerate(gloss)},
+        )
     with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, **{f"{k}{i}": np.asarray(getattr(x, k)) for i, x in enumerate(s.lamps)
-                                  for k in ("points", "normals", "radiance", "area", "weights")})
+        np.savez_compressed(
+            f,
+            **{
+                f"{k}{i}": np.asarray(getattr(x, k))
+                for i, x in enumerate(s.lamps)
+                for k in ("points", "normals", "radiance", "area", "weights")
+            },
+        )
     clock("meshes")
     for name in ("direct", "sun", "bounces"):
         (folder / f"stage_{name}.npz").unlink(missing_ok=True)
-    files = {p.name: _mark(p) for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")}
+    files = {
+        p.name: _mark(p) for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")
+    }
     manifest = {
-        "version": VERSION, "key": folder.name, "house": house.digest, "device": device(),
-        "settings": dataclasses.asdict(settings), "pages": first + len(outer_pages) + 1, "own_pages": len(s.atlas.pages),
-        "owners": list(owners(house)), "seconds": {k: round(v, 2) for k, v in took.items()},
-        "total_seconds": round(time.perf_counter() - start, 1), "luxels": len(s.lux.position), "check": error,
-        "exposure": {"polygons": s.exposure.polygons, "levels": s.exposure.levels.tolist(), "gains": s.exposure.gains.tolist(),
-                     "outdoors": s.exposure.outdoors.tolist()},
-        "meshes": [{"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha,
-                    "gloss": m.gloss} for m in meshes],
+        "version": VERSION,
+        "key": folder.name,
+        "house": house.digest,
+        "device": device(),
+        "settings": dataclasses.asdict(settings),
+        "pages": first + len(outer_pages) + 1,
+        "own_pages": len(s.atlas.pages),
+        "owners": list(owners(house)),
+        "seconds": {k: round(v, 2) for k, v in took.items()},
+        "total_seconds": round(time.perf_counter() - start, 1),
+        "luxels": len(s.lux.position),
+        "check": error,
+        "exposure": {
+            "polygons": s.exposure.polygons,
+            "levels": s.exposure.levels.tolist(),
+            "gains": s.exposure.gains.tolist(),
+            "outdoors": s.exposure.outdoors.tolist(),
+        },
+        "meshes": [
+            {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
+            for m in meshes
+        ],
         "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
-        "probes": _probes(s, space), "files": files,
+        "probes": _probes(s, space),
+        "files": files,
     }
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
@@ -292,7 +372,10 @@ def _reader() -> Callable[[str], np.ndarray]:
 
 def _same_atlas(folder: Path, atlas: Atlas) -> None:
     """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
-    pages = [digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes)) for p in atlas.pages]
+    pages = [
+        digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
+        for p in atlas.pages
+    ]
     mark, path = digest(pages), folder / "atlas.txt"
     if not path.exists() or path.read_text() != mark:
         for old in sorted(folder.iterdir()):
@@ -335,7 +418,9 @@ def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clo
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
     """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far brighter than that."""
     e = light.soft
-    room_of_owner = np.array([[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms])
+    room_of_owner = np.array(
+        [[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms]
+    )
     room = room_of_owner[lux.owner]
     out = {}
     for i, r in enumerate(house.rooms):
@@ -376,9 +461,21 @@ def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
             thin = page.thin[mine]
             faces = np.concatenate([faces, faces[thin][:, ::-1]])
             real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-            alpha = min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
-            out.append(LitMesh(atlas.owners[o], atlas.kinds[o], atlas.rooms[o], number, both[corner, :3].astype(np.float32),
-                               faces[real], both[corner, 3:].astype(np.float32), float(alpha)))
+            alpha = (
+                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
+            )
+            out.append(
+                LitMesh(
+                    atlas.owners[o],
+                    atlas.kinds[o],
+                    atlas.rooms[o],
+                    number,
+                    both[corner, :3].astype(np.float32),
+                    faces[real],
+                    both[corner, 3:].astype(np.float32),
+                    float(alpha),
+                )
+            )
             kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
             area = areas_of(page.corners[mine])
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())

@@ -26,7 +26,9 @@ AGAIN = 5
 """A bake that seems wrong is judged by this many times more luxels before it is refused."""
 
 
-def compare(solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first") -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def compare(
+    solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first"
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and (k, 3).
 
     Rooms that get less than a twentieth of the house's middle light are left out: there the
@@ -37,14 +39,18 @@ def compare(solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, na
     whole = s.light.soft + AMBIENT + s.light.sun[:, None] * s.outdoors.sun * radiosity.GLASS
     bright = whole @ y
     level = {u: np.median(bright[s.lux.shell & (s.lux.unit == u)]) for u in np.unique(s.lux.unit[s.lux.shell])}
-    lit = np.array([level.get(u, 0.0) for u in range(int(s.lux.unit.max()) + 1)]) > 0.05 * np.median(bright[s.lux.shell])
+    lit = np.array([level.get(u, 0.0) for u in range(int(s.lux.unit.max()) + 1)]) > 0.05 * np.median(
+        bright[s.lux.shell]
+    )
     fit = s.lux.shell & s.light.good & lit[s.lux.unit]
     # beside a shadow's edge a luxel's mean and its centre differ by nature
     fit &= (s.light.sun < 1e-3) | (s.light.sun > 0.98 * np.clip(s.lux.normal @ s.outdoors.sun_direction, 0, 1))
     rng = stream(s.house.seed, "light", "check", name)
     pick = rng.choice(np.nonzero(fit)[0], min(luxels, int(fit.sum())), replace=False)
     space = radiosity.space_of(s.atlas, s.lux.texels, s.outdoors.picture)
-    lights = paths.lights_of(space, lambda o: radiosity.without(space, s.atlas, o), portals_of(s.house), s.lamps, s.outdoors)
+    lights = paths.lights_of(
+        space, lambda o: radiosity.without(space, s.atlas, o), portals_of(s.house), s.lamps, s.outdoors
+    )
     p = subset(s.lux, np.repeat(pick, paths_each))
     e = array(paths.irradiance(space, lights, paths.surfaces_of(s.lux), p, rng=rng))
     traced = np.nan_to_num(e).reshape(len(pick), paths_each, 3) @ y
@@ -75,7 +81,11 @@ def judge(baked: np.ndarray, traced: np.ndarray, error: np.ndarray, position: np
     """The verdict on what `compare` returns: numbers, and the worst luxel in words; no words if the bake passes."""
     off = (baked - traced) / np.maximum(traced, 1e-6)
     beyond = np.abs(off) - 2 * error / np.maximum(traced, 1e-6) - LIMIT
-    result = {"luxels": len(off), "bias": round(float(np.median(off)), 4), "beyond": round(float(np.mean(beyond > 0)), 4)}
+    result = {
+        "luxels": len(off),
+        "bias": round(float(np.median(off)), 4),
+        "beyond": round(float(np.mean(beyond > 0)), 4),
+    }
     if abs(result["bias"]) <= LIMIT and result["beyond"] <= MOST:
         return result, ""
     worst = int(np.argmax(beyond))

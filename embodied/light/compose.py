@@ -56,7 +56,9 @@ class Solved:
     exposure: Exposure
 
 
-def page_of(number: int, solved: Solved, space: Space, settings: Settings, read: Callable[[str], np.ndarray]) -> Ingredients:
+def page_of(
+    number: int, solved: Solved, space: Space, settings: Settings, read: Callable[[str], np.ndarray]
+) -> Ingredients:
     """Compose page `number` of the atlas."""
     lux, light = solved.lux, solved.light
     page = solved.atlas.pages[number]
@@ -75,7 +77,9 @@ def page_of(number: int, solved: Solved, space: Space, settings: Settings, read:
     _add_metal(radiance, solved, page, t, colour, space)
     radiance += glow_of(solved.house, solved.atlas, page, t, solved.lamps)
     shown_by = sources(t.index, t.shape)
-    page_like = lambda values: values[shown_by].reshape(*t.shape, -1) if len(t.index) else np.zeros((*t.shape, values.shape[1]), values.dtype)
+    page_like = lambda values: (
+        values[shown_by].reshape(*t.shape, -1) if len(t.index) else np.zeros((*t.shape, values.shape[1]), values.dtype)
+    )
     picture = page_like(display(radiance, solved.exposure.at(t.position)))
     whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
     whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
@@ -99,10 +103,15 @@ def _add_metal(radiance: np.ndarray, solved: Solved, page, t: Texels, colour: np
         mine, share = i[some], metal[i[some], None]
         if len(mine):
             tint = np.maximum(colour[mine], np.where(rough[some] < 0.02, 0.85, 0.0)[:, None])
-            radiance[mine] = radiance[mine] * (1 - share) + _mirrored(solved, page, t, mine, rough[some], space, dull=dull) * tint * share
+            radiance[mine] = (
+                radiance[mine] * (1 - share)
+                + _mirrored(solved, page, t, mine, rough[some], space, dull=dull) * tint * share
+            )
 
 
-def _mirrored(solved: Solved, page, t: Texels, i: np.ndarray, rough: np.ndarray, space: Space, *, dull: bool) -> np.ndarray:
+def _mirrored(
+    solved: Solved, page, t: Texels, i: np.ndarray, rough: np.ndarray, space: Space, *, dull: bool
+) -> np.ndarray:
     """(k, 3) radiance that the texels `i` of one roughness each mirror, all of them dull or none."""
     mi, dr = mitsuba(), drjit()
     house, atlas, lux, light, sun = solved.house, solved.atlas, solved.lux, solved.light, solved.outdoors.sun
@@ -202,5 +211,7 @@ def _sharp_sun(solved: Solved, page, t: Texels, share: np.ndarray, space: Space,
     i = np.nonzero(at(unsure.astype(np.uint8)) > 0)[0]
     if len(i):
         p = points_of(t.position[i], t.normal[i], t.face_normal[i], page.thin[t.face[i]])
-        out[i] = np.asarray(radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays))
+        out[i] = np.asarray(
+            radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays)
+        )
     return out

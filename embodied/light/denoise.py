@@ -20,8 +20,14 @@ KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 
 
 def smooth_pages(
-    e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
-    steps: Sequence[int] = (1, 2, 4, 8, 16), likeness: Sequence[float] = (0.15, 0.12, 0.1, 0.1, 0.1),
+    e: np.ndarray,
+    atlas: Atlas,
+    luxels: Sequence[Texels],
+    good: np.ndarray,
+    chosen: np.ndarray,
+    *,
+    steps: Sequence[int] = (1, 2, 4, 8, 16),
+    likeness: Sequence[float] = (0.15, 0.12, 0.1, 0.1, 0.1),
     variance: np.ndarray | None = None,
 ) -> np.ndarray:
     """A-trous smoothing within planes.
@@ -107,8 +113,9 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[n
     return relative, np.asarray(mean / n) * np.minimum(relative, 1.0)
 
 
-def cap_sparks(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *,
-               most: float = 1.4) -> np.ndarray:
+def cap_sparks(
+    e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *, most: float = 1.4
+) -> np.ndarray:
     """Luxels brighter than `most` times the geometric mean of the good ones around them, cut to that.
 
     One ray in a hundred that meets a lampshade makes such a luxel; smoothing would spread it into a blob.
@@ -151,7 +158,9 @@ class _Grid:
         self._column = i32((flat[self.mine] - base[page]) % widths)
         position = np.concatenate([t.position for t in luxels])
         normal = np.concatenate([t.normal for t in luxels])
-        self._places, self._normals = (mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal))
+        self._places, self._normals = (
+            mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal)
+        )
         self._p, self._n = vector(position[self.mine]), vector(normal[self.mine])
         self.own = mi.UInt32(np.ascontiguousarray(self.mine, np.uint32))
 
@@ -174,7 +183,9 @@ LAYER = (0.3, 0.002)
 """A neighbour lies on the same layer where it is at most this share of its distance, and so many metres more, off the tangent plane."""
 
 
-def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12) -> np.ndarray:
+def neighbours(
+    position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12
+) -> np.ndarray:
     """(m, k) int32, nearest good luxels of the chosen ones by place and facing, those on the same layer first.
 
     The dark mattress below a blanket faces the blanket's way, and is nearer to its luxels than they are to each other.
@@ -197,8 +208,14 @@ def neighbours(position: np.ndarray, normal: np.ndarray, good: np.ndarray, chose
 
 
 def smooth_space(
-    e: np.ndarray, position: np.ndarray, normal: np.ndarray, near: np.ndarray, chosen: np.ndarray, *,
-    passes: int = 2, likeness: float = 0.6,
+    e: np.ndarray,
+    position: np.ndarray,
+    normal: np.ndarray,
+    near: np.ndarray,
+    chosen: np.ndarray,
+    *,
+    passes: int = 2,
+    likeness: float = 0.6,
 ) -> np.ndarray:
     """Smoothing over neighbours in space.
 

@@ -123,7 +123,9 @@ def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ..
         else:
             intensity = color * light.power / _luminance(color) / (4 * np.pi) / UNIT
             shell = np.array([_ball(k, 24) for k in range(24)]) * 0.05 + np.asarray(light.position)
-            lamps.append(Lamp(light.id, light.room, shell, np.zeros((24, 3)), intensity, 1.0, light.placement, np.ones(24)))
+            lamps.append(
+                Lamp(light.id, light.room, shell, np.zeros((24, 3)), intensity, 1.0, light.placement, np.ones(24))
+            )
     return tuple(lamps)
 
 
@@ -137,7 +139,11 @@ def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lam
         return lamp
     mi, dr = mitsuba(), drjit()
     n = vector(lamp.normals)
-    origin, frame, free = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n), dr.zeros(mi.Float, len(lamp.points))
+    origin, frame, free = (
+        mi.Point3f(vector(lamp.points) + n * 2e-3),
+        mi.Frame3f(n),
+        dr.zeros(mi.Float, len(lamp.points)),
+    )
     for k in range(rays):
         d = frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(*(constant(x) for x in r2(k)))))
         free += dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0)
@@ -149,7 +155,9 @@ def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lam
     chance /= chance.sum()
     count = len(share)
     pick = np.minimum(np.searchsorted(np.cumsum(chance), (np.arange(count) + 0.5) / count), count - 1)
-    return dataclasses.replace(lamp, points=lamp.points[pick], normals=lamp.normals[pick], weights=1 / (count * chance[pick]))
+    return dataclasses.replace(
+        lamp, points=lamp.points[pick], normals=lamp.normals[pick], weights=1 / (count * chance[pick])
+    )
 
 
 def glowing_faces(atlas: Atlas) -> dict[str, np.ndarray]:

@@ -75,7 +75,9 @@ def surfaces_of(lux: Luxels) -> Surfaces:
     return Surfaces(flat(lux.albedo), flat(np.where(lux.sampled[:, None], 0.0, lux.glow)), flat(lux.normal))
 
 
-def lights_of(space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors) -> Lights:
+def lights_of(
+    space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors
+) -> Lights:
     """Pool what shines.
 
     Args:
@@ -92,24 +94,37 @@ def lights_of(space: Space, without: Callable[[str], Space], portals: Sequence[P
         else:
             index.append(0)
     sky = float(outdoors.picture.mean())
-    centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(k, 3)
-    power = np.array([p.area * sky for p in portals] + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1)
-                                                       for x in lamps])
+    centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(
+        k, 3
+    )
+    power = np.array(
+        [p.area * sky for p in portals]
+        + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps]
+    )
     fill = lambda a: a[np.arange(POINTS) % len(a)]
     flat = lambda rows: mi.Float(np.ascontiguousarray(np.array(rows, np.float32).reshape(-1)))
     scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
-        k, centre, power, flat([p.corner for p in portals] + none), flat([p.along for p in portals] + none),
-        flat([p.up for p in portals] + none), flat([p.normal for p in portals] + none),
+        k,
+        centre,
+        power,
+        flat([p.corner for p in portals] + none),
+        flat([p.along for p in portals] + none),
+        flat([p.up for p in portals] + none),
+        flat([p.normal for p in portals] + none),
         flat([p.area * radiosity.GLASS / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
         flat([zero] * len(portals) + [x.radiance for x in lamps]),
         flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
         flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
         flat([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
         mi.Bool([False] * len(portals) + [not x.normals.any() for x in lamps]),
-        mi.Bool([False] * len(portals) + [True] * len(lamps)), tuple(spaces), mi.UInt32(index or [0]), scene,
-        outdoors.sun_direction, outdoors.sun * radiosity.GLASS,
+        mi.Bool([False] * len(portals) + [True] * len(lamps)),
+        tuple(spaces),
+        mi.UInt32(index or [0]),
+        scene,
+        outdoors.sun_direction,
+        outdoors.sun * radiosity.GLASS,
     )
 
 
@@ -134,7 +149,13 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         far = mi.Point3f(*(constant(x) for x in c)) - p.position
         weights.append(constant(max(power, 1e-6)) / (dr.squared_norm(far) + 0.3))
         whole += weights[-1]
-    target, sum_, pick, chance, open_ = mi.Float(u[0]) * whole, mi.Float(0.0), mi.UInt32(0), mi.Float(1.0), mi.Bool(True)
+    target, sum_, pick, chance, open_ = (
+        mi.Float(u[0]) * whole,
+        mi.Float(0.0),
+        mi.UInt32(0),
+        mi.Float(1.0),
+        mi.Bool(True),
+    )
     for i, w in enumerate(weights):
         sum_ += w
         here = open_ & ((target < sum_) | (i == lights.count - 1))
@@ -145,7 +166,9 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
     at = lambda t: dr.gather(mi.Vector3f, t, pick)
     lamp, bare = dr.gather(mi.Bool, lights.lamp, pick), dr.gather(mi.Bool, lights.bare, pick)
     spot = pick * POINTS + dr.minimum(mi.UInt32(a * POINTS), POINTS - 1)
-    q = dr.select(lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b)
+    q = dr.select(
+        lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b
+    )
     n = dr.select(lamp, dr.gather(mi.Vector3f, lights.normals, spot), at(lights.normal))
     d = mi.Point3f(q) - p.position
     far = dr.norm(d)
@@ -160,13 +183,20 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
     blocked = mi.Bool(False)
     for i, world in enumerate(lights.spaces):
         blocked |= world.scene.ray_test(ray, active & (which == i))
-    g = cos * leaving / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4)) * dr.gather(mi.Float, lights.strength, pick)
+    g = (
+        cos
+        * leaving
+        / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4))
+        * dr.gather(mi.Float, lights.strength, pick)
+    )
     g *= dr.select(lamp, dr.gather(mi.Float, lights.weights, spot), 1.0)
     light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space, d, active)))
     return mi.Color3f(dr.select(active & ~blocked, light * dr.minimum(g, dr.select(bare, 400.0, 4.0)) / chance, 0.0))
 
 
-def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST):
+def irradiance(
+    space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST
+):
     """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each."""
     mi, dr = mitsuba(), drjit()
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
@@ -176,14 +206,21 @@ def irradiance(space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, r
         u = rng.random((4, p.n), np.float32)
         side = dr.select(p.thin & (mi.Float(u[2]) < 0.5), -1.0, 1.0)
         out = p.face_normal * side
-        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(mi.Float(u[0]), mi.Float(u[1]))))
+        d = mi.Frame3f(p.normal * side).to_world(
+            mi.warp.square_to_cosine_hemisphere(mi.Point2f(mi.Float(u[0]), mi.Float(u[1])))
+        )
         rise = dr.dot(d, out)
         d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
         ray = mi.Ray3f(p.position + out * radiosity.LIFT, d)
         luxel, alive, q = hit_points(space, surfaces, ray, alive, p)
         throughput = throughput * dr.gather(mi.Color3f, surfaces.albedo, luxel, alive)
-        total = total + dr.select(alive, throughput / dr.maximum(dr.gather(mi.Color3f, surfaces.albedo, luxel, alive), 1e-4)
-                                  * dr.gather(mi.Color3f, surfaces.glow, luxel, alive), 0.0)
+        total = total + dr.select(
+            alive,
+            throughput
+            / dr.maximum(dr.gather(mi.Color3f, surfaces.albedo, luxel, alive), 1e-4)
+            * dr.gather(mi.Color3f, surfaces.glow, luxel, alive),
+            0.0,
+        )
         if depth >= 2:
             keep = dr.clip(dr.max(throughput) * 1.5, 0.05, 0.95)
             alive &= mi.Float(u[3]) < keep

@@ -38,12 +38,21 @@ class Points:
     """Per-point rotation of the sample sequences (Cranley and Patterson 1976)."""
 
 
-def points_of(position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, seed: int = 0) -> Points:
+def points_of(
+    position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, seed: int = 0
+) -> Points:
     """Upload points; all arrays (n, 3) but `thin` (n,)."""
     mi, dr = mitsuba(), drjit()
     turn = np.random.default_rng(seed).random((2, len(position)), np.float32)
-    p = Points(len(position), mi.Point3f(vector(position)), vector(normal), vector(face_normal),
-               mi.Bool(np.ascontiguousarray(thin)), mi.Float(turn[0]), mi.Float(turn[1]))
+    p = Points(
+        len(position),
+        mi.Point3f(vector(position)),
+        vector(normal),
+        vector(face_normal),
+        mi.Bool(np.ascontiguousarray(thin)),
+        mi.Float(turn[0]),
+        mi.Float(turn[1]),
+    )
     dr.eval(p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
     return p
 
@@ -86,9 +95,17 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray) -> Space:
     u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
     flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     return Space(
-        scene_of(corners[keep]), keep, u32(page[keep]), flat(xy), flat(face_normals(corners[keep])),
-        mi.Bool(np.ascontiguousarray(thin)), u32([p.width for p in atlas.pages]), u32([p.height for p in atlas.pages]),
-        u32(np.cumsum(sizes) - sizes), u32(nearest_luxel(atlas, luxels)), flat(_small(env)),
+        scene_of(corners[keep]),
+        keep,
+        u32(page[keep]),
+        flat(xy),
+        flat(face_normals(corners[keep])),
+        mi.Bool(np.ascontiguousarray(thin)),
+        u32([p.width for p in atlas.pages]),
+        u32([p.height for p in atlas.pages]),
+        u32(np.cumsum(sizes) - sizes),
+        u32(nearest_luxel(atlas, luxels)),
+        flat(_small(env)),
     )
 
 
@@ -146,7 +163,9 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     a few centimetres from the glass turn into fireflies.
     """
     mi, dr = mitsuba(), drjit()
-    corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal))
+    corner, along, up, n = (
+        mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal)
+    )
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
     total, seen = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
     for k in range(samples):
@@ -195,7 +214,10 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
         g *= dr.gather(mi.Float, weights, i)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - (4 * LIFT if not bare else 0.06), 0.0, [])
         active &= ray.maxt > 0
-        total += dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), constant((4.0 if not bare else 400.0) / samples))
+        total += dr.minimum(
+            dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0),
+            constant((4.0 if not bare else 400.0) / samples),
+        )
         dr.eval(total)
     return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
@@ -221,8 +243,15 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
     return total / directions
 
 
-def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarray, thin: np.ndarray, flux: np.ndarray,
-                extent: np.ndarray) -> np.ndarray:
+def patch_light(
+    space: Space,
+    p: Points,
+    position: np.ndarray,
+    normal: np.ndarray,
+    thin: np.ndarray,
+    flux: np.ndarray,
+    extent: np.ndarray,
+) -> np.ndarray:
     """(n, 3) e from sunlit patches, each a small disc light, the same for all points and so free of noise.
 
     Args:
@@ -230,7 +259,9 @@ def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarra
     """
     mi, dr = mitsuba(), drjit()
     total = dr.zeros(mi.Color3f, p.n)
-    for q, n, both, f, a in zip(np.where(thin[:, None], position, position + normal * LIFT), normal, thin, flux, extent):
+    for q, n, both, f, a in zip(
+        np.where(thin[:, None], position, position + normal * LIFT), normal, thin, flux, extent
+    ):
         d = mi.Point3f(*(constant(x) for x in q)) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-5)
@@ -245,7 +276,9 @@ def patch_light(space: Space, p: Points, position: np.ndarray, normal: np.ndarra
     return array(total)
 
 
-def gather(space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def gather(
+    space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean of what cosine-distributed rays meet.
 
     Args:
@@ -298,7 +331,9 @@ def hit_colour(space: Space, table, ray, active=True):
     for dx, wx in ((0, 1 - fx), (1, fx)):
         for dy, wy in ((0, 1 - fy), (1, fy)):
             spot = base + dr.minimum(y0 + dy, height - 1) * w + dr.minimum(x0 + dx, w - 1)
-            out += dr.gather(mi.Color3f, table, dr.gather(mi.UInt32, space.luxel_of, spot, hit), hit & front) * (wx * wy)
+            out += dr.gather(mi.Color3f, table, dr.gather(mi.UInt32, space.luxel_of, spot, hit), hit & front) * (
+                wx * wy
+            )
     return out, hit
 
 

@@ -34,7 +34,9 @@ RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 class Tracer:
     """Draws panoramas of one lit house by tracing rays; owns the house on Mitsuba's device."""
 
-    def __init__(self, bake: Bake, house: House, *, quality: str = "glossy", size: int = 256, rays: int | None = None) -> None:
+    def __init__(
+        self, bake: Bake, house: House, *, quality: str = "glossy", size: int = 256, rays: int | None = None
+    ) -> None:
         """Upload the bake.
 
         Args:
@@ -118,7 +120,11 @@ class Tracer:
         gain = world.exposure.at(np.where(keep, there, 0.0))
         most = np.maximum(SPARK, gain * (world.outdoors.sun * radiosity.GLASS).astype(np.float32))
         x = np.where(keep, np.minimum(seen * gain, most), 0.0)
-        elsewhere, share, square = np.where(keep, 0.0, array(shown)), keep.astype(np.float32), np.square(x.mean(1, keepdims=True))
+        elsewhere, share, square = (
+            np.where(keep, 0.0, array(shown)),
+            keep.astype(np.float32),
+            np.square(x.mean(1, keepdims=True)),
+        )
         if world.panes is None:
             return share, x, elsewhere, np.where(keep, array(hit.albedo), 0.0), square
         colour, left, _, _ = through(world.panes, ray, dr.select(hit.ok, hit.distance, dr.inf))
@@ -182,7 +188,11 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
     for step, like in ((1, 0.3), (2, 0.2), (4, 0.15), (8, 0.1)):
         shade = np.log(cv2.blur(light.mean(-1), (3, 3)) + 1e-3)
         tight = 1 / (like**2 + np.square(2 * noise))
-        total, weight, squares = np.zeros_like(light), np.zeros(light.shape[:2], np.float32), np.zeros(light.shape[:2], np.float32)
+        total, weight, squares = (
+            np.zeros_like(light),
+            np.zeros(light.shape[:2], np.float32),
+            np.zeros(light.shape[:2], np.float32),
+        )
         for j in range(-2, 3):
             for i in range(-2, 3):
                 moved = lambda a: np.roll(a, (j * step, i * step), axis=(0, 1))  # noqa: B023
@@ -196,7 +206,9 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
     return light
 
 
-def _camera_rays(position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None):
+def _camera_rays(
+    position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None
+):
     """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
     mi, dr = mitsuba(), drjit()
     h, w = size

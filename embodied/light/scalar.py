@@ -102,7 +102,21 @@ def gather(kind: Type, source: np.ndarray, index: np.ndarray, active=True) -> Va
 
 
 minimum, maximum, square, floor, exp, log, sqrt, abs, sin, cos, acos, atan2, isinf, power = (
-    np.minimum, np.maximum, np.square, np.floor, np.exp, np.log, np.sqrt, np.abs, np.sin, np.cos, np.arccos, np.arctan2, np.isinf, np.power)
+    np.minimum,
+    np.maximum,
+    np.square,
+    np.floor,
+    np.exp,
+    np.log,
+    np.sqrt,
+    np.abs,
+    np.sin,
+    np.cos,
+    np.arccos,
+    np.arctan2,
+    np.isinf,
+    np.power,
+)
 
 
 def clip(a, low, high):

@@ -39,7 +39,9 @@ class Outdoors:
 def sun_height(hour: float) -> float:
     """Elevation of the sun above the horizon at a local solar hour, radians."""
     turn = (hour - 12.0) * np.pi / 12.0
-    return float(np.arcsin(np.sin(LATITUDE) * np.sin(DECLINATION) + np.cos(LATITUDE) * np.cos(DECLINATION) * np.cos(turn)))
+    return float(
+        np.arcsin(np.sin(LATITUDE) * np.sin(DECLINATION) + np.cos(LATITUDE) * np.cos(DECLINATION) * np.cos(turn))
+    )
 
 
 def sun_direction(sky: Sky) -> np.ndarray:
@@ -68,8 +70,12 @@ def paint(sky: Sky, seed: int, height: int = HEIGHT) -> Outdoors:
     elevation = (0.5 - (np.arange(height) + 0.5) / height) * np.pi
     yaw = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
     directions = np.stack(
-        [np.cos(elevation)[:, None] * np.cos(yaw), np.cos(elevation)[:, None] * np.sin(yaw),
-         np.broadcast_to(np.sin(elevation)[:, None], (height, 2 * height))], axis=-1,
+        [
+            np.cos(elevation)[:, None] * np.cos(yaw),
+            np.cos(elevation)[:, None] * np.sin(yaw),
+            np.broadcast_to(np.sin(elevation)[:, None], (height, 2 * height)),
+        ],
+        axis=-1,
     ).astype(np.float32)
     sun = _sun_strength(sky, up)
     sky_part = _sky(sky, up, directions, towards, seed)
@@ -141,22 +147,32 @@ def _noise(rng: np.random.Generator, rows: int, columns: int, shape: tuple[int, 
 def _clouds(d: np.ndarray, seed: int, weather: str) -> np.ndarray:
     """(h, w) cover in [0, 1]: fractal noise on a flat layer overhead."""
     rng = stream(seed, "light", "clouds")
-    sheet = sum(cv2.resize(rng.random((n, n)).astype(np.float32), (1024, 1024), interpolation=cv2.INTER_CUBIC) * w
-                for n, w in ((10, 0.5), (24, 0.27), (60, 0.14), (150, 0.09)))
+    sheet = sum(
+        cv2.resize(rng.random((n, n)).astype(np.float32), (1024, 1024), interpolation=cv2.INTER_CUBIC) * w
+        for n, w in ((10, 0.5), (24, 0.27), (60, 0.14), (150, 0.09))
+    )
     z = np.maximum(d[..., 2], 0.03)
     x, y = d[..., 0] / (z + 0.12) * 110 + 512, d[..., 1] / (z + 0.12) * 110 + 512
-    value = cv2.remap(sheet, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    value = cv2.remap(
+        sheet, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
+    )
     threshold = {"clear": 0.53, "hazy": 0.45, "overcast": 0.3}[weather]
     return np.clip((value - threshold) / 0.16, 0, 1) * np.clip(d[..., 2] * 9, 0, 1)
 
 
-def _ground(picture: np.ndarray, d: np.ndarray, elevation: np.ndarray, yaw: np.ndarray, lit: np.ndarray, seed: int) -> np.ndarray:
+def _ground(
+    picture: np.ndarray, d: np.ndarray, elevation: np.ndarray, yaw: np.ndarray, lit: np.ndarray, seed: int
+) -> np.ndarray:
     """Lawn below the horizon: near grass is coarse, far grass smooth and hazy; a paved strip around the house."""
     h, w = picture.shape[:2]
     rng = stream(seed, "light", "lawn")
     below = elevation < 0
     distance = 2.2 / np.tan(np.maximum(-elevation, 1e-3))
-    patches = _noise(rng, h // 4, 80, (h, w)) * 0.5 + _noise(rng, h, 900, (h, w)) * 0.3 + _noise(rng, h // 24, 20, (h, w)) * 0.4
+    patches = (
+        _noise(rng, h // 4, 80, (h, w)) * 0.5
+        + _noise(rng, h, 900, (h, w)) * 0.3
+        + _noise(rng, h // 24, 20, (h, w)) * 0.4
+    )
     shade = (0.72 + 0.5 * patches)[..., None]
     grass = GRASS * shade
     paving = np.array([0.30, 0.28, 0.25]) * (0.85 + 0.25 * patches[..., None])
@@ -168,8 +184,14 @@ def _ground(picture: np.ndarray, d: np.ndarray, elevation: np.ndarray, yaw: np.n
 
 
 def _far_things(
-    picture: np.ndarray, elevation: np.ndarray, yaw: np.ndarray, lit: np.ndarray, sun: np.ndarray, towards: np.ndarray,
-    sky_level: float, seed: int,
+    picture: np.ndarray,
+    elevation: np.ndarray,
+    yaw: np.ndarray,
+    lit: np.ndarray,
+    sun: np.ndarray,
+    towards: np.ndarray,
+    sky_level: float,
+    seed: int,
 ) -> np.ndarray:
     """Hills, houses, two rows of trees and a hedge, far to near, each lit from the sun's side."""
     h, w = picture.shape[:2]
@@ -184,17 +206,28 @@ def _far_things(
     for top, rough, grain, haze in ((5.5, 2.6, 46, 0.25), (8.0, 4.5, 30, 0.1)):
         line = top * (_noise(rng, 1, 14, (1, w))[0] ** 1.5) + rough * _noise(rng, 1, grain, (1, w))[0]
         line = line + 0.9 * _noise(rng, 1, 260, (1, w))[0] + 0.5 * _noise(rng, 1, 800, (1, w))[0] - 1.4
-        crowns = 0.5 + 0.8 * _noise(rng, h // 5, 420, (h, w)) * _noise(rng, h // 24, 110, (h, w)) + 0.25 * _noise(rng, h, 1000, (h, w))
+        crowns = (
+            0.5
+            + 0.8 * _noise(rng, h // 5, 420, (h, w)) * _noise(rng, h // 24, 110, (h, w))
+            + 0.25 * _noise(rng, h, 1000, (h, w))
+        )
         hue = 0.8 + 0.5 * _noise(rng, 1, 50, (1, w))[0]
         colour = (TREES * np.stack([hue, np.ones(w), hue * 0.9], 1) * crowns[..., None]) * side * 1.1
         picture = _layer(picture, elevation, np.radians(line), colour, air, haze)
     hedge = np.radians(-3.2 + 0.45 * _noise(rng, 1, 300, (1, w))[0])
     leaves = 0.55 + 0.7 * _noise(rng, h, 1100, (h, w))
-    return _layer(picture, elevation, hedge, TREES * 1.15 * leaves[..., None] * side, air, 0.03, bottom=np.radians(-6.8))
+    return _layer(
+        picture, elevation, hedge, TREES * 1.15 * leaves[..., None] * side, air, 0.03, bottom=np.radians(-6.8)
+    )
 
 
 def _layer(
-    picture: np.ndarray, elevation: np.ndarray, top: np.ndarray, colour: np.ndarray, air: np.ndarray, haze: float,
+    picture: np.ndarray,
+    elevation: np.ndarray,
+    top: np.ndarray,
+    colour: np.ndarray,
+    air: np.ndarray,
+    haze: float,
     bottom: float = np.radians(-2.6),
 ) -> np.ndarray:
     """`colour` from `bottom` up to the line `top` (w,), mixed with `haze` of the air's light; edges one row soft."""
@@ -203,7 +236,9 @@ def _layer(
     return picture + (colour * (1 - haze) + air * haze * 0.8 - picture) * cover[..., None]
 
 
-def _houses(picture: np.ndarray, elevation: np.ndarray, side: np.ndarray, sky_level: float, rng: np.random.Generator) -> np.ndarray:
+def _houses(
+    picture: np.ndarray, elevation: np.ndarray, side: np.ndarray, sky_level: float, rng: np.random.Generator
+) -> np.ndarray:
     """A dozen neighbours as plain facades with pitched roofs; windows glow when the sky is dark."""
     h, w = picture.shape[:2]
     picture = picture.copy()

@@ -93,15 +93,24 @@ def luxels_of(house: House, atlas: Atlas, lamps: Sequence[Lamp], read: Callable[
     units = {}
     for o, room, kind in zip(atlas.owners, atlas.rooms, atlas.kinds):
         units.setdefault(o.split("/")[0] if kind == "opening" else room, len(units))
-    unit_of_owner = np.array([units[o.split("/")[0] if k == "opening" else r] for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)])
+    unit_of_owner = np.array(
+        [units[o.split("/")[0] if k == "opening" else r] for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
+    )
     shell_of_owner = np.array([k in SHELL for k in atlas.kinds])
     lit = {x.id for x in lamps}
     sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
     glow_all = np.concatenate(glow)
     return Luxels(
-        texels, *places.values(),
-        np.concatenate(thin), np.concatenate(color), glow_all, sampled[owner_of] & (glow_all.sum(1) > 0),
-        np.concatenate(area), owner_of, unit_of_owner[owner_of].astype(np.int32), shell_of_owner[owner_of],
+        texels,
+        *places.values(),
+        np.concatenate(thin),
+        np.concatenate(color),
+        glow_all,
+        sampled[owner_of] & (glow_all.sum(1) > 0),
+        np.concatenate(area),
+        owner_of,
+        unit_of_owner[owner_of].astype(np.int32),
+        shell_of_owner[owner_of],
     )
 
 
@@ -135,8 +144,15 @@ def glow_of(house: House, atlas: Atlas, page, texels: Texels, lamps: Sequence[La
     return out
 
 
-def direct_light(lux: Luxels, atlas: Atlas, space: Space, portals: Sequence[Portal], lamps: Sequence[Lamp],
-                 settings: Settings, tell: Callable[[float], None]) -> np.ndarray:
+def direct_light(
+    lux: Luxels,
+    atlas: Atlas,
+    space: Space,
+    portals: Sequence[Portal],
+    lamps: Sequence[Lamp],
+    settings: Settings,
+    tell: Callable[[float], None],
+) -> np.ndarray:
     """(n, 3) e from sky and lamps."""
     e = np.zeros((len(lux.position), 3), np.float32)
     jobs: list[tuple[Space, Callable]] = []
@@ -173,7 +189,12 @@ def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: 
     mi, dr = mitsuba(), drjit()
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
-    inwards = np.array([into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2 for o, k in zip(atlas.owners, atlas.kinds)])
+    inwards = np.array(
+        [
+            into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2
+            for o, k in zip(atlas.owners, atlas.kinds)
+        ]
+    )
     mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
     if not len(mine):
         return e
@@ -196,12 +217,18 @@ def _nowhere() -> Portal:
     return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
 
 
-def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Outdoors, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+def sun_light(
+    lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Outdoors, settings: Settings
+) -> tuple[np.ndarray, np.ndarray]:
     """(n,) share of the sun, and (n, 3) e of its first bounce."""
     n = len(lux.position)
     if not portals or not outdoors.sun.any():
         return np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
-    share = np.asarray(radiosity.sun_share(space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4))
+    share = np.asarray(
+        radiosity.sun_share(
+            space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4
+        )
+    )
     flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
     power = flux.mean(1)
     e = np.zeros((n, 3), np.float32)
@@ -220,8 +247,12 @@ def sun_light(lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Ou
     return share, e
 
 
-def _patches(lux: Luxels, space: Space, pick: np.ndarray, strength: np.ndarray, extent: np.ndarray, i: np.ndarray, rays: int) -> np.ndarray:
-    return radiosity.patch_light(space, subset(lux, i), lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent)
+def _patches(
+    lux: Luxels, space: Space, pick: np.ndarray, strength: np.ndarray, extent: np.ndarray, i: np.ndarray, rays: int
+) -> np.ndarray:
+    return radiosity.patch_light(
+        space, subset(lux, i), lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent
+    )
 
 
 def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell: Callable[[float], None]) -> Radiosity:
@@ -302,8 +333,16 @@ def subset(lux: Luxels, i: np.ndarray) -> Points:
     return points_of(lux.position[i], lux.normal[i], lux.face_normal[i], lux.thin[i])
 
 
-def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Sequence[Lamp], settings: Settings,
-          stage: Callable[[str, Callable[[], dict]], dict], tell: Callable[[str, float], None]) -> Radiosity:
+def solve(
+    house: House,
+    atlas: Atlas,
+    lux: Luxels,
+    outdoors: Outdoors,
+    lamps: Sequence[Lamp],
+    settings: Settings,
+    stage: Callable[[str, Callable[[], dict]], dict],
+    tell: Callable[[str, float], None],
+) -> Radiosity:
     """The light of a house.
 
     Args:
@@ -313,9 +352,13 @@ def solve(house: House, atlas: Atlas, lux: Luxels, outdoors: Outdoors, lamps: Se
     space = radiosity.space_of(atlas, lux.texels, outdoors.picture)
     n = len(lux.position)
     zero = np.zeros((n, 3), np.float32)
-    direct = stage("direct", lambda: {
-        "e": direct_light(lux, atlas, space, portals, lamps, settings, lambda x: tell("direct light", x)),
-        "outer": outer_light(house, lux, atlas, space)})
+    direct = stage(
+        "direct",
+        lambda: {
+            "e": direct_light(lux, atlas, space, portals, lamps, settings, lambda x: tell("direct light", x)),
+            "outer": outer_light(house, lux, atlas, space),
+        },
+    )
     sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
     light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool), np.zeros(n, np.float32))
 

@@ -26,8 +26,15 @@ LUXELS = 110_000
 """Luxels for all outer parts together, at most."""
 
 
-def surroundings(house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoors, exposure: Exposure, cache: Path,
-                 read: Callable[[str], np.ndarray]) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
+def surroundings(
+    house: House,
+    parts: Sequence,
+    indoors: Atlas,
+    outdoors: Outdoors,
+    exposure: Exposure,
+    cache: Path,
+    read: Callable[[str], np.ndarray],
+) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
     """Outer parts in the light of sun and sky, and the picture on the dome.
 
     Args:
@@ -41,8 +48,10 @@ def surroundings(house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoo
     dome = display(outdoors.picture, gain)
     if not parts:
         return None, [], dome
-    area = sum(float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
-               for c in (p.mesh.vertices[p.mesh.faces] for p in parts))
+    area = sum(
+        float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
+        for c in (p.mesh.vertices[p.mesh.faces] for p in parts)
+    )
     density = float(min(14.0, np.sqrt(LUXELS / max(area, 1.0))))
     atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=1500, cache=cache, finest=2))
     blockers = scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass]))

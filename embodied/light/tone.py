@@ -49,7 +49,9 @@ class Exposure:
         """(n, 3) float32 gains at points (n, 3)."""
         grid, low = self._grid
         where = ((np.asarray(position, float) - low) / CELL).T
-        return np.exp(np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)).astype(np.float32)
+        return np.exp(
+            np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)
+        ).astype(np.float32)
 
     @functools.cached_property
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:

@@ -129,9 +129,17 @@ def world_of(bake: Bake, house: House) -> World:
     small = sun.picture.reshape(rows, k, 2 * rows, k, 3).mean((1, 3))
     xy = uv * np.stack([lw, lh], 1)[page][:, None]
     space = Space(
-        scene_of(corners), np.arange(len(corners)), u32(page), flat(xy), flat(face_normals(corners.astype(np.float64))),
-        mi.Bool(thin), u32(lw), u32(lh), u32(np.cumsum(lw * lh) - lw * lh),
-        u32(np.arange(int((lw * lh).sum()))), flat(small),
+        scene_of(corners),
+        np.arange(len(corners)),
+        u32(page),
+        flat(xy),
+        flat(face_normals(corners.astype(np.float64))),
+        mi.Bool(thin),
+        u32(lw),
+        u32(lh),
+        u32(np.cumsum(lw * lh) - lw * lh),
+        u32(np.arange(int((lw * lh).sum()))),
+        flat(small),
     )
     hit_by_lamp = glow_coarse if not sampled else np.zeros_like(glow_coarse)
     surfaces = Surfaces(flat(np.concatenate(coarse_albedo)), flat(hit_by_lamp), flat(np.zeros_like(glow_coarse)))
@@ -139,9 +147,24 @@ def world_of(bake: Bake, house: House) -> World:
     lights = lights_of(space, without, portals_of(house), lamps, sun)
     any_glow = np.concatenate(glow)
     return World(
-        space, surfaces, lights, owner, mi.Bool(outer), flat(np.concatenate([g for _, g in solid]) / 255), flat(uv), u32(page),
-        u32(size.ravel()), u32(np.cumsum(texels) - texels), flat(np.concatenate(albedo)), flat(np.concatenate(light)),
-        flat(any_glow) if any_glow.any() else None, flat(lit.pages[-1] / 255), flat(sun.picture), sun.picture.shape[0], bake.exposure, sun,
+        space,
+        surfaces,
+        lights,
+        owner,
+        mi.Bool(outer),
+        flat(np.concatenate([g for _, g in solid]) / 255),
+        flat(uv),
+        u32(page),
+        u32(size.ravel()),
+        u32(np.cumsum(texels) - texels),
+        flat(np.concatenate(albedo)),
+        flat(np.concatenate(light)),
+        flat(any_glow) if any_glow.any() else None,
+        flat(lit.pages[-1] / 255),
+        flat(sun.picture),
+        sun.picture.shape[0],
+        bake.exposure,
+        sun,
         _panes_of(lit, number),
     )
 
@@ -166,16 +189,31 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
     size = np.array([p.shape[1::-1] for p in pictures])
     texels = size.prod(1)
     return Panes(
-        scene_of(corners), flat(face_normals(corners.astype(np.float64))), flat(np.concatenate([m.uv[m.faces] for m in clear])),
-        flat(each(lambda m: m.alpha)), each(lambda m: number.get(m.owner, 0)).astype(np.int32), u32(each(lambda m: used[m.page])),
-        u32(size.ravel()), u32(np.cumsum(texels) - texels), flat(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
+        scene_of(corners),
+        flat(face_normals(corners.astype(np.float64))),
+        flat(np.concatenate([m.uv[m.faces] for m in clear])),
+        flat(each(lambda m: m.alpha)),
+        each(lambda m: number.get(m.owner, 0)).astype(np.int32),
+        u32(each(lambda m: used[m.page])),
+        u32(size.ravel()),
+        u32(np.cumsum(texels) - texels),
+        flat(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
     )
 
 
 def _lamps(bake: Bake) -> tuple[Lamp, ...]:
     with np.load(bake.folder / "lamps.npz", allow_pickle=False) as z:
         return tuple(
-            Lamp(x["id"], x["room"], z[f"points{i}"], z[f"normals{i}"], z[f"radiance{i}"], float(z[f"area{i}"]), x["owner"], z[f"weights{i}"])
+            Lamp(
+                x["id"],
+                x["room"],
+                z[f"points{i}"],
+                z[f"normals{i}"],
+                z[f"radiance{i}"],
+                float(z[f"area{i}"]),
+                x["owner"],
+                z[f"weights{i}"],
+            )
             for i, x in enumerate(bake.manifest["lamps"])
         )
 
@@ -228,8 +266,20 @@ def look(world: World, ray, active=True) -> Hit:
     n = dr.gather(mi.Vector3f, world.space.normal, f, ok)
     front = dr.dot(n, ray.d) < 0
     n = dr.select(front, n, -n)
-    return Hit(ok, h.t, f, ray.o + ray.d * h.t, n, albedo, e, glow, dr.gather(mi.Bool, world.is_outdoor, f, ok),
-               dr.gather(mi.Vector3f, world.gloss, f, ok), front, dr.gather(mi.Bool, world.space.thin, f, ok))
+    return Hit(
+        ok,
+        h.t,
+        f,
+        ray.o + ray.d * h.t,
+        n,
+        albedo,
+        e,
+        glow,
+        dr.gather(mi.Bool, world.is_outdoor, f, ok),
+        dr.gather(mi.Vector3f, world.gloss, f, ok),
+        front,
+        dr.gather(mi.Bool, world.space.thin, f, ok),
+    )
 
 
 def through(panes: Panes, ray, behind, most: int = 6):
@@ -256,7 +306,9 @@ def through(panes: Panes, ray, behind, most: int = 6):
         x = dr.minimum(mi.UInt32(dr.maximum(q.x, 0) * w), w - 1)
         y = dr.minimum(mi.UInt32(dr.maximum(q.y, 0) * height), height - 1)
         opacity = dr.gather(mi.Float, panes.opacity, f, front)
-        colour += dr.gather(mi.Color3f, panes.picture, dr.gather(mi.UInt32, panes.base, page, front) + y * w + x, front) * (left * opacity)
+        colour += dr.gather(
+            mi.Color3f, panes.picture, dr.gather(mi.UInt32, panes.base, page, front) + y * w + x, front
+        ) * (left * opacity)
         left *= dr.select(front, 1 - opacity, 1.0)
         face = dr.select(front & dr.isinf(first), f, face)
         first = dr.select(front & dr.isinf(first), start + h.t, first)

@@ -114,7 +114,9 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     corners, normals, uv, part = corners_of(parts)
     if not len(corners):
         empty = np.zeros((0, 3, 3))
-        return Unwrapped(*_single(empty, empty, empty[..., :2], empty[..., :2]), part, np.zeros(0, bool), np.array([1, 1], np.int32))
+        return Unwrapped(
+            *_single(empty, empty, empty[..., :2], empty[..., :2]), part, np.zeros(0, bool), np.array([1, 1], np.int32)
+        )
     if not trusted:
         once = _without_doubles(corners)
         corners, normals, uv, part = (x[once] for x in (corners, normals, uv, part))
@@ -310,5 +312,7 @@ def _with_rings(corners: np.ndarray, keep: np.ndarray, rings: int = 2) -> np.nda
 def _weld(corners: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shared vertices (n, 6) of position and normal, and faces (m, 3) into them."""
     both = np.concatenate([corners, normals], -1).reshape(-1, 6)
-    _, first, index = np.unique(np.round(both * [1, 1, 1, 0.02, 0.02, 0.02], 5), axis=0, return_index=True, return_inverse=True)
+    _, first, index = np.unique(
+        np.round(both * [1, 1, 1, 0.02, 0.02, 0.02], 5), axis=0, return_index=True, return_inverse=True
+    )
     return both[first], index.reshape(-1, 3)

@@ -94,6 +94,7 @@ def doorway(house: House, opening: Opening) -> shapely.Polygon:
 def _floors_and_doorways(house: House, storey: int) -> shapely.Geometry:
     rooms: list[Room] = [r for r in house.rooms if r.storey == storey]
     ids = {r.id for r in rooms}
-    ways = [doorway(house, o) for o in house.openings
-            if o.kind in DOORS and o.rooms[1] is not None and o.rooms[0] in ids]
+    ways = [
+        doorway(house, o) for o in house.openings if o.kind in DOORS and o.rooms[1] is not None and o.rooms[0] in ids
+    ]
     return shapely.union_all([*(house.floor(r) for r in rooms), *ways])

@@ -118,8 +118,10 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
     grid, room_of_cell, reach = reachable(house, storey)
     space = grid.space
     if shut := closed_rooms(room_of_cell, reach, len(rooms)):
-        raise HouseError(f"room {rooms[shut[0]].id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
-                         "widen its door or move the furniture that blocks it")
+        raise HouseError(
+            f"room {rooms[shut[0]].id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
+            "widen its door or move the furniture that blocks it"
+        )
     room_of_cell[~reach] = -1
     nodes = _spread(space, grid, room_of_cell, rooms, spacing)
     nodes = _join(house, storey, space, grid, reach, nodes, spacing)
@@ -197,8 +199,8 @@ class Grid:
         """Sparse 8-neighbour graph of the cells, dearer near obstacles; steps out of `space` are left out."""
         rows, cols, costs = [], [], []
         for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
-            a = self.index[: self.index.shape[0] - dx, max(0, -dy): self.index.shape[1] - max(0, dy)]
-            b = self.index[dx:, max(0, dy): self.index.shape[1] + min(0, dy)]
+            a = self.index[: self.index.shape[0] - dx, max(0, -dy) : self.index.shape[1] - max(0, dy)]
+            b = self.index[dx:, max(0, dy) : self.index.shape[1] + min(0, dy)]
             both = (a >= 0) & (b >= 0)
             i, j = a[both], b[both]
             rows.append(i)
@@ -206,7 +208,9 @@ class Grid:
             near = np.minimum(self.clearance[i], self.clearance[j])
             tight = np.flatnonzero(near < 1.5 * CELL)
             fine = np.ones(len(i), bool)
-            fine[tight] = shapely.covers(space, shapely.linestrings(np.stack([self.xy[i[tight]], self.xy[j[tight]]], 1)))
+            fine[tight] = shapely.covers(
+                space, shapely.linestrings(np.stack([self.xy[i[tight]], self.xy[j[tight]]], 1))
+            )
             rows[-1], cols[-1], near = i[fine], j[fine], near[fine]
             costs.append(CELL * np.hypot(dx, dy) * (1.0 + 0.6 * np.exp(-near / 0.2)))
         n = len(self.xy)
@@ -230,7 +234,9 @@ def _spread(space, grid: Grid, room_of_cell: np.ndarray, rooms, spacing: float) 
             ranked = np.flatnonzero(open_)[np.argsort(-value[open_], kind="stable")]
             top = ranked[: max(1, len(ranked) // 2)]
             top = top[np.linspace(0, len(top) - 1, min(LOOKS, len(top))).astype(int)]
-            best = int(top[np.argmax(value[top] + 0.5 * np.minimum(_seen(space, grid, cells[top], chosen, spacing), 3))])
+            best = int(
+                top[np.argmax(value[top] + 0.5 * np.minimum(_seen(space, grid, cells[top], chosen, spacing), 3))]
+            )
             chosen.append(int(cells[best]))
             gap = np.minimum(gap, np.hypot(*(xy - xy[best]).T))
             open_ = (gap >= apart) & (elsewhere >= 0.5 * apart)
@@ -278,7 +284,9 @@ def _visible_pairs(space: shapely.Polygon, xy: np.ndarray, longest: float) -> np
     return pairs[shapely.covers(space, lines)]
 
 
-def _join(house: House, storey: int, space, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
+def _join(
+    house: House, storey: int, space, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float
+) -> list[int]:
     """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
     ids = {r.id for r in house.rooms if r.storey == storey}
     cells = np.flatnonzero(reach)
@@ -296,8 +304,11 @@ def _join(house: House, storey: int, space, grid: Grid, reach: np.ndarray, nodes
             continue
         cell = int(cells[cell])
         close = np.flatnonzero(np.hypot(*(xy - grid.xy[cell]).T) < longest)
-        seen = close[shapely.covers(space, shapely.linestrings([(grid.xy[cell], xy[k]) for k in close]))] if (
-            len(close)) else close
+        seen = (
+            close[shapely.covers(space, shapely.linestrings([(grid.xy[cell], xy[k]) for k in close]))]
+            if (len(close))
+            else close
+        )
         if len(np.unique(label[seen])) > 1:
             nodes = [*nodes, cell]
     for _ in range(len(nodes)):
@@ -346,7 +357,9 @@ def sight_lines(graph: NavGraph, house: House) -> np.ndarray:
         space = sight_floor(house, storey).buffer(1e-6)
         shapely.prepare(space)
         i, j = nodes[np.stack(np.triu_indices(len(nodes), 1))]
-        seen[i, j] = shapely.covers(space, shapely.linestrings(np.stack([graph.positions[i, :2], graph.positions[j, :2]], 1)))
+        seen[i, j] = shapely.covers(
+            space, shapely.linestrings(np.stack([graph.positions[i, :2], graph.positions[j, :2]], 1))
+        )
     seen[graph.edges[:, 0], graph.edges[:, 1]] = True
     return seen | seen.T
 
@@ -364,11 +377,17 @@ def to_matterport(graph: NavGraph, house: House, path: Path) -> None:
     seen = sight_lines(graph, house)
     items = []
     for k, (x, y, z) in enumerate(graph.positions.tolist()):
-        items.append({
-            "image_id": graph.ids[k], "pose": [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0],
-            "included": True, "visible": seen[k].tolist(), "unobstructed": open_[k].tolist(), "height": EYE,
-            "room": graph.room_of_node[k],
-        })
+        items.append(
+            {
+                "image_id": graph.ids[k],
+                "pose": [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0],
+                "included": True,
+                "visible": seen[k].tolist(),
+                "unobstructed": open_[k].tolist(),
+                "height": EYE,
+                "room": graph.room_of_node[k],
+            }
+        )
     write_bytes(Path(path), json.dumps(items).encode())
 
 
@@ -382,7 +401,9 @@ def from_matterport(path: Path) -> NavGraph:
         items = json.loads(Path(path).read_text())
         keep = [k for k, i in enumerate(items) if i["included"]]
         positions = [[float(items[k]["pose"][at]) for at in (3, 7, 11)] for k in keep]
-        matrix = np.array([[bool(items[k]["unobstructed"][j]) for j in keep] for k in keep]).reshape(len(keep), len(keep))
+        matrix = np.array([[bool(items[k]["unobstructed"][j]) for j in keep] for k in keep]).reshape(
+            len(keep), len(keep)
+        )
         ids = tuple(str(items[k]["image_id"]) for k in keep)
     except (ValueError, KeyError, IndexError, TypeError) as e:
         raise HouseError(f"{path} is not a Matterport connectivity file ({e!r}); write one with to_matterport") from e

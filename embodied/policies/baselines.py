@@ -70,8 +70,12 @@ class Shortest:
         self._label = (teacher or ShortestTeacher()).label
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         return [None if s is None else self._label(s).move for s in situations], ()
 
@@ -112,8 +116,12 @@ class Asking:
         self.privileged = getattr(navigation, "privileged", False)
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], **situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        **situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         last, inner = memory or ([-1] * len(observations), None)
         actions, inner = self.navigation.act(observations, inner, rngs=rngs, **situations)
@@ -143,8 +151,12 @@ class PerfectInterpreter:
     privileged = True
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         trails = memory or [_Trail() for _ in observations]
         actions = [
@@ -226,8 +238,12 @@ class VnlaAsking:
         self._inner_privileged = getattr(navigation, "privileged", False)
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         times, inner = memory or ([self._times(s, rng) for s, rng in zip(situations, rngs, strict=True)], None)
         more = {"situations": situations} if self._inner_privileged else {}
@@ -259,8 +275,12 @@ class HalfwaySkyline:
     privileged = True
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         return [None if o is None else self._one(o, s) for o, s in zip(observations, situations, strict=True)], ()
 

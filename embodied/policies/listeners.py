@@ -24,8 +24,12 @@ class ScriptedListener:
     privileged = True
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         plans: list[Plan] = memory or [("", ()) for _ in observations]
         actions: Actions = []
@@ -42,8 +46,12 @@ class ListeningInterpreter(PerfectInterpreter):
     """
 
     def act(
-        self, observations: Observations, memory: object | None, *,
-        rngs: Sequence[np.random.Generator], situations: Sequence[Situation | None],
+        self,
+        observations: Observations,
+        memory: object | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        situations: Sequence[Situation | None],
     ) -> tuple[Actions, object]:
         plans, inner = memory or ([("", ()) for _ in observations], None)
         actions, inner = super().act(observations, inner, rngs=rngs, situations=situations)

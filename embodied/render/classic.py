@@ -43,8 +43,17 @@ class Renderer:
     thread that made them.
     """
 
-    def __init__(self, house: House, catalogue, *, quality: str = "unlit", backend: str = "classic", size: int = 256,
-                 lit: LitPages | None = None, scene: Scene | None = None) -> None:
+    def __init__(
+        self,
+        house: House,
+        catalogue,
+        *,
+        quality: str = "unlit",
+        backend: str = "classic",
+        size: int = 256,
+        lit: LitPages | None = None,
+        scene: Scene | None = None,
+    ) -> None:
         """Compile `house`, open OpenGL and upload.
 
         A pane of glass counts as what is seen where it is: its depth and its id, though colours shine through.
@@ -89,8 +98,16 @@ class Renderer:
             self._painter = Painter(house, catalogue, lit)
         self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
 
-    def view(self, position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 3,
-             size: tuple[int, int] = (480, 640), *, cull: bool = True) -> View:
+    def view(
+        self,
+        position,
+        yaw: float,
+        pitch: float = 0.0,
+        vfov: float = math.pi / 3,
+        size: tuple[int, int] = (480, 640),
+        *,
+        cull: bool = True,
+    ) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch).
 
         Args:
@@ -159,8 +176,9 @@ class Renderer:
             mask = self._seen_around(camera.position) & self._in_frustum(camera, size)
         model = self.scene.model
         model.geom_group[:] = np.where(mask, VISUAL, HIDDEN)
-        mujoco.mjv_updateScene(model, self._data, self._option, self._perturb, self._camera,
-                               mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn)
+        mujoco.mjv_updateScene(
+            model, self._data, self._option, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn
+        )
         model.geom_group[:] = np.where(self._is_visual, VISUAL, COLLISION)
         _aim(self._drawn, camera, size)
         return np.flatnonzero(mask)
@@ -175,7 +193,9 @@ class Renderer:
             else:
                 for room, sectors in rooms.items():
                     g = self._geoms_of_room.get(room, np.zeros(0, int))
-                    mask[g] |= visibility.within(sectors, np.array(position[:2]), data.geom_xpos[g, :2], model.geom_rbound[g])
+                    mask[g] |= visibility.within(
+                        sectors, np.array(position[:2]), data.geom_xpos[g, :2], model.geom_rbound[g]
+                    )
             self._seen_from = (position, mask)
         return self._seen_from[1]
 

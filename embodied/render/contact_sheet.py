@@ -36,7 +36,7 @@ def draw_sheets(catalogue, keys: Sequence[str], out: Path, *, surfaces: bool = F
     the support surfaces lie on the models as blue sheets.
     """
     per_sheet = COLUMNS * ROWS
-    groups = [keys[i:i + per_sheet] for i in range(0, len(keys), per_sheet)]
+    groups = [keys[i : i + per_sheet] for i in range(0, len(keys), per_sheet)]
     paths = []
     for i, group in enumerate(tqdm(groups, desc="drawing sheets", unit="sheet")):
         path = Path(out) / f"sheet_{i:02d}.png"
@@ -79,8 +79,15 @@ def _model(catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
     spec.stat.extent, spec.stat.center = 1.0, [0, 0, 0]
     spec.visual.map.znear, spec.visual.map.zfar = 0.005, 60.0
     scene._light(spec)
-    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-                     rgb1=[0.80, 0.86, 0.92], rgb2=[0.80, 0.86, 0.92], width=32, height=32)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=[0.80, 0.86, 0.92],
+        rgb2=[0.80, 0.86, 0.92],
+        width=32,
+        height=32,
+    )
     parts = []
     for i, key in enumerate(keys):
         for j, mesh in enumerate(catalogue.mesh(key)):
@@ -88,8 +95,13 @@ def _model(catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
         _measure(spec, catalogue.assets[key], SPACING * i)
         for s in catalogue.assets[key].surfaces if surfaces else ():
             spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX, pos=[SPACING * i + (s.x0 + s.x1) / 2, (s.y0 + s.y1) / 2, s.z + 0.004],
-                size=[(s.x1 - s.x0) / 2, (s.y1 - s.y0) / 2, 0.003], rgba=[0.1, 0.3, 1.0, 0.7], contype=0, conaffinity=0)
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[SPACING * i + (s.x0 + s.x1) / 2, (s.y0 + s.y1) / 2, s.z + 0.004],
+                size=[(s.x1 - s.x0) / 2, (s.y1 - s.y0) / 2, 0.003],
+                rgba=[0.1, 0.3, 1.0, 0.7],
+                contype=0,
+                conaffinity=0,
+            )
     scene._add_parts(spec, parts, {})
     return spec.compile()
 

@@ -37,8 +37,14 @@ MIRROR = 11_700.0
 """Intensity of an image light at which a mirror shows its texels as they are (measured: sRGB 188 comes out as 188)."""
 DULL = 0.05
 """Specular below which a mesh reflects nothing."""
-CUBE = (((1, 0, 0), (0, 0, 1)), ((-1, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, 1, 0)), ((0, 0, -1), (0, -1, 0)),
-        ((0, -1, 0), (0, 0, 1)), ((0, 1, 0), (0, 0, 1)))
+CUBE = (
+    ((1, 0, 0), (0, 0, 1)),
+    ((-1, 0, 0), (0, 0, 1)),
+    ((0, 0, 1), (0, 1, 0)),
+    ((0, 0, -1), (0, -1, 0)),
+    ((0, -1, 0), (0, 0, 1)),
+    ((0, 1, 0), (0, 0, 1)),
+)
 """Forward and up, world, of the faces of an image light: OpenGL's order and (mirrored) layout with y up, found with
 coloured faces on a mirroring ball."""
 REMEDY = "install Vulkan (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers), or use backend 'classic'"
@@ -93,13 +99,21 @@ class Painter:
         if room not in self._lights_of_room:
             eye = middle_of(self._house, room)
             faces = [self._draw(Camera(eye, forward, up), (PROBE, PROBE), near, far)[:, ::-1] for forward, up in CUBE]
-            texture = self._context.create_texture(mjrf.TextureConfig(
-                width=PROBE, height=6 * PROBE, format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
-                color_space=mjrf.ColorSpace.COLORSPACE_SRGB, sampler_type=mjrf.SamplerType.TEXTURE_CUBE))
+            texture = self._context.create_texture(
+                mjrf.TextureConfig(
+                    width=PROBE,
+                    height=6 * PROBE,
+                    format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+                    color_space=mjrf.ColorSpace.COLORSPACE_SRGB,
+                    sampler_type=mjrf.SamplerType.TEXTURE_CUBE,
+                )
+            )
             data = mjrf.TextureData()
             data.set_image(np.ascontiguousarray(np.concatenate(faces)).tobytes())
             texture.upload(data)
-            light = self._context.create_light(mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=MIRROR))
+            light = self._context.create_light(
+                mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=MIRROR)
+            )
             self._lights_of_room[room] = light, texture
         self._scene.add_light(self._lights_of_room[room][0])
         self._room = room
@@ -116,8 +130,15 @@ class Painter:
         top = near * np.tan(camera.vfov / 2)
         request = mjrf.RenderRequest()
         request.scene, request.target = self._scene, self._targets[size]
-        request.camera = mjrf.Camera(pos=camera.position, forward=camera.forward, up=camera.up, frustum_bottom=-top,
-                                     frustum_top=top, frustum_near=near, frustum_far=far)
+        request.camera = mjrf.Camera(
+            pos=camera.position,
+            forward=camera.forward,
+            up=camera.up,
+            frustum_bottom=-top,
+            frustum_top=top,
+            frustum_near=near,
+            frustum_far=far,
+        )
         request.viewport.left = request.viewport.bottom = 0
         request.viewport.width, request.viewport.height = size[1], size[0]
         request.post_processing, request.skybox = True, True
@@ -213,8 +234,13 @@ class _InstanceInfo(ctypes.Structure):
     """VkInstanceCreateInfo of the Vulkan specification."""
 
     _fields_ = [
-        ("kind", ctypes.c_int), ("next", ctypes.c_void_p), ("flags", ctypes.c_uint32), ("application", ctypes.c_void_p),
-        ("layers", ctypes.c_uint32), ("layer_names", ctypes.c_void_p), ("extensions", ctypes.c_uint32),
+        ("kind", ctypes.c_int),
+        ("next", ctypes.c_void_p),
+        ("flags", ctypes.c_uint32),
+        ("application", ctypes.c_void_p),
+        ("layers", ctypes.c_uint32),
+        ("layer_names", ctypes.c_void_p),
+        ("extensions", ctypes.c_uint32),
         ("extension_names", ctypes.c_void_p),
     ]
 

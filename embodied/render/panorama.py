@@ -47,8 +47,9 @@ class Panorama:
         """Side of a face, pixels."""
         return self.rgb.shape[1]
 
-    def view(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36,
-             size: tuple[int, int] = (480, 640)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def view(
+        self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A perspective picture along (yaw, pitch): rgb, depth along its optical axis, ids.
 
         Args:
@@ -63,8 +64,9 @@ class Panorama:
         grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size))
         return self._rgb(grid), self._depth(grid), self._ids(grid)
 
-    def view_rgb(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36,
-                 size: tuple[int, int] = (480, 640)) -> np.ndarray:
+    def view_rgb(
+        self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
+    ) -> np.ndarray:
         """The colours of `view` alone."""
         return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size)))
 
@@ -167,8 +169,12 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
 @functools.lru_cache(maxsize=4)
 def grid36(s: int, size: int) -> Grid:
     """The 36 views of `Panorama.views36`, below each other."""
-    rays = [_pinhole_rays(float(yaw_of_heading(math.radians(30 * (i % 12)))), math.radians(30 * (i // 12 - 1)),
-                          VFOV36, size, size) for i in range(36)]
+    rays = [
+        _pinhole_rays(
+            float(yaw_of_heading(math.radians(30 * (i % 12)))), math.radians(30 * (i // 12 - 1)), VFOV36, size, size
+        )
+        for i in range(36)
+    ]
     return _grid(s, np.concatenate([r[0] for r in rays]), np.concatenate([r[1] for r in rays]))
 
 
@@ -230,8 +236,14 @@ def pad_grid(s: int) -> Pad:
     lengths = np.linalg.norm(rays, axis=-1)
     other, ou, ov, along = _face_coordinates(rays / lengths[:, None])
     x, y = (np.clip((w + 1) / 2 * s - 0.5, 0, s - 1) for w in (ou, ov))
-    return Pad(face, row, column, x.astype(np.float32)[:, None], (y + other * s).astype(np.float32)[:, None],
-               (along * lengths).astype(np.float32))
+    return Pad(
+        face,
+        row,
+        column,
+        x.astype(np.float32)[:, None],
+        (y + other * s).astype(np.float32)[:, None],
+        (along * lengths).astype(np.float32),
+    )
 
 
 @functools.lru_cache(maxsize=8)

@@ -104,7 +104,9 @@ class PanoramaFile:
             raise IndexError(f"{self.path} holds the nodes 0 to {len(self) - 1}, not {node}")
         data = self._data(node, channel)
         if data is None:
-            raise PanoramaFileError(f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again")
+            raise PanoramaFileError(
+                f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again"
+            )
         return cv2.imdecode(np.frombuffer(data, np.uint8), flag)
 
     def _data(self, node: int, channel: str) -> bytes | None:
@@ -115,7 +117,9 @@ class PanoramaFile:
         return data if len(data) == length and zlib.crc32(data) == crc else None
 
 
-def write_panoramas(path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False) -> None:
+def write_panoramas(
+    path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False
+) -> None:
     """Write `panoramas` (node 0, 1, ...) to `path` atomically.
 
     Args:
@@ -142,8 +146,14 @@ def encode(panorama: Panorama, lossless: bool = False) -> tuple[bytes, bytes, by
     if lossless:
         rgb = _encoded(".png", colours, cv2.IMWRITE_PNG_COMPRESSION, 3)
     else:
-        rgb = _encoded(".jpg", colours, cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
-                       cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+        rgb = _encoded(
+            ".jpg",
+            colours,
+            cv2.IMWRITE_JPEG_QUALITY,
+            JPEG_QUALITY,
+            cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+            cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+        )
     metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST), 0)
     depth = _encoded(".png", _beside(np.rint(metres * 1000).astype(np.uint16)), cv2.IMWRITE_PNG_COMPRESSION, 1)
     if panorama.ids.max() > 65535:

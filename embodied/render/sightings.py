@@ -50,7 +50,8 @@ class SightingTable:
         first, last = np.searchsorted(self.node, [node, node + 1])
         return tuple(
             Sighting(house.placements[o].id, house.placements[o].object_class, float(y), float(p), float(d), int(n))
-            for o, y, p, d, n in zip(*(getattr(self, name)[first:last] for name in COLUMNS[1:]), strict=True))
+            for o, y, p, d, n in zip(*(getattr(self, name)[first:last] for name in COLUMNS[1:]), strict=True)
+        )
 
 
 COLUMNS = ("node", "owner", "yaw", "pitch", "distance", "pixels")
@@ -81,8 +82,14 @@ def _rows(node: int, depth: np.ndarray, ids: np.ndarray, placements: int) -> tup
     order = np.argsort(-pixels, kind="stable")
     order = order[: np.count_nonzero(pixels)]
     x, y, z = direction[order].T
-    return (np.full(len(order), node), order, np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)), distance[order],
-            pixels[order])
+    return (
+        np.full(len(order), node),
+        order,
+        np.arctan2(y, x),
+        np.arctan2(z, np.hypot(x, y)),
+        distance[order],
+        pixels[order],
+    )
 
 
 def save_table(path: Path, table: SightingTable) -> None:

@@ -97,8 +97,9 @@ def visible_rooms(house: House, portals: Portals, position) -> dict[str, list[Se
     return seen if complete else None
 
 
-def _look(portals: Portals, eye: np.ndarray, room: str, sector: Sector, path: tuple[str, ...],
-          seen: dict[str, list[Sector]]) -> bool:
+def _look(
+    portals: Portals, eye: np.ndarray, room: str, sector: Sector, path: tuple[str, ...], seen: dict[str, list[Sector]]
+) -> bool:
     if any(s[0] <= sector[0] and sector[1] <= s[1] for s in seen.get(room, ())):
         return True
     seen.setdefault(room, []).append(sector)

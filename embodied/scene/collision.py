@@ -33,8 +33,16 @@ SMALL = 0.35
 """Objects no larger than this in metres, without support surfaces, are one box."""
 
 DENSITIES = (
-    ("metal", 900.0), ("stone", 2000.0), ("marble", 2000.0), ("ceramic", 1200.0), ("glass", 1200.0),
-    ("wood", 500.0), ("leather", 200.0), ("fabric", 120.0), ("plastic", 300.0), ("paper", 600.0),
+    ("metal", 900.0),
+    ("stone", 2000.0),
+    ("marble", 2000.0),
+    ("ceramic", 1200.0),
+    ("glass", 1200.0),
+    ("wood", 500.0),
+    ("leather", 200.0),
+    ("fabric", 120.0),
+    ("plastic", 300.0),
+    ("paper", 600.0),
 )
 """Material word to kg per cubic metre of what a box encloses (things are hollow)."""
 DENSITY = 300.0
@@ -50,7 +58,9 @@ class Box:
     yaw: float = 0.0
 
 
-def kept_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path) -> tuple[Box, ...]:
+def kept_boxes(
+    asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path
+) -> tuple[Box, ...]:
     """`object_boxes`, kept on disk under what they depend on; a file that makes no sense is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
@@ -118,7 +128,9 @@ def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
 
 
-def without(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+def without(
+    one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """The part of box `one` outside box `other` as up to six boxes; all given as (low, high) corners."""
     low, high = one[0].copy(), one[1].copy()
     if np.any(low >= other[1] - 1e-6) or np.any(high <= other[0] + 1e-6):
@@ -151,7 +163,9 @@ def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:
     sides = np.where(normals[flat, 2] > 0, 1, -1)
     keys, group = np.unique(np.stack([np.rint(heights / 0.004), sides]), axis=1, return_inverse=True)
     areas = np.bincount(group.ravel(), np.abs(normals[flat, 2]), keys.shape[1])
-    mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(np.bincount(group.ravel(), minlength=keys.shape[1]), 1)
+    mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(
+        np.bincount(group.ravel(), minlength=keys.shape[1]), 1
+    )
     outline = np.prod(np.ptp(corners.reshape(-1, 3), axis=0)[:2])
     large = np.argsort(-areas)[:8]
     return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > share * outline)
@@ -164,8 +178,9 @@ def is_solid(points: np.ndarray) -> bool:
     return filled > 0.97 * float(np.prod(points.max(axis=0) - points.min(axis=0)))
 
 
-def grid_boxes(points: np.ndarray, n: int, cut: Sequence[float] = (),
-               most: int = 10**6) -> list[tuple[np.ndarray, np.ndarray]]:
+def grid_boxes(
+    points: np.ndarray, n: int, cut: Sequence[float] = (), most: int = 10**6
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """(low, high) corners of boxes that cover `points` (k, 3), from a grid of cubes, n along the longest side.
 
     The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is

@@ -23,7 +23,9 @@ MESHES, TEXTURES = "meshes", "textures"
 """Folders beside house.xml."""
 
 
-def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None) -> Path:
+def export_mjcf(
+    house: House, catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None
+) -> Path:
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer as it is.
 
     Args:
@@ -45,7 +47,9 @@ def export_mjcf(house: House, catalogue, folder: Path, *, free: frozenset[str] =
         (folder / MESHES / name).write_bytes(data)
     for texture in spec.textures:
         if texture.data:
-            image = np.frombuffer(bytes(texture.data), np.uint8).reshape(texture.height, texture.width, texture.nchannel)
+            image = np.frombuffer(bytes(texture.data), np.uint8).reshape(
+                texture.height, texture.width, texture.nchannel
+            )
             (folder / TEXTURES / f"{texture.name}.png").write_bytes(_png(image))
             texture.data = b""
             texture.file = f"{texture.name}.png"
@@ -95,8 +99,9 @@ def glb_scene(parts: Sequence[Part]) -> trimesh.Scene:
         if finish not in materials:
             materials[finish] = pbr_material(finish)
         visual = trimesh.visual.TextureVisuals(uv=part.mesh.uv, material=materials[finish])
-        mesh = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces, vertex_normals=part.mesh.normals, visual=visual,
-                               process=False)
+        mesh = trimesh.Trimesh(
+            part.mesh.vertices, part.mesh.faces, vertex_normals=part.mesh.normals, visual=visual, process=False
+        )
         scene.add_geometry(mesh, node_name=node, geom_name=part.mesh_key, transform=upright @ pose)
     return scene
 
@@ -107,14 +112,20 @@ def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in finish.color[:3]]
     has_holes = image is not None and image.mode == "RGBA"
     return trimesh.visual.material.PBRMaterial(
-        baseColorTexture=image, baseColorFactor=[1.0, 1.0, 1.0, finish.color[3]] if image else [*linear, finish.color[3]],
-        roughnessFactor=finish.roughness, metallicFactor=finish.metallic, doubleSided=True,
+        baseColorTexture=image,
+        baseColorFactor=[1.0, 1.0, 1.0, finish.color[3]] if image else [*linear, finish.color[3]],
+        roughnessFactor=finish.roughness,
+        metallicFactor=finish.metallic,
+        doubleSided=True,
         alphaMode="MASK" if has_holes else "BLEND" if finish.color[3] < 1 else "OPAQUE",
-        emissiveFactor=[min(1.0, e) for e in finish.emission] if finish.emission else None)
+        emissiveFactor=[min(1.0, e) for e in finish.emission] if finish.emission else None,
+    )
 
 
 def _picture(path: str) -> PIL.Image.Image:
     image = PIL.Image.fromarray(load_texture(path))
     buffer = io.BytesIO()
-    image.save(buffer, *(("PNG",) if image.mode == "RGBA" else ("JPEG",)), **({} if image.mode == "RGBA" else {"quality": 90}))
+    image.save(
+        buffer, *(("PNG",) if image.mode == "RGBA" else ("JPEG",)), **({} if image.mode == "RGBA" else {"quality": 90})
+    )
     return PIL.Image.open(buffer)

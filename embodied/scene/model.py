@@ -62,8 +62,9 @@ class Scene:
     """Placement ids that have a body and a free joint of the same name."""
 
 
-def compile_scene(house: House, catalogue, *, free: Iterable[str] = (), collisions: bool = True,
-                  lit: LitPages | None = None) -> Scene:
+def compile_scene(
+    house: House, catalogue, *, free: Iterable[str] = (), collisions: bool = True, lit: LitPages | None = None
+) -> Scene:
     """Build and compile `house`.
 
     Args:
@@ -108,8 +109,11 @@ def owner_of_name(geom: str) -> str:
 
 def loose(house: House, catalogue) -> frozenset[str]:
     """The placements that physics can move: all that stand or lie, not what is fixed to the house or underfoot."""
-    return frozenset(p.id for p in house.placements if catalogue.assets[p.asset].support in LOOSE
-                     and not is_underfoot(p) and not is_hung(house, p))
+    return frozenset(
+        p.id
+        for p in house.placements
+        if catalogue.assets[p.asset].support in LOOSE and not is_underfoot(p) and not is_hung(house, p)
+    )
 
 
 def is_hung(house: House, p: Placement) -> bool:
@@ -122,8 +126,15 @@ def is_underfoot(p: Placement) -> bool:
     return p.parent is None and p.size[2] < UNDERFOOT
 
 
-def build_spec(house: House, catalogue, *, free: frozenset[str] = frozenset(), collisions: bool = True,
-               lit: LitPages | None = None, parts: Sequence[Part] | None = None) -> mujoco.MjSpec:
+def build_spec(
+    house: House,
+    catalogue,
+    *,
+    free: frozenset[str] = frozenset(),
+    collisions: bool = True,
+    lit: LitPages | None = None,
+    parts: Sequence[Part] | None = None,
+) -> mujoco.MjSpec:
     """The house as an MjSpec.
 
     Args:
@@ -183,13 +194,26 @@ def _light(spec: mujoco.MjSpec) -> None:
     head.active, head.ambient, head.diffuse, head.specular = 1, [0.63, 0.62, 0.60], [0.0] * 3, [0.0] * 3
     for direction, strength in LIGHTS:
         spec.worldbody.add_light(
-            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=direction, pos=[0, 0, 3], castshadow=False,
-            ambient=[0, 0, 0], diffuse=[strength, strength * 0.985, strength * 0.95], specular=[0.1] * 3)
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            dir=direction,
+            pos=[0, 0, 3],
+            castshadow=False,
+            ambient=[0, 0, 0],
+            diffuse=[strength, strength * 0.985, strength * 0.95],
+            specular=[0.1] * 3,
+        )
 
 
 def _add_sky(spec: mujoco.MjSpec) -> None:
-    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-                     rgb1=[0.50, 0.68, 0.90], rgb2=[0.93, 0.95, 0.97], width=128, height=128)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.50, 0.68, 0.90],
+        rgb2=[0.93, 0.95, 0.97],
+        width=128,
+        height=128,
+    )
 
 
 LIGHTS = (((0.35, 0.5, -0.8), 0.34), ((-0.85, -0.5, 0.15), 0.30), ((0.0, 0.0, 1.0), 0.30))
@@ -226,8 +250,17 @@ def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, 
         body = bodies.get(part.owner)
         pose = {} if body is not None else {"pos": part.position, "quat": yaw_quat(part.yaw)}
         (body or spec.worldbody).add_geom(
-            name=f"{part.owner}#{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=meshes[part.mesh_key],
-            material=material, rgba=rgba, group=VISUAL, contype=0, conaffinity=0, mass=0, **pose)
+            name=f"{part.owner}#{k}",
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=meshes[part.mesh_key],
+            material=material,
+            rgba=rgba,
+            group=VISUAL,
+            contype=0,
+            conaffinity=0,
+            mass=0,
+            **pose,
+        )
 
 
 def _is_drawable(mesh: MeshPart) -> bool:
@@ -236,8 +269,9 @@ def _is_drawable(mesh: MeshPart) -> bool:
     return bool(np.abs(normals).sum() > 1e-7)
 
 
-def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: np.ndarray, normals: np.ndarray | None,
-              uv: np.ndarray, faces: np.ndarray) -> None:
+def _add_mesh(
+    spec: mujoco.MjSpec, name: str, vertices: np.ndarray, normals: np.ndarray | None, uv: np.ndarray, faces: np.ndarray
+) -> None:
     """A mesh by way of MuJoCo's binary format, which is much faster than handing over lists."""
     if len(vertices) < 4:  # the format's least
         vertices, uv = (np.concatenate([a, a[-1:]]) for a in (vertices, uv))
@@ -271,8 +305,12 @@ class _Looks:
         if key not in self._materials:
             name = self._materials[key] = f"material_{len(self._materials)}"
             material = self._spec.add_material(
-                name=name, rgba=[1, 1, 1, 1] if finish.texture else [0.5, 0.5, 0.5, 1], emission=0.9 if glow else 0.0,
-                specular=gloss, shininess=max(0.05, 1 - finish.roughness))
+                name=name,
+                rgba=[1, 1, 1, 1] if finish.texture else [0.5, 0.5, 0.5, 1],
+                emission=0.9 if glow else 0.0,
+                specular=gloss,
+                shininess=max(0.05, 1 - finish.roughness),
+            )
             if finish.texture:
                 material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = self._texture(finish.texture)
         alpha = float(finish.color[3])
@@ -324,8 +362,16 @@ def _add_pages(spec: mujoco.MjSpec, lit: LitPages) -> None:
             name = f"{i:04d}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
             _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
             spec.worldbody.add_geom(
-                name=f"{m.owner}#{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=f"page_{m.page}",
-                rgba=[1, 1, 1, m.alpha], group=VISUAL, contype=0, conaffinity=0, mass=0)
+                name=f"{m.owner}#{k}",
+                type=mujoco.mjtGeom.mjGEOM_MESH,
+                meshname=name,
+                material=f"page_{m.page}",
+                rgba=[1, 1, 1, m.alpha],
+                group=VISUAL,
+                contype=0,
+                conaffinity=0,
+                mass=0,
+            )
 
 
 def _add_collisions(spec: mujoco.MjSpec, house: House, catalogue, bodies: Mapping[str, mujoco.MjsBody]) -> None:
@@ -355,22 +401,43 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
         if part.kind == "opening" and part.owner.endswith(LEAVES):
             first = count[part.owner] = count.get(part.owner, -1) + 1
             frame = spec.worldbody.add_frame(pos=part.position, quat=yaw_quat(part.yaw))
-            _add_boxes(spec.worldbody, part.owner, [collision.bounding_box(part.mesh.vertices)], frame=frame, first=first)
+            _add_boxes(
+                spec.worldbody, part.owner, [collision.bounding_box(part.mesh.vertices)], frame=frame, first=first
+            )
 
 
 def placement_boxes(catalogue, p: Placement) -> tuple[collision.Box, ...]:
     """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
     asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
     cache = getattr(catalogue, "cache", None)
-    return collision.object_boxes(asset, parts, p.size) if cache is None else collision.kept_boxes(asset, parts, p.size, cache)
+    return (
+        collision.object_boxes(asset, parts, p.size)
+        if cache is None
+        else collision.kept_boxes(asset, parts, p.size, cache)
+    )
 
 
-def _add_boxes(body: mujoco.MjsBody, owner: str, boxes: Sequence[collision.Box], *, density: float = 1000.0,
-               frame: mujoco.MjsFrame | None = None, first: int = 0) -> None:
+def _add_boxes(
+    body: mujoco.MjsBody,
+    owner: str,
+    boxes: Sequence[collision.Box],
+    *,
+    density: float = 1000.0,
+    frame: mujoco.MjsFrame | None = None,
+    first: int = 0,
+) -> None:
     for k, box in enumerate(boxes, first):
         geom = body.add_geom(
-            name=f"{owner}#box{k}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=box.centre, quat=yaw_quat(box.yaw),
-            size=box.half, group=COLLISION, rgba=[0.6, 0.7, 0.9, 0.4], density=density, friction=[0.9, 0.005, 0.0001])
+            name=f"{owner}#box{k}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=box.centre,
+            quat=yaw_quat(box.yaw),
+            size=box.half,
+            group=COLLISION,
+            rgba=[0.6, 0.7, 0.9, 0.4],
+            density=density,
+            friction=[0.9, 0.005, 0.0001],
+        )
         if frame is not None:
             geom.set_frame(frame)
 

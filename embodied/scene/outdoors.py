@@ -8,18 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from assets.built.primitives import (
-    Shape,
-    ball,
-    bar,
-    box,
-    extruded,
-    flat,
-    joined,
-    part,
-    sheet,
-    tube,
-)
+from assets.built.primitives import Shape, ball, bar, box, extruded, flat, joined, part, sheet, tube
 from assets.records import Finish
 from embodied.house.house import House
 from embodied.scene.part import Part

@@ -44,9 +44,7 @@ class Pool:
         return len(self.pairs)
 
 
-def build_pool(
-    world: World, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str
-) -> Pool:
+def build_pool(world: World, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str) -> Pool:
     """Pairs whose shortest path to the nearest goal (in metres) has `fewest`..`most` nodes."""
     graph = world.graph
     hops = count_hops(graph.next_hop) + 1
@@ -76,8 +74,15 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     goal, start, rng = draw(pool, index, seed=seed, kind="find")
     what = FindObject(goal.object_class, None, goal.placements)
     return Task(
-        f"{pool.world}/find/{index}", "find", pool.world, start, what, goal.goal_nodes,
-        language.request(what, rng=rng), radius=0.0, horizon=config.horizon,
+        f"{pool.world}/find/{index}",
+        "find",
+        pool.world,
+        start,
+        what,
+        goal.goal_nodes,
+        language.request(what, rng=rng),
+        radius=0.0,
+        horizon=config.horizon,
     )
 
 

@@ -42,6 +42,13 @@ def hanna_task(pool: Pool, index: int, *, seed: int, language: Language, config:
     goal, start, rng = draw(pool, index, seed=seed, kind="hanna")
     what = FindObject(goal.object_class, None, goal.placements)
     return Task(
-        f"{pool.world}/hanna/{index}", "hanna", pool.world, start, what, goal.goal_nodes,
-        language.request(what, rng=rng), radius=config.radius, horizon=config.horizon,
+        f"{pool.world}/hanna/{index}",
+        "hanna",
+        pool.world,
+        start,
+        what,
+        goal.goal_nodes,
+        language.request(what, rng=rng),
+        radius=config.radius,
+        horizon=config.horizon,
     )

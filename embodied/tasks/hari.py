@@ -26,7 +26,7 @@ class HariConfig:
 
 
 def hari_pool(
-    world: World, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None,
+    world: World, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None
 ) -> Pool:
     """One request per object instance: the node nearest to it is what the human has in mind.
 
@@ -35,7 +35,8 @@ def hari_pool(
     """
     classes = tuple(
         GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1])
-        for x in find_instances(world, config.reach) if objects is None or x.object_class in objects
+        for x in find_instances(world, config.reach)
+        if objects is None or x.object_class in objects
     )
     return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hari")
 
@@ -49,6 +50,13 @@ def hari_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     goal, start, rng = draw(pool, index, seed=seed, kind="hari")
     what = FindObject(goal.object_class, goal.room_kind, goal.placements)
     return Task(
-        f"{pool.world}/hari/{index}", "hari", pool.world, start, what, goal.goal_nodes,
-        language.request(what, rng=rng), radius=0.0, horizon=config.horizon,
+        f"{pool.world}/hari/{index}",
+        "hari",
+        pool.world,
+        start,
+        what,
+        goal.goal_nodes,
+        language.request(what, rng=rng),
+        radius=0.0,
+        horizon=config.horizon,
     )

@@ -12,6 +12,13 @@ HORIZON = 20
 def vln_task(world: str, route: Route) -> Task:
     """The task of following `route` of the house `world`."""
     return Task(
-        f"{world}/vln/{route.id}", "vln", world, Pose(route.path[0], route.turn, route.tilt),
-        FollowRoute(route.id, route.path), (route.path[-1],), route.instruction, RADIUS, HORIZON,
+        f"{world}/vln/{route.id}",
+        "vln",
+        world,
+        Pose(route.path[0], route.turn, route.tilt),
+        FollowRoute(route.id, route.path),
+        (route.path[-1],),
+        route.instruction,
+        RADIUS,
+        HORIZON,
     )

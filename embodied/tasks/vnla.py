@@ -38,7 +38,9 @@ def vnla_pool(world: World, plan: MonocularPlan, *, seed: int, config: VnlaConfi
     """Pairs that the teacher finishes in time, whichever way the agent looks at first."""
     classes = goal_classes(find_instances(world, config.reach), by_room=config.by_room, nearest_only=True)
     pool = build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_actions, kind="vnla")
-    return Pool(pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan, config)]).reshape(-1, 2))
+    return Pool(
+        pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan, config)]).reshape(-1, 2)
+    )
 
 
 def _in_time(pair: np.ndarray, classes: tuple[GoalClass, ...], plan: MonocularPlan, config: VnlaConfig) -> bool:
@@ -64,8 +66,15 @@ def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple
 
 
 def vnla_task(
-    pool: Pool, index: int, world: World, plan: MonocularPlan, *, seed: int, language: Language,
-    limits: Mapping[tuple[str, str], int] | None = None, config: VnlaConfig = VnlaConfig(),
+    pool: Pool,
+    index: int,
+    world: World,
+    plan: MonocularPlan,
+    *,
+    seed: int,
+    language: Language,
+    limits: Mapping[tuple[str, str], int] | None = None,
+    config: VnlaConfig = VnlaConfig(),
 ) -> Task:
     """Task `index` of the pool: a pure function of its arguments.
 
@@ -83,8 +92,16 @@ def vnla_task(
         horizon = max(horizon, limits.get(limit_key(world, start.node, what), config.most_actions))
     budget = config.help_ratio * horizon / config.help_steps
     return Task(
-        f"{pool.world}/vnla/{index}", "vnla", pool.world, start, what, goal.goal_nodes,
-        language.request(what, rng=rng), radius=config.radius, horizon=horizon, budget=budget,
+        f"{pool.world}/vnla/{index}",
+        "vnla",
+        pool.world,
+        start,
+        what,
+        goal.goal_nodes,
+        language.request(what, rng=rng),
+        radius=config.radius,
+        horizon=horizon,
+        budget=budget,
     )
 
 

@@ -42,6 +42,4 @@ class ShortestTeacher:
         return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
 
     def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
-        return tuple(
-            Label(shortest_action(world.graph, s.pose, s.targets, s.candidate_nodes)) for s in episode.steps
-        )
+        return tuple(Label(shortest_action(world.graph, s.pose, s.targets, s.candidate_nodes)) for s in episode.steps)

@@ -213,8 +213,18 @@ class VnlaTeacher:
             left = None if episode.budget is None else episode.budget - requests
             candidates, _ = self.moves.at(world, step.pose)
             situation = Situation(
-                world, episode.task, step.pose, step.mode, step.targets, None, step.candidate_nodes, candidates,
-                time, requests, left, tuple(trail),
+                world,
+                episode.task,
+                step.pose,
+                step.mode,
+                step.targets,
+                None,
+                step.candidate_nodes,
+                candidates,
+                time,
+                requests,
+                left,
+                tuple(trail),
             )
             label = self.label(situation, step.action.thought)
             asked = isinstance(step.action, Ask)

@@ -75,14 +75,19 @@ def _placements(rooms: list[tuple[str, list[Thing]]]) -> tuple[Placement, ...]:
             name = t.asset.object_class.replace(" ", "_")
             numbers[name] += 1
             ids[id(t)] = f"{name}_{numbers[name]}"
-            placements.append(Placement(
-                ids[id(t)], t.asset.key, t.asset.object_class, room, rounded((t.x, t.y, t.z)),
-                rounded(float(wrap(t.yaw))), rounded(t.size), ids[id(t.parent)] if t.parent is not None else None,
-                t.surface, tuple(sorted(t.params)), f"{room}/{t.group}" if t.group else None,
-            ))
+            placements.append(
+                Placement(
+                    ids[id(t)],
+                    t.asset.key,
+                    t.asset.object_class,
+                    room,
+                    rounded((t.x, t.y, t.z)),
+                    rounded(float(wrap(t.yaw))),
+                    rounded(t.size),
+                    ids[id(t.parent)] if t.parent is not None else None,
+                    t.surface,
+                    tuple(sorted(t.params)),
+                    f"{room}/{t.group}" if t.group else None,
+                )
+            )
     return tuple(placements)
-
-
-
-
-

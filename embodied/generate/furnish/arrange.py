@@ -118,7 +118,7 @@ class Fit:
 
 
 def pack(
-    space: RoomSpace, items: Sequence[Item], poses: Iterable[Pose], group: str, tries: int = 40,
+    space: RoomSpace, items: Sequence[Item], poses: Iterable[Pose], group: str, tries: int = 40
 ) -> list[Thing] | None:
     """Put the arrangement at the first pose that takes all of it, or at one that takes most of it.
 
@@ -159,16 +159,26 @@ def _fit(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> Fit
             continue
         w, d, h = item.extent
         thing = Thing(
-            item.asset, pose.x + c * item.x - s * item.y, pose.y + s * item.x + c * item.y,
-            space.bottom + item.z, pose.yaw + item.yaw, item.extent, item.params, None, None, group,
-            item.role, pose.wall,
+            item.asset,
+            pose.x + c * item.x - s * item.y,
+            pose.y + s * item.x + c * item.y,
+            space.bottom + item.z,
+            pose.yaw + item.yaw,
+            item.extent,
+            item.params,
+            None,
+            None,
+            group,
+            item.role,
+            pose.wall,
         )
         b = thing.box
         flat = is_flat(item.extent, item.z)
         allowed = [boxes[i] for i in item.under if boxes[i] is not None]
         good = (item.needs is None or things[item.needs] is not None) and (
-            _flat_fits(space, b) if flat else
-            space.fits(b, ignore=allowed, passage=item.passage)
+            _flat_fits(space, b)
+            if flat
+            else space.fits(b, ignore=allowed, passage=item.passage)
             and not any(q is not None and overlap(b, q) and not any(q is a for a in allowed) for q in boxes)
             and not any(overlap(b, z) for z in zones)
         )
@@ -179,8 +189,15 @@ def _fit(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> Fit
                 fx, fy = -fx, -fy
             depth = abs(item.clear)
             away = d / 2 + depth / 2
-            zone = box(thing.x + fx * away, thing.y + fy * away, w * 0.9, depth - 0.01, thing.yaw,
-                       thing.z, thing.z + max(h, 0.5))
+            zone = box(
+                thing.x + fx * away,
+                thing.y + fy * away,
+                w * 0.9,
+                depth - 0.01,
+                thing.yaw,
+                thing.z,
+                thing.z + max(h, 0.5),
+            )
             good = space.inside(zone) and space.is_clear(zone)
         if not good:
             if not item.optional:
@@ -227,9 +244,11 @@ def _without_optional(items, things, boxes):
     """The arrangement stripped of its optional standing things, and of what rests on them."""
     kept: list[Thing | None] = []
     for item, thing in zip(items, things):
-        gone = (item.optional and item.on is None and not is_flat(item.extent)) or (
-            item.on is not None and kept[item.on] is None
-        ) or (item.needs is not None and kept[item.needs] is None)
+        gone = (
+            (item.optional and item.on is None and not is_flat(item.extent))
+            or (item.on is not None and kept[item.on] is None)
+            or (item.needs is not None and kept[item.needs] is None)
+        )
         kept.append(None if gone else thing)
     solids = [b for b, t in zip(boxes, kept) if b is not None and t is not None]
     return solids, kept
@@ -238,9 +257,7 @@ def _without_optional(items, things, boxes):
 def _flat_fits(space: RoomSpace, b: Box) -> bool:
     """Rugs lie inside the room and not on one another or on tall built-ins' feet."""
     grown = replace(b, top=b.bottom + 0.02)
-    return space.inside(b) and not any(
-        overlap(grown, q) for q in space.solids if q.top - space.bottom <= 0.03
-    )
+    return space.inside(b) and not any(overlap(grown, q) for q in space.solids if q.top - space.bottom <= 0.03)
 
 
 def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thing | None:
@@ -261,14 +278,29 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
     v = min(max(item.y, y0 + d / 2), y1 - d / 2) if d < y1 - y0 else (y0 + y1) / 2
     x, y = parent.local(u, v)
     return Thing(
-        item.asset, x, y, parent.z + surface.z * scale[2] + item.z, parent.yaw + item.yaw, item.extent,
-        item.params, parent, surface.name, group, item.role, parent.wall,
+        item.asset,
+        x,
+        y,
+        parent.z + surface.z * scale[2] + item.z,
+        parent.yaw + item.yaw,
+        item.extent,
+        item.params,
+        parent,
+        surface.name,
+        group,
+        item.role,
+        parent.wall,
     )
 
 
 def wall_poses(
-    space: RoomSpace, width: float, *, score: Callable[[Wall, float], float], gap: float = WALL_GAP,
-    step: float = 0.25, walls: Sequence[Wall] | None = None,
+    space: RoomSpace,
+    width: float,
+    *,
+    score: Callable[[Wall, float], float],
+    gap: float = WALL_GAP,
+    step: float = 0.25,
+    walls: Sequence[Wall] | None = None,
 ) -> list[Pose]:
     """Poses of a group `width` wide with its back to a wall, clear of doors.
 
@@ -299,7 +331,11 @@ def wall_poses(
 
 
 def floor_poses(
-    space: RoomSpace, *, score: Callable[[float, float, float], float], yaws: Sequence[float], step: float = 0.3,
+    space: RoomSpace,
+    *,
+    score: Callable[[float, float, float], float],
+    yaws: Sequence[float],
+    step: float = 0.3,
     margin: float = 0.3,
 ) -> list[Pose]:
     """Poses on a grid over the floor, at each of `yaws`."""

@@ -56,10 +56,21 @@ class Context:
         return [t for t in self.things if t.role in names]
 
     def against_wall(
-        self, asset: Asset | None, group: str, *, clear: float = 0.6, corner: float = 0.5, centre: float = 0.0,
-        window: float = -1.0, score: Callable[[Wall, float], float] | None = None, role: str = "",
-        extra: Callable[[Asset], Sequence[Item]] = lambda asset: (), gap: float = WALL_GAP, tries: int = 30,
-        size: tuple[float, float, float] | None = None, params: tuple = (),
+        self,
+        asset: Asset | None,
+        group: str,
+        *,
+        clear: float = 0.6,
+        corner: float = 0.5,
+        centre: float = 0.0,
+        window: float = -1.0,
+        score: Callable[[Wall, float], float] | None = None,
+        role: str = "",
+        extra: Callable[[Asset], Sequence[Item]] = lambda asset: (),
+        gap: float = WALL_GAP,
+        tries: int = 30,
+        size: tuple[float, float, float] | None = None,
+        params: tuple = (),
     ) -> list[Thing] | None:
         """One piece with its back to a wall, where the weighted preferences like it best.
 

@@ -45,7 +45,9 @@ def seating(ctx: Context) -> list[Thing] | None:
             for distance, shift in _distances(ctx, stand, sofa):
                 items = _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich)
                 poses = wall_poses(
-                    ctx.space, stand.size[0], score=lambda w, s, far=distance: _screen_score(ctx, w, s, far, stand.size[0]),
+                    ctx.space,
+                    stand.size[0],
+                    score=lambda w, s, far=distance: _screen_score(ctx, w, s, far, stand.size[0]),
                 )
                 found = ctx.put(items, poses, "seating", tries=14)
                 if found:
@@ -56,9 +58,9 @@ def seating(ctx: Context) -> list[Thing] | None:
 def _distances(ctx: Context, stand: Asset, sofa: Asset) -> list[tuple[float, float]]:
     """Sensible distances from the screen's wall to the back of the sofa, and shifts of the sofa aside."""
     # from 1.5 m (a small screen) to 3.6 m between the screen and who looks at it
-    depths = sorted({
-        round(depth_before(ctx.space, w, w.length / 2), 2) for w in ctx.space.walls if w.length > stand.size[0]
-    })
+    depths = sorted(
+        {round(depth_before(ctx.space, w, w.length / 2), 2) for w in ctx.space.walls if w.length > stand.size[0]}
+    )
     near = stand.size[1] + 1.55 + sofa.size[1]
     far = stand.size[1] + 3.6 + sofa.size[1]
     at_wall = [d - 0.04 for d in depths if near <= d - 0.04 <= far]
@@ -95,9 +97,7 @@ def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance,
             if rug is not None and ctx.chance(0.85):
                 room = -front - stand.size[1] - 0.3
                 size = (min(width + rng.uniform(0.1, 0.5), 3.2), min(rng.uniform(1.7, 2.1), room), RUG_HEIGHT)
-                items.append(Item(
-                    rug, 0.0, front - 0.25 + size[1] / 2, 0.0, size=size, optional=True, role="rug",
-                ))
+                items.append(Item(rug, 0.0, front - 0.25 + size[1] / 2, 0.0, size=size, optional=True, role="rug"))
             if chair is not None and rich >= 1:
                 count = 2 if rich == 2 and ctx.chance(0.6) else 1
                 reach = max(table.size[0] / 2 + 0.45, width / 2 - 0.25) + chair.size[1] / 2
@@ -136,12 +136,28 @@ def sofa_group(ctx: Context) -> list[Thing] | None:
             items.append(Item(rug, 0.0, y + 0.15, size=(w + 0.3, 1.6, RUG_HEIGHT), optional=True, role="rug"))
         for sign in (-1, 1):
             x = sign * (table.size[0] / 2 + 0.45 + chair.size[1] / 2)
-            items.append(Item(chair, x, y - 0.1, facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10), optional=True,
-                              role="armchair"))
-        found = ctx.put(items, wall_poses(
-            ctx.space, w, score=lambda wall, s, w=w: 1.2 * centred(wall, s) + 0.4 * ctx.rng.random()
-            - 0.5 * at_window(wall, s, w),
-        ), "seating", tries=40)
+            items.append(
+                Item(
+                    chair,
+                    x,
+                    y - 0.1,
+                    facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10),
+                    optional=True,
+                    role="armchair",
+                )
+            )
+        found = ctx.put(
+            items,
+            wall_poses(
+                ctx.space,
+                w,
+                score=lambda wall, s, w=w: (
+                    1.2 * centred(wall, s) + 0.4 * ctx.rng.random() - 0.5 * at_window(wall, s, w)
+                ),
+            ),
+            "seating",
+            tries=40,
+        )
         if found:
             return found
     return None
@@ -153,22 +169,29 @@ def lone_sofa(ctx: Context) -> list[Thing] | None:
         sofa, table = ctx.pick("sofa", most=(longest, 1.0, 1.2)), ctx.pick("coffee table", most=(1.2, 0.7, 0.6))
         if sofa is not None and table is not None:
             w, d = sofa.size[:2]
-            items = [Item(sofa, 0.0, -d / 2, role="sofa"),
-                     Item(table, 0.0, -d - 0.38 - table.size[1] / 2, wobble(ctx.rng, 2), role="coffee table")]
+            items = [
+                Item(sofa, 0.0, -d / 2, role="sofa"),
+                Item(table, 0.0, -d - 0.38 - table.size[1] / 2, wobble(ctx.rng, 2), role="coffee table"),
+            ]
             found = ctx.put(items, wall_poses(ctx.space, w + 0.1, score=lambda wall, s: centred(wall, s)), "seating")
             if found:
                 return found
     for longest in (2.3, 1.9, 1.75):
-        found = ctx.against_wall(ctx.pick("sofa", most=(longest, 1.0, 1.2)), "seating", clear=0.5, window=-0.3, centre=0.5,
-                                 role="sofa")
+        found = ctx.against_wall(
+            ctx.pick("sofa", most=(longest, 1.0, 1.2)), "seating", clear=0.5, window=-0.3, centre=0.5, role="sofa"
+        )
         if found:
             return found
     x0, y0, x1, y1 = ctx.space.polygon.bounds
     sofa = ctx.pick("sofa", most=(1.9, 1.0, 1.2))
     if sofa is None:
         return None
-    poses = floor_poses(ctx.space, score=lambda x, y, yaw: -math.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2),
-                        yaws=(0.0, math.pi / 2, math.pi, -math.pi / 2), step=0.2)
+    poses = floor_poses(
+        ctx.space,
+        score=lambda x, y, yaw: -math.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2),
+        yaws=(0.0, math.pi / 2, math.pi, -math.pi / 2),
+        step=0.2,
+    )
     return ctx.put([Item(sofa, 0.0, 0.0, clear=0.4, role="sofa")], poses, "seating")
 
 
@@ -210,11 +233,25 @@ def reading_corner(ctx: Context) -> list[Thing] | None:
     span = w + 0.5
     items = [Item(chair, 0.0, -d / 2 - 0.14, -side * angle, role="armchair")]
     if lamp is not None:
-        items.append(Item(lamp, side * (w / 2 + 0.14 + lamp.size[0] / 2), -lamp.size[1] / 2 - 0.03,
-                          optional=True, role="floor lamp"))
+        items.append(
+            Item(
+                lamp,
+                side * (w / 2 + 0.14 + lamp.size[0] / 2),
+                -lamp.size[1] / 2 - 0.03,
+                optional=True,
+                role="floor lamp",
+            )
+        )
     if table is not None:
-        items.append(Item(table, -side * (w / 2 + 0.12 + table.size[0] / 2), -table.size[1] / 2 - 0.1,
-                          optional=True, role="side table"))
+        items.append(
+            Item(
+                table,
+                -side * (w / 2 + 0.12 + table.size[0] / 2),
+                -table.size[1] / 2 - 0.1,
+                optional=True,
+                role="side table",
+            )
+        )
 
     def score(wall: Wall, s: float) -> float:
         x, y = wall.point(s, 0.5)
@@ -224,8 +261,9 @@ def reading_corner(ctx: Context) -> list[Thing] | None:
     return ctx.put(items, wall_poses(ctx.space, span, score=score), "reading", tries=25)
 
 
-def dining(ctx: Context, table_role: str = "dining table", chair_role: str = "dining chair",
-           most: float = 2.5) -> list[Thing] | None:
+def dining(
+    ctx: Context, table_role: str = "dining table", chair_role: str = "dining chair", most: float = 2.5
+) -> list[Thing] | None:
     """A table with chairs in pairs around it, tucked in and a little askew; at a wall where it must be small."""
     limits = [most, *(m for m in (1.75, 1.45, 1.15, 0.85) if m < most)]
     for pairs in (True, False):
@@ -258,8 +296,13 @@ def _table_score(ctx: Context, x: float, y: float, yaw: float) -> float:
     if ctx.kind == "dining_room":
         return -centre + 0.4 * along_long
     near = window_distance(ctx.space, x, y)
-    return 0.3 * along_long - 0.25 * abs(near - 1.4) - 0.1 * centre + 0.15 * min(door_distance(ctx.space, x, y), 2.0) \
+    return (
+        0.3 * along_long
+        - 0.25 * abs(near - 1.4)
+        - 0.1 * centre
+        + 0.15 * min(door_distance(ctx.space, x, y), 2.0)
         + 0.3 * ctx.rng.random()
+    )
 
 
 def _table_wall_score(ctx: Context, wall: Wall, s: float, table: Asset) -> float:
@@ -289,23 +332,52 @@ def table_items(ctx: Context, table: Asset, chair: Asset, *, wall: bool = False,
             angle = start + 2 * math.pi * k / count
             r = w / 2 + cd / 2 - tuck * (0.8 if "round" in table.tags else 1.0) + _pulled(rng)
             x, y = r * math.cos(angle), r * math.sin(angle)
-            items.append(Item(chair, x, y, facing_point(x, y, 0, 0) + wobble(rng, 9), under=(0,),
-                              optional=k > 1, role="dining chair"))
+            items.append(
+                Item(
+                    chair,
+                    x,
+                    y,
+                    facing_point(x, y, 0, 0) + wobble(rng, 9),
+                    under=(0,),
+                    optional=k > 1,
+                    role="dining chair",
+                )
+            )
         return items
     per_side = max(1, int((w - 0.06) / max(cw + 0.12, 0.6)))
     pitch = w / per_side
-    for sign in ((-1,) if wall else (-1, 1)):
+    for sign in (-1,) if wall else (-1, 1):
         for k in range(per_side):
             x = (k + 0.5) * pitch - w / 2
             y = y0 + sign * (d / 2 + cd / 2 - tuck + _pulled(rng))
             yaw = (0.0 if sign > 0 else math.pi) + wobble(rng, 7)
-            items.append(Item(chair, x, y, yaw, under=(0,), clear=-0.3, optional=k > 0 or (sign > 0 and not pairs),
-                              role="dining chair"))
+            items.append(
+                Item(
+                    chair,
+                    x,
+                    y,
+                    yaw,
+                    under=(0,),
+                    clear=-0.3,
+                    optional=k > 0 or (sign > 0 and not pairs),
+                    role="dining chair",
+                )
+            )
     if d > 0.7 and (wall or w > 1.35) and ctx.chance(0.6):
         for sign in (-1, 1):
             x = sign * (w / 2 + cd / 2 - tuck + _pulled(rng))
-            items.append(Item(chair, x, y0, -sign * math.pi / 2 + wobble(rng, 7), under=(0,),
-                              clear=-0.25, optional=True, role="dining chair"))
+            items.append(
+                Item(
+                    chair,
+                    x,
+                    y0,
+                    -sign * math.pi / 2 + wobble(rng, 7),
+                    under=(0,),
+                    clear=-0.25,
+                    optional=True,
+                    role="dining chair",
+                )
+            )
     return items
 
 
@@ -322,18 +394,22 @@ def low_table_seat(ctx: Context) -> list[Thing] | None:
         return None
     d = sofa.size[1]
     y = -d - 0.4 - table.size[1] / 2
-    items = [
-        Item(sofa, 0.0, -d / 2 - 0.02, role="sofa"),
-        Item(table, 0.0, y, wobble(ctx.rng, 3), role="coffee table"),
-    ]
+    items = [Item(sofa, 0.0, -d / 2 - 0.02, role="sofa"), Item(table, 0.0, y, wobble(ctx.rng, 3), role="coffee table")]
     for sign in (-1, 1):
         x = sign * (max(table.size[0], 0.9) / 2 + 0.35 + chair.size[1] / 2)
-        items.append(Item(chair, x, y, facing_point(x, y, 0.0, y) + wobble(ctx.rng, 10), optional=True,
-                          role="armchair"))
-    return ctx.put(items, wall_poses(
-        ctx.space, sofa.size[0] + 0.1, score=lambda w, s: centred(w, s) + 0.8 * at_window(w, s, 1.5)
-        + 0.3 * ctx.rng.random(),
-    ), "seating", tries=30)
+        items.append(
+            Item(chair, x, y, facing_point(x, y, 0.0, y) + wobble(ctx.rng, 10), optional=True, role="armchair")
+        )
+    return ctx.put(
+        items,
+        wall_poses(
+            ctx.space,
+            sofa.size[0] + 0.1,
+            score=lambda w, s: centred(w, s) + 0.8 * at_window(w, s, 1.5) + 0.3 * ctx.rng.random(),
+        ),
+        "seating",
+        tries=30,
+    )
 
 
 def middle_of_room(ctx: Context) -> Pose:

@@ -7,15 +7,7 @@ from dataclasses import replace
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import Item, Thing, wall_poses
-from embodied.generate.furnish.context import (
-    Context,
-    at_corner,
-    at_window,
-    centred,
-    depth_before,
-    has_window,
-    wobble,
-)
+from embodied.generate.furnish.context import Context, at_corner, at_window, centred, depth_before, has_window, wobble
 from embodied.generate.furnish.groups_living import RUG_HEIGHT
 from embodied.generate.furnish.space import Wall
 
@@ -58,8 +50,16 @@ def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thi
         for n, sign in enumerate(signs):
             x = sign * (w / 2 + 0.05 + night.size[0] / 2)
             must = n < flank
-            items.append(Item(night, x, -night.size[1] / 2, clear=0.45 if w > 1.2 else 0.0, optional=not must,
-                              role="bedside table"))
+            items.append(
+                Item(
+                    night,
+                    x,
+                    -night.size[1] / 2,
+                    clear=0.45 if w > 1.2 else 0.0,
+                    optional=not must,
+                    role="bedside table",
+                )
+            )
             if lamp is not None:
                 items.append(Item(lamp, 0.0, 0.06, on=len(items) - 1, role="table lamp"))
         span = w + flank * (night.size[0] + 0.05)
@@ -76,9 +76,12 @@ def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thi
         free_side = depth_before(ctx.space, wall, s) - d
         doors = sum(abs((s0 + s1) / 2 - s) < w / 2 + 0.4 for s0, s1, o in _facing_doors(ctx, wall))
         return (
-            -1.6 * at_window(wall, s, w) + (corner if roomy else abs(corner)) * at_corner(wall, s, span)
+            -1.6 * at_window(wall, s, w)
+            + (corner if roomy else abs(corner)) * at_corner(wall, s, span)
             + (0.8 if roomy else 0.1) * centred(wall, s)
-            + 0.5 * min(free_side, 1.2) - 0.8 * doors + 0.4 * rng.random()
+            + 0.5 * min(free_side, 1.2)
+            - 0.8 * doors
+            + 0.4 * rng.random()
         )
 
     items = [i if i.on is not None else replace(i, x=i.x + shift) for i in items]
@@ -106,8 +109,7 @@ def wardrobe(ctx: Context) -> list[Thing] | None:
     for limit in (9.0, 1.8, 1.2):
         asset = ctx.pick("wardrobe", most=(limit, 0.75, ctx.space.height - 0.05), avoid=())
         found = ctx.against_wall(
-            asset, "wardrobe", clear=0.65, corner=0.8, window=-3.0,
-            score=lambda w, s: -0.7 * has_window(w), tries=36,
+            asset, "wardrobe", clear=0.65, corner=0.8, window=-3.0, score=lambda w, s: -0.7 * has_window(w), tries=36
         )
         if found:
             return found
@@ -125,8 +127,17 @@ def dresser(ctx: Context) -> list[Thing] | None:
         stool = ctx.pick("stool", most=(0.5, 0.5, 0.6))
         if stool is None:
             return []
-        return [Item(stool, wobble(ctx.rng, 3), -a.size[1] - 0.1, wobble(ctx.rng, 20), optional=True, under=(0,),
-                     role="stool")]
+        return [
+            Item(
+                stool,
+                wobble(ctx.rng, 3),
+                -a.size[1] - 0.1,
+                wobble(ctx.rng, 20),
+                optional=True,
+                under=(0,),
+                role="stool",
+            )
+        ]
 
     return ctx.against_wall(asset, "dressing", clear=0.6, corner=0.1, centre=0.5, window=-0.4, extra=extra)
 
@@ -137,10 +148,18 @@ def bedroom_chair(ctx: Context) -> list[Thing] | None:
     if chair is None:
         return None
     items = [Item(chair, 0.0, -chair.size[1] / 2 - 0.1, wobble(ctx.rng, 20), role="armchair")]
-    return ctx.put(items, wall_poses(
-        ctx.space, chair.size[0] + 0.2,
-        score=lambda w, s: at_corner(w, s, chair.size[0] + 0.2) + 0.6 * at_window(w, s, 1.0) + 0.4 * ctx.rng.random(),
-    ), "chair", tries=24)
+    return ctx.put(
+        items,
+        wall_poses(
+            ctx.space,
+            chair.size[0] + 0.2,
+            score=lambda w, s: (
+                at_corner(w, s, chair.size[0] + 0.2) + 0.6 * at_window(w, s, 1.0) + 0.4 * ctx.rng.random()
+            ),
+        ),
+        "chair",
+        tries=24,
+    )
 
 
 def clothes(ctx: Context) -> list[Thing] | None:
@@ -149,8 +168,7 @@ def clothes(ctx: Context) -> list[Thing] | None:
     for k in ctx.rng.permutation(len(roles)):
         for widest in (2.2, 1.05):
             asset = ctx.pick(roles[int(k)], most=(widest, 0.7, ctx.space.height - 0.05), avoid=())
-            found = ctx.against_wall(
-                asset, "clothes", clear=0.45, corner=0.6, window=-2.0, role="storage", tries=36)
+            found = ctx.against_wall(asset, "clothes", clear=0.45, corner=0.6, window=-2.0, role="storage", tries=36)
             if found:
                 return found
     return None
@@ -173,21 +191,32 @@ def toys(ctx: Context) -> list[Thing] | None:
             width = depth = 1.3
         items.append(Item(rug, 0.0, -depth / 2 - 0.15, size=(width, depth, RUG_HEIGHT), role="rug"))
     if big is not None:
-        items.append(Item(big, rng.uniform(-0.3, 0.3), -big.size[1] / 2 - 0.06, wobble(rng, 12), optional=True,
-                          role="toy"))
+        items.append(
+            Item(big, rng.uniform(-0.3, 0.3), -big.size[1] / 2 - 0.06, wobble(rng, 12), optional=True, role="toy")
+        )
     for _ in range(int(rng.integers(2, 5))):
         toy = ctx.pick("floor toy", avoid=tuple(i.asset.key for i in items))
         if toy is not None:
             z = RUG_HEIGHT if rug is not None else 0.0
-            items.append(Item(
-                toy, rng.uniform(-0.45, 0.45) * width * 0.8, -rng.uniform(0.35, 0.9) * depth,
-                rng.uniform(-math.pi, math.pi), z=z, optional=True, role="toy",
-            ))
+            items.append(
+                Item(
+                    toy,
+                    rng.uniform(-0.45, 0.45) * width * 0.8,
+                    -rng.uniform(0.35, 0.9) * depth,
+                    rng.uniform(-math.pi, math.pi),
+                    z=z,
+                    optional=True,
+                    role="toy",
+                )
+            )
     if not items:
         return None
-    return ctx.put(items, wall_poses(
-        ctx.space, width, score=lambda w, s: 0.5 * at_window(w, s, width) + ctx.rng.random(),
-    ), "play", tries=16)
+    return ctx.put(
+        items,
+        wall_poses(ctx.space, width, score=lambda w, s: 0.5 * at_window(w, s, width) + ctx.rng.random()),
+        "play",
+        tries=16,
+    )
 
 
 def child_table(ctx: Context) -> list[Thing] | None:
@@ -199,8 +228,20 @@ def child_table(ctx: Context) -> list[Thing] | None:
     items = [Item(table, 0.0, -d / 2 - 0.35, wobble(ctx.rng, 6), role="child table")]
     for sign in (-1, 1):
         x = sign * (w / 2 + chair.size[1] / 2 + 0.01)
-        items.append(Item(chair, x, -d / 2 - 0.35, -sign * math.pi / 2 + wobble(ctx.rng, 15), under=(0,),
-                          optional=True, role="child chair"))
-    return ctx.put(items, wall_poses(
-        ctx.space, w + 0.9, score=lambda wall, s: 0.6 * at_window(wall, s, w) + ctx.rng.random(),
-    ), "play_table", tries=20)
+        items.append(
+            Item(
+                chair,
+                x,
+                -d / 2 - 0.35,
+                -sign * math.pi / 2 + wobble(ctx.rng, 15),
+                under=(0,),
+                optional=True,
+                role="child chair",
+            )
+        )
+    return ctx.put(
+        items,
+        wall_poses(ctx.space, w + 0.9, score=lambda wall, s: 0.6 * at_window(wall, s, w) + ctx.rng.random()),
+        "play_table",
+        tries=20,
+    )

@@ -74,8 +74,7 @@ def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list
         if free and start is None:
             start = i * step
         if not free and start is not None:
-            runs.append((_edge(space, wall, start, -1, depth, height),
-                         _edge(space, wall, i * step, 1, depth, height)))
+            runs.append((_edge(space, wall, start, -1, depth, height), _edge(space, wall, i * step, 1, depth, height)))
             start = None
     return runs
 
@@ -98,7 +97,7 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
     """
     kits = kitchen_sets(ctx)
     for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
-        for with_fridge in ((True, False) if fridge else (False,)):
+        for with_fridge in (True, False) if fridge else (False,):
             found = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
             if found is None:
                 continue
@@ -111,7 +110,7 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
 
 
 def _line_at_a_wall(
-    ctx: Context, kits: list[KitchenSet], with_fridge: bool, clear: float, spare: int, aside: float,
+    ctx: Context, kits: list[KitchenSet], with_fridge: bool, clear: float, spare: int, aside: float
 ) -> tuple[KitchenSet, list[Thing]] | None:
     """The first kit that finds a wall; `aside` metres of it stay free at one end or both, for a door beside it."""
     ends = ((aside, 0.0), (0.0, aside), (aside, aside)) if aside else ((0.0, 0.0),)
@@ -145,7 +144,7 @@ def lone_fridge(ctx: Context) -> list[Thing] | None:
 
 
 def _run(
-    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool, free: float, spare: int,
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool, free: float, spare: int
 ) -> list[Thing] | None:
     """Sink, cooker and at least `spare` cabinets between `a` and `b` of a wall, the fridge at an end without window.
 
@@ -165,8 +164,10 @@ def _run(
     ends = [False, True]  # fridge at the end `b`?
     if fridge is not None:
         span = fridge.size[0]
-        clear = [all(s1 < a - 0.05 or s0 > a + span + 0.05 for s0, s1 in windows),
-                 all(s1 < b - span - 0.05 or s0 > b + 0.05 for s0, s1 in windows)]
+        clear = [
+            all(s1 < a - 0.05 or s0 > a + span + 0.05 for s0, s1 in windows),
+            all(s1 < b - span - 0.05 or s0 > b + 0.05 for s0, s1 in windows),
+        ]
         ends = [e for e in ends if clear[int(e)]]
         if ctx.chance(0.5):
             ends.reverse()
@@ -225,7 +226,7 @@ def _slots(ctx: Context, kit: KitchenSet, count: int, width: float, start: float
 
 
 def _run_items(
-    ctx: Context, kit: KitchenSet, slots, width: float, windows, length: float, free: float,
+    ctx: Context, kit: KitchenSet, slots, width: float, windows, length: float, free: float
 ) -> list[tuple[float, Item]]:
     """(s, item) of all modules, the hob, the hood and the wall cabinets of a run."""
     items: list[tuple[float, Item]] = []
@@ -259,26 +260,54 @@ def _run_items(
                 hood = kit.hood
                 w = min(hood.size[0], n * width)
                 z = min(max(hood.elevation, top + 0.62), ctx.space.height - hood.size[2])
-                items.append((s, Item(hood, 0.0, -hood.size[1] / 2, z=z, size=(w, *hood.size[1:]), optional=True,
-                                      role="range hood")))
+                items.append(
+                    (
+                        s,
+                        Item(
+                            hood,
+                            0.0,
+                            -hood.size[1] / 2,
+                            z=z,
+                            size=(w, *hood.size[1:]),
+                            optional=True,
+                            role="range hood",
+                        ),
+                    )
+                )
             continue
         if covered or not kit.upper:
             continue
         single = [a for a in kit.upper if kit.units(a) == 1] or list(kit.upper)
         pair = [a for a in kit.upper if kit.units(a) == 2]
-        blocks = [(pair[0], s, n * width)] if n == 2 and pair and ctx.chance(0.6) else [
-            (single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * width, width) for k in range(n)
-        ]
+        blocks = (
+            [(pair[0], s, n * width)]
+            if n == 2 and pair and ctx.chance(0.6)
+            else [(single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * width, width) for k in range(n)]
+        )
         for asset, at, w in blocks:
             h = min(asset.size[2], ctx.space.height - UPPER - 0.02)
-            items.append((at, Item(asset, 0.0, -asset.size[1] / 2, z=UPPER, size=(w, asset.size[1], h),
-                                   optional=True, role="wall cabinet")))
+            items.append(
+                (
+                    at,
+                    Item(
+                        asset,
+                        0.0,
+                        -asset.size[1] / 2,
+                        z=UPPER,
+                        size=(w, asset.size[1], h),
+                        optional=True,
+                        role="wall cabinet",
+                    ),
+                )
+            )
     return items
 
 
 def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
     """More cabinets, round the corner or opposite, until the kitchen has the worktop its size deserves."""
-    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - sum(t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t))
+    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - sum(
+        t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t)
+    )
     for _ in range(3):
         if want < 0.8 * kit.unit:
             return
@@ -306,7 +335,7 @@ def _gap(point: tuple[float, float], thing: Thing) -> float:
 
 
 def _add_run(
-    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, want: float, done: list[Thing], least: int,
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, want: float, done: list[Thing], least: int
 ) -> float:
     """Cabinets along part of a..b, from the end that is nearer to what stands already; returns their length."""
     starts_at_a = min(_gap(wall.point(a), t) for t in done) <= min(_gap(wall.point(b), t) for t in done)
@@ -340,8 +369,17 @@ def island(ctx: Context) -> list[Thing] | None:
         count = max(1, int(w / 0.55))
         for k in range(count):
             x = (k + 0.5) * w / count - w / 2
-            items.append(Item(stool, x, -d / 2 - stool.size[1] / 2 + 0.05, math.pi + float(ctx.rng.normal(0, 0.15)),
-                              optional=True, under=(0,), role="bar stool"))
+            items.append(
+                Item(
+                    stool,
+                    x,
+                    -d / 2 - stool.size[1] / 2 + 0.05,
+                    math.pi + float(ctx.rng.normal(0, 0.15)),
+                    optional=True,
+                    under=(0,),
+                    role="bar stool",
+                )
+            )
     cx = sum(t.x for t in line) / len(line)
     cy = sum(t.y for t in line) / len(line)
     fx, fy = line[0].front
@@ -367,15 +405,34 @@ def toilet(ctx: Context) -> list[Thing] | None:
     for margin, clear in ((0.2, 0.55), (0.12, 0.4), (0.05, 0.3)):
         items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, clear=clear, role="toilet")]
         if paper is not None:
-            items.append(Item(paper, sign * (w / 2 + 0.08 + paper.size[0] / 2), WALL_GAP - paper.size[1] / 2,
-                              z=0.62, optional=True, role="toilet paper holder"))
+            items.append(
+                Item(
+                    paper,
+                    sign * (w / 2 + 0.08 + paper.size[0] / 2),
+                    WALL_GAP - paper.size[1] / 2,
+                    z=0.62,
+                    optional=True,
+                    role="toilet paper holder",
+                )
+            )
         if brush is not None:
-            items.append(Item(brush, -sign * (w / 2 + 0.06 + brush.size[0] / 2), -brush.size[1] / 2 - 0.02,
-                              optional=True, role="toilet brush"))
+            items.append(
+                Item(
+                    brush,
+                    -sign * (w / 2 + 0.06 + brush.size[0] / 2),
+                    -brush.size[1] / 2 - 0.02,
+                    optional=True,
+                    role="toilet brush",
+                )
+            )
 
         def score(wall: Wall, s: float) -> float:
             x, y = wall.point(s, 0.4)
-            return (1.2 if tiny else 0.4) * door_distance(ctx.space, x, y) - 0.5 * at_window(wall, s, w) + 0.4 * ctx.rng.random()
+            return (
+                (1.2 if tiny else 0.4) * door_distance(ctx.space, x, y)
+                - 0.5 * at_window(wall, s, w)
+                + 0.4 * ctx.rng.random()
+            )
 
         found = ctx.put(items, wall_poses(ctx.space, w + 2 * margin, score=score, step=0.15), "toilet", tries=40)
         if found:
@@ -408,11 +465,23 @@ def basin(ctx: Context, role: str = "wash place") -> list[Thing] | None:
                 items.append(Item(mirror, 0.0, WALL_GAP - size[1] / 2, z=1.2, size=size, optional=True, role="mirror"))
                 lamp = ctx.pick("wall lamp", most=(0.6, 0.3, 0.6))
                 if lamp is not None and ctx.chance(0.5):
-                    items.append(Item(lamp, size[0] / 2 + 0.08 + lamp.size[0] / 2, WALL_GAP - lamp.size[1] / 2,
-                                      z=1.55, optional=True, role="wall lamp"))
+                    items.append(
+                        Item(
+                            lamp,
+                            size[0] / 2 + 0.08 + lamp.size[0] / 2,
+                            WALL_GAP - lamp.size[1] / 2,
+                            z=1.55,
+                            optional=True,
+                            role="wall lamp",
+                        )
+                    )
             poses = wall_poses(
-                ctx.space, w + 0.04, step=0.15,
-                score=lambda wall, s, w=w: 0.5 * centred(wall, s) - 1.5 * at_window(wall, s, w) + 0.5 * ctx.rng.random(),
+                ctx.space,
+                w + 0.04,
+                step=0.15,
+                score=lambda wall, s, w=w: (
+                    0.5 * centred(wall, s) - 1.5 * at_window(wall, s, w) + 0.5 * ctx.rng.random()
+                ),
             )
             found = ctx.put(items, poses, "washing", tries=40)
             if found:
@@ -428,14 +497,16 @@ def bathing(ctx: Context, role: str) -> list[Thing] | None:
             return None
         w, d, h = asset.size
         mat = ctx.pick("bath mat")
-        items = [Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, clear=0.5 if ctx.attempt < 2 else 0.3,
-                      role=asset.object_class)]
+        items = [
+            Item(asset, 0.0, -d / 2 + WALL_GAP - 0.002, clear=0.5 if ctx.attempt < 2 else 0.3, role=asset.object_class)
+        ]
         if mat is not None:
             items.append(Item(mat, 0.0, -d - 0.08 - mat.size[1] / 2, optional=True, role="bath mat"))
 
         def score(wall: Wall, s: float, w: float = w, h: float = h) -> float:
-            return 2.0 * at_corner(wall, s, w) - (0.2 if h < 1.2 else 3.0) * at_window(wall, s, w) \
-                + 0.4 * ctx.rng.random()
+            return (
+                2.0 * at_corner(wall, s, w) - (0.2 if h < 1.2 else 3.0) * at_window(wall, s, w) + 0.4 * ctx.rng.random()
+            )
 
         found = ctx.put(items, wall_poses(ctx.space, w, score=score), "bathing", tries=40)
         if found:

@@ -5,14 +5,7 @@ from __future__ import annotations
 import math
 
 from embodied.generate.furnish.arrange import Item, Pose, Thing, floor_poses, wall_poses
-from embodied.generate.furnish.context import (
-    Context,
-    at_corner,
-    at_window,
-    centred,
-    door_distance,
-    wobble,
-)
+from embodied.generate.furnish.context import Context, at_corner, at_window, centred, door_distance, wobble
 from embodied.generate.furnish.space import Wall
 
 
@@ -21,8 +14,11 @@ def desk(ctx: Context) -> list[Thing] | None:
     kid = ctx.kind == "kids_room"
     small = ctx.kind in ("bedroom", "guest_room", "main_bedroom")
     for limit in ((1.3 if small else 2.0), 1.25, 1.05):
-        asset = ctx.pick("writing desk", most=(limit, 0.95, 1.5),
-                         where=(lambda a: "child" in a.tags) if kid else (lambda a: "child" not in a.tags))
+        asset = ctx.pick(
+            "writing desk",
+            most=(limit, 0.95, 1.5),
+            where=(lambda a: "child" in a.tags) if kid else (lambda a: "child" not in a.tags),
+        )
         asset = asset or ctx.pick("desk", most=(limit, 0.95, 1.5))
         chair = ctx.pick("office chair", where=lambda a: ("child" in a.tags) == kid) or ctx.pick("dining chair")
         if asset is None or chair is None:
@@ -30,22 +26,48 @@ def desk(ctx: Context) -> list[Thing] | None:
         w, d = asset.size[:2]
         items = [
             Item(asset, 0.0, -d / 2, role="desk"),
-            Item(chair, wobble(ctx.rng, 5), -d - chair.size[1] / 2 - 0.03, math.pi + wobble(ctx.rng, 20), under=(0,),
-                 clear=-0.2, role="desk chair"),
+            Item(
+                chair,
+                wobble(ctx.rng, 5),
+                -d - chair.size[1] / 2 - 0.03,
+                math.pi + wobble(ctx.rng, 20),
+                under=(0,),
+                clear=-0.2,
+                role="desk chair",
+            ),
         ]
         computer = ctx.pick("laptop") if ctx.chance(0.75) else ctx.pick("computer", most=(0.6, 0.5, 0.6))
         if computer is not None:
             back = min(d / 2 - computer.size[1] / 2 - 0.04, 0.08)
-            items.append(Item(computer, 0.0, max(back, computer.size[1] / 2 + 0.13 - d / 2), wobble(ctx.rng, 5), on=0,
-                              role="computer"))
+            items.append(
+                Item(
+                    computer,
+                    0.0,
+                    max(back, computer.size[1] / 2 + 0.13 - d / 2),
+                    wobble(ctx.rng, 5),
+                    on=0,
+                    role="computer",
+                )
+            )
         lamp = ctx.pick("desk lamp")
         if lamp is not None:
             sign = 1 if ctx.chance(0.5) else -1
             items.append(Item(lamp, sign * w * 0.36, d * 0.2, wobble(ctx.rng, 20), on=0, role="desk lamp"))
-        found = ctx.put(items, wall_poses(
-            ctx.space, w, score=lambda wall, s, w=w: 0.9 * at_window(wall, s, w) + 0.4 * at_corner(wall, s, w)
-            + 0.3 * centred(wall, s) + 0.5 * ctx.rng.random(),
-        ), "desk", tries=36)
+        found = ctx.put(
+            items,
+            wall_poses(
+                ctx.space,
+                w,
+                score=lambda wall, s, w=w: (
+                    0.9 * at_window(wall, s, w)
+                    + 0.4 * at_corner(wall, s, w)
+                    + 0.3 * centred(wall, s)
+                    + 0.5 * ctx.rng.random()
+                ),
+            ),
+            "desk",
+            tries=36,
+        )
         if found:
             return found
     return None
@@ -55,8 +77,11 @@ def bookshelf(ctx: Context) -> list[Thing] | None:
     """A bookcase on a free wall, beside the last one where there is one."""
     before = ctx.roles("bookcase")
     same = before[-1].asset if before and ctx.chance(0.7) else None
-    asset = same or ctx.pick("bookcase" if ctx.kind in ("library", "study") else "book storage",
-                             least=(0, 0, 1.0), most=(2.0, 0.6, ctx.space.height - 0.05))
+    asset = same or ctx.pick(
+        "bookcase" if ctx.kind in ("library", "study") else "book storage",
+        least=(0, 0, 1.0),
+        most=(2.0, 0.6, ctx.space.height - 0.05),
+    )
 
     def beside(wall: Wall, s: float) -> float:
         if not before:
@@ -73,8 +98,16 @@ def storage(ctx: Context, role: str, *, clear: float = 0.6, group: str = "storag
     limits.setdefault("most", (2.6, 0.8, ctx.space.height - 0.03))
     asset = ctx.pick(role, **limits)
     low = asset is not None and asset.size[2] < 0.95
-    return ctx.against_wall(asset, group, clear=clear, corner=0.4, centre=0.3, window=-0.3 if low else -3.0,
-                            role=asset.object_class if asset else "", tries=30)
+    return ctx.against_wall(
+        asset,
+        group,
+        clear=clear,
+        corner=0.4,
+        centre=0.3,
+        window=-0.3 if low else -3.0,
+        role=asset.object_class if asset else "",
+        tries=30,
+    )
 
 
 def corner_plant(ctx: Context) -> list[Thing] | None:
@@ -83,8 +116,9 @@ def corner_plant(ctx: Context) -> list[Thing] | None:
     if asset is None:
         return None
     w, d = asset.size[:2]
-    items = [Item(asset, 0.0, -d / 2 - 0.04, ctx.rng.uniform(-math.pi, math.pi) if abs(w - d) < 0.03 else 0.0,
-                  role="plant")]
+    items = [
+        Item(asset, 0.0, -d / 2 - 0.04, ctx.rng.uniform(-math.pi, math.pi) if abs(w - d) < 0.03 else 0.0, role="plant")
+    ]
 
     def score(wall: Wall, s: float) -> float:
         x, y = wall.point(s, d / 2)
@@ -96,7 +130,9 @@ def corner_plant(ctx: Context) -> list[Thing] | None:
 
 def _window_points(ctx: Context) -> list[tuple[float, float]]:
     return [
-        wall.point((s0 + s1) / 2) for wall in ctx.space.walls for s0, s1, o in wall.openings
+        wall.point((s0 + s1) / 2)
+        for wall in ctx.space.walls
+        for s0, s1, o in wall.openings
         if o.kind in ("window", "french_window")
     ]
 
@@ -133,12 +169,19 @@ def in_the_open(ctx: Context, role: str, *, clear: float = 0.5, group: str = "ma
     w, d = asset.size[:2]
     if w * d > 2.0:
         c = ctx.space.polygon.centroid
-        return ctx.put([Item(asset, role=asset.object_class)], floor_poses(
-            ctx.space, yaws=(0.0, math.pi / 2),
-            score=lambda x, y, yaw: -math.hypot(x - c.x, y - c.y) + 0.3 * ctx.rng.random(),
-        ), group, tries=50)
-    return ctx.against_wall(asset, group, clear=clear, corner=0.1, centre=0.2, window=0.1, role=asset.object_class,
-                            gap=0.06, tries=36)
+        return ctx.put(
+            [Item(asset, role=asset.object_class)],
+            floor_poses(
+                ctx.space,
+                yaws=(0.0, math.pi / 2),
+                score=lambda x, y, yaw: -math.hypot(x - c.x, y - c.y) + 0.3 * ctx.rng.random(),
+            ),
+            group,
+            tries=50,
+        )
+    return ctx.against_wall(
+        asset, group, clear=clear, corner=0.1, centre=0.2, window=0.1, role=asset.object_class, gap=0.06, tries=36
+    )
 
 
 def machines(ctx: Context) -> list[Thing] | None:
@@ -152,9 +195,16 @@ def machines(ctx: Context) -> list[Thing] | None:
         items.append(Item(dryer, x, -dryer.size[1] / 2, clear=0.6, optional=True, role="tumble dryer"))
         items = [Item(i.asset, i.x - x / 2, i.y, clear=i.clear, optional=i.optional, role=i.role) for i in items]
     span = 1.25 if len(items) > 1 else washer.size[0]
-    return ctx.put(items, wall_poses(
-        ctx.space, span, score=lambda w, s: at_corner(w, s, span) - 0.3 * at_window(w, s, span) + 0.3 * ctx.rng.random(),
-    ), "laundry", tries=30)
+    return ctx.put(
+        items,
+        wall_poses(
+            ctx.space,
+            span,
+            score=lambda w, s: at_corner(w, s, span) - 0.3 * at_window(w, s, span) + 0.3 * ctx.rng.random(),
+        ),
+        "laundry",
+        tries=30,
+    )
 
 
 def workbench(ctx: Context) -> list[Thing] | None:
@@ -190,8 +240,9 @@ def doormat(ctx: Context) -> list[Thing] | None:
         for s0, s1, o in wall.openings:
             if o.kind in ("front_door", "back_door"):
                 x, y = wall.point((s0 + s1) / 2, 0.12)
-                return ctx.put([Item(asset, 0.0, -d / 2, passage=True, role="doormat")],
-                               [Pose(0.0, x, y, wall.yaw, wall)], "entry")
+                return ctx.put(
+                    [Item(asset, 0.0, -d / 2, passage=True, role="doormat")], [Pose(0.0, x, y, wall.yaw, wall)], "entry"
+                )
     return None
 
 
@@ -207,8 +258,11 @@ def runner(ctx: Context) -> list[Thing] | None:
     if size[0] < 0.9 or size[1] > width - 0.1:
         return None
     c = ctx.space.polygon.centroid
-    return ctx.put([Item(rug, size=size, passage=True, role="rug")],
-                   [Pose(0.0, c.x, c.y, 0.0 if long_x else math.pi / 2)], "runner")
+    return ctx.put(
+        [Item(rug, size=size, passage=True, role="rug")],
+        [Pose(0.0, c.x, c.y, 0.0 if long_x else math.pi / 2)],
+        "runner",
+    )
 
 
 def middle_rug(ctx: Context) -> list[Thing] | None:
@@ -221,5 +275,6 @@ def middle_rug(ctx: Context) -> list[Thing] | None:
     long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
     size = (min(0.55 * long, 2.6), min(0.5 * short, 1.8), 0.012)
     c = ctx.space.polygon.centroid
-    return ctx.put([Item(rug, size=size, passage=True, role="rug")],
-                   [Pose(0.0, c.x, c.y, 0.0 if wide else math.pi / 2)], "rug")
+    return ctx.put(
+        [Item(rug, size=size, passage=True, role="rug")], [Pose(0.0, c.x, c.y, 0.0 if wide else math.pi / 2)], "rug"
+    )

@@ -10,9 +10,18 @@ from embodied.generate.furnish.style import Style
 from embodied.house.house import Light, Placement, rounded
 
 LUMENS: dict[str, float] = {
-    "ceiling lamp": 1500.0, "pendant lamp": 1300.0, "chandelier": 2600.0, "fluorescent lamp": 2800.0,
-    "track light": 1600.0, "ceiling fan": 900.0, "floor lamp": 900.0, "table lamp": 450.0, "desk lamp": 420.0,
-    "wall lamp": 380.0, "picture light": 200.0, "spotlight": 350.0,
+    "ceiling lamp": 1500.0,
+    "pendant lamp": 1300.0,
+    "chandelier": 2600.0,
+    "fluorescent lamp": 2800.0,
+    "track light": 1600.0,
+    "ceiling fan": 900.0,
+    "floor lamp": 900.0,
+    "table lamp": 450.0,
+    "desk lamp": 420.0,
+    "wall lamp": 380.0,
+    "picture light": 200.0,
+    "spotlight": 350.0,
 }
 """Object class to the flux of its bulbs."""
 ALWAYS = ("ceiling lamp", "pendant lamp", "chandelier", "fluorescent lamp", "track light")
@@ -36,8 +45,15 @@ def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Gene
         cool = p.object_class == "fluorescent lamp"
         on = True if p.object_class in ALWAYS else bool(rng.random() < 0.7)
         scale = min(max(p.size[0] / 0.5, 0.6), 1.6) if hanging else 1.0
-        found.append(Light(
-            f"light_{len(found) + 1}", p.room, p.id, rounded((x, y, bulb)), NEUTRAL if cool else color,
-            round(lumens * scale, 0), on,
-        ))
+        found.append(
+            Light(
+                f"light_{len(found) + 1}",
+                p.room,
+                p.id,
+                rounded((x, y, bulb)),
+                NEUTRAL if cool else color,
+                round(lumens * scale, 0),
+                on,
+            )
+        )
     return tuple(found)

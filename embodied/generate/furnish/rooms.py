@@ -36,8 +36,7 @@ def lacks(ctx: Context) -> int:
 
 def living_room(ctx: Context) -> None:
     area = ctx.space.area
-    seated = (living.seating(ctx) or living.sofa_group(ctx) or living.lone_sofa(ctx)
-              or living.conversation(ctx))
+    seated = living.seating(ctx) or living.sofa_group(ctx) or living.lone_sofa(ctx) or living.conversation(ctx)
     if "dining_room" not in ctx.kinds and area > 20 and ctx.kind == "living_room":
         living.dining(ctx)
     for _ in range(1 + (area > 22) + (area > 32)):
@@ -96,7 +95,8 @@ def kitchen(ctx: Context) -> None:
     if area > 11 and ctx.chance(0.4):
         work.storage(ctx, "cupboard")
     work.corner_thing(ctx, "kitchen bin", most=(0.5, 0.5, 0.9)) or work.corner_thing(
-        ctx, "kitchen bin", most=(0.35, 0.35, 0.7))
+        ctx, "kitchen bin", most=(0.35, 0.35, 0.7)
+    )
     if ctx.chance(0.4):
         work.corner_thing(ctx, "high chair" if "kids_room" in ctx.kinds else "plant", most=(0.7, 0.7, 1.3))
     if ctx.chance(0.3):
@@ -117,7 +117,9 @@ def bedroom(ctx: Context) -> None:
         sleep.single_bed(ctx) or sleep.double_bed(ctx)
     if not ctx.roles("bed"):
         sleep.single_bed(ctx, "child bed")
-    if not ctx.roles("wardrobe") and not (not ctx.attempt and "closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)):
+    if not ctx.roles("wardrobe") and not (
+        not ctx.attempt and "closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)
+    ):
         sleep.wardrobe(ctx)
     if area > 17 and ctx.chance(0.5):
         sleep.wardrobe(ctx)
@@ -377,8 +379,19 @@ def garage(ctx: Context) -> None:
         work.in_the_open(ctx, "bicycle", clear=0.2)
     if ctx.chance(0.6):
         work.in_the_open(ctx, "lawn mower", clear=0.0)
-    for role in ("step ladder", "kitchen bin", "wheelbarrow", "chest freezer", "kick scooter", "tricycle",
-                 "fire extinguisher", "broom", "shovel", "traffic cone", "furnace"):
+    for role in (
+        "step ladder",
+        "kitchen bin",
+        "wheelbarrow",
+        "chest freezer",
+        "kick scooter",
+        "tricycle",
+        "fire extinguisher",
+        "broom",
+        "shovel",
+        "traffic cone",
+        "furnace",
+    ):
         if ctx.chance(0.5):
             work.corner_thing(ctx, role, most=(1.7, 1.2, 2.2))
     for _ in range(int(ctx.rng.integers(2, 6))):
@@ -442,6 +455,7 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
 This orders the attempts at one room; generate/lacking.py says over which of them a finished house is drawn anew.
 """
 
+
 def _piece(role: str, **limits) -> Callable[[Context], object]:
     """A filler that puts one piece of storage at a wall."""
     return lambda ctx: work.storage(ctx, role, **limits)
@@ -454,48 +468,147 @@ def _corner(role: str, **limits) -> Callable[[Context], object]:
 
 def _table_for_two(ctx: Context) -> object:
     """A small table with its chairs, where the kitchen has none yet."""
-    return None if ctx.roles("dining table", "dining chair") else living.dining(ctx, "small table", "kitchen chair", 1.15)
+    return (
+        None if ctx.roles("dining table", "dining chair") else living.dining(ctx, "small table", "kitchen chair", 1.15)
+    )
 
 
 SITTING = (
-    living.conversation, living.reading_corner, work.bookshelf, _piece("living storage"), work.corner_plant,
-    _piece("display storage"), work.console, work.corner_plant, living.sofa_group, _corner("floor vase"),
+    living.conversation,
+    living.reading_corner,
+    work.bookshelf,
+    _piece("living storage"),
+    work.corner_plant,
+    _piece("display storage"),
+    work.console,
+    work.corner_plant,
+    living.sofa_group,
+    _corner("floor vase"),
 )
 RESTING = (
-    sleep.dresser, sleep.bedroom_chair, work.corner_plant, work.bookshelf, living.reading_corner, sleep.wardrobe, work.desk,
-    _piece("bench", clear=0.3), _corner("basket", most=(0.6, 0.6, 0.7)),
+    sleep.dresser,
+    sleep.bedroom_chair,
+    work.corner_plant,
+    work.bookshelf,
+    living.reading_corner,
+    sleep.wardrobe,
+    work.desk,
+    _piece("bench", clear=0.3),
+    _corner("basket", most=(0.6, 0.6, 0.7)),
 )
 ROUGH = (
-    _piece("rough storage", clear=0.5, avoid=()), _corner("box", avoid=()), _corner("box", avoid=()),
-    _piece("shelving unit", clear=0.5, avoid=()), _corner("step ladder"), _corner("trash can"),
+    _piece("rough storage", clear=0.5, avoid=()),
+    _corner("box", avoid=()),
+    _corner("box", avoid=()),
+    _piece("shelving unit", clear=0.5, avoid=()),
+    _corner("step ladder"),
+    _corner("trash can"),
 )
 FILLERS: dict[str, tuple[float, tuple[Callable[[Context], object], ...]]] = {
-    "living_room": (0.26, SITTING), "family_room": (0.26, SITTING), "library": (0.26, SITTING), "sun_room": (0.24, SITTING),
-    "dining_room": (0.26, (_piece("display storage"), work.corner_plant, living.reading_corner, work.console,
-                           work.corner_plant, _piece("cupboard"), work.bookshelf)),
-    "kitchen": (0.27, (_piece("cupboard", clear=0.5), work.corner_plant, _table_for_two, _piece("shelving unit", clear=0.4),
-                       _corner("basket", most=(0.5, 0.5, 0.6)), _piece("display storage", clear=0.5), work.corner_plant)),
-    "main_bedroom": (0.34, RESTING), "bedroom": (0.36, RESTING), "guest_room": (0.34, RESTING),
-    "kids_room": (0.34, (sleep.toys, sleep.child_table, work.bookshelf, _corner("big toy"), _piece("shelving unit", clear=0.4),
-                         _corner("bean bag"), sleep.dresser)),
+    "living_room": (0.26, SITTING),
+    "family_room": (0.26, SITTING),
+    "library": (0.26, SITTING),
+    "sun_room": (0.24, SITTING),
+    "dining_room": (
+        0.26,
+        (
+            _piece("display storage"),
+            work.corner_plant,
+            living.reading_corner,
+            work.console,
+            work.corner_plant,
+            _piece("cupboard"),
+            work.bookshelf,
+        ),
+    ),
+    "kitchen": (
+        0.27,
+        (
+            _piece("cupboard", clear=0.5),
+            work.corner_plant,
+            _table_for_two,
+            _piece("shelving unit", clear=0.4),
+            _corner("basket", most=(0.5, 0.5, 0.6)),
+            _piece("display storage", clear=0.5),
+            work.corner_plant,
+        ),
+    ),
+    "main_bedroom": (0.34, RESTING),
+    "bedroom": (0.36, RESTING),
+    "guest_room": (0.34, RESTING),
+    "kids_room": (
+        0.34,
+        (
+            sleep.toys,
+            sleep.child_table,
+            work.bookshelf,
+            _corner("big toy"),
+            _piece("shelving unit", clear=0.4),
+            _corner("bean bag"),
+            sleep.dresser,
+        ),
+    ),
     "study": (0.3, (work.bookshelf, work.corner_plant, living.reading_corner, _piece("office storage"), work.console)),
     "hall": (0.14, (work.console, work.corner_plant, work.hall_bench, _piece("cupboard"), living.reading_corner)),
-    "playroom": (0.26, (sleep.toys, _corner("bean bag"), _piece("shelving unit", clear=0.4), _corner("big toy"),
-                        living.reading_corner, sleep.child_table)),
-    "gym": (0.26, (_piece("bench", clear=0.3), work.corner_plant, _piece("shelving unit", clear=0.4), _corner("basketball"))),
-    "garage": (0.24, ROUGH), "workshop": (0.28, ROUGH),
-    "pantry": (0.36, (_piece("shelving unit", clear=0.4, avoid=()), _corner("box", avoid=()), _piece("cupboard", clear=0.4),
-                      _corner("basket", most=(0.6, 0.6, 0.7)))),
-    "closet": (0.36, (sleep.clothes, sleep.clothes, _corner("shoes"), _corner("box", most=(0.6, 0.6, 0.5)), _corner("basket"))),
-    "laundry_room": (0.34, (_piece("rough storage", clear=0.4), _corner("laundry basket"), _corner("box"),
-                            _piece("cupboard", clear=0.4))),
+    "playroom": (
+        0.26,
+        (
+            sleep.toys,
+            _corner("bean bag"),
+            _piece("shelving unit", clear=0.4),
+            _corner("big toy"),
+            living.reading_corner,
+            sleep.child_table,
+        ),
+    ),
+    "gym": (
+        0.26,
+        (_piece("bench", clear=0.3), work.corner_plant, _piece("shelving unit", clear=0.4), _corner("basketball")),
+    ),
+    "garage": (0.24, ROUGH),
+    "workshop": (0.28, ROUGH),
+    "pantry": (
+        0.36,
+        (
+            _piece("shelving unit", clear=0.4, avoid=()),
+            _corner("box", avoid=()),
+            _piece("cupboard", clear=0.4),
+            _corner("basket", most=(0.6, 0.6, 0.7)),
+        ),
+    ),
+    "closet": (
+        0.36,
+        (sleep.clothes, sleep.clothes, _corner("shoes"), _corner("box", most=(0.6, 0.6, 0.5)), _corner("basket")),
+    ),
+    "laundry_room": (
+        0.34,
+        (_piece("rough storage", clear=0.4), _corner("laundry basket"), _corner("box"), _piece("cupboard", clear=0.4)),
+    ),
 }
 """Room kind to the share of floor that should be stood on, and what fills it up."""
 
 PROGRAMMES: dict[str, Callable[[Context], None]] = {
-    "living_room": living_room, "family_room": living_room, "dining_room": dining_room, "kitchen": kitchen,
-    "main_bedroom": bedroom, "bedroom": bedroom, "guest_room": bedroom, "kids_room": kids_room,
-    "bathroom": bathroom, "toilet": toilet_room, "hall": hall, "corridor": corridor, "study": study,
-    "laundry_room": laundry_room, "pantry": pantry, "closet": closet, "library": library, "playroom": playroom,
-    "gym": gym, "garage": garage, "workshop": workshop, "sun_room": sun_room, "stairwell": stairwell,
+    "living_room": living_room,
+    "family_room": living_room,
+    "dining_room": dining_room,
+    "kitchen": kitchen,
+    "main_bedroom": bedroom,
+    "bedroom": bedroom,
+    "guest_room": bedroom,
+    "kids_room": kids_room,
+    "bathroom": bathroom,
+    "toilet": toilet_room,
+    "hall": hall,
+    "corridor": corridor,
+    "study": study,
+    "laundry_room": laundry_room,
+    "pantry": pantry,
+    "closet": closet,
+    "library": library,
+    "playroom": playroom,
+    "gym": gym,
+    "garage": garage,
+    "workshop": workshop,
+    "sun_room": sun_room,
+    "stairwell": stairwell,
 }

@@ -18,9 +18,16 @@ from embodied.generate.furnish.space import box, overlap
 EDGE = 0.012
 """Free strip at the edge of a surface, metres."""
 SEATS = {
-    "sofa": (0.16, 0.36), "corner sofa": (0.3, 0.3), "armchair": (0.14, 0.34), "rattan sofa": (0.1, 0.3),
-    "bed": (0.05, 0.24), "child bed": (0.05, 0.24), "day bed": (0.05, 0.24), "bunk bed": (0.1, 0.24),
-    "lounge chair": (0.14, 0.4), "sofa bed": (0.16, 0.36),
+    "sofa": (0.16, 0.36),
+    "corner sofa": (0.3, 0.3),
+    "armchair": (0.14, 0.34),
+    "rattan sofa": (0.1, 0.3),
+    "bed": (0.05, 0.24),
+    "child bed": (0.05, 0.24),
+    "day bed": (0.05, 0.24),
+    "bunk bed": (0.1, 0.24),
+    "lounge chair": (0.14, 0.4),
+    "sofa bed": (0.16, 0.36),
 }
 """Object class to the width of its arms in metres and the share of its depth that back or pillows take."""
 BOWLS = ("bathtub", "corner bathtub", "washbasin", "wall washbasin", "shower", "kitchen sink")
@@ -52,8 +59,14 @@ class Tops:
         self.taken.setdefault(key, []).append((u - a, v - b, u + a, v + b))
 
     def put(
-        self, asset: Asset | None, parent: Thing, surface: SupportSurface, spot: str = "any", turn: float = 0.2,
-        size: tuple[float, float, float] | None = None, tries: int = 7,
+        self,
+        asset: Asset | None,
+        parent: Thing,
+        surface: SupportSurface,
+        spot: str = "any",
+        turn: float = 0.2,
+        size: tuple[float, float, float] | None = None,
+        tries: int = 7,
     ) -> Thing | None:
         """Rest `asset` on a surface of `parent`, near `spot`; None where there is no free place."""
         if asset is None:
@@ -82,18 +95,30 @@ class Tops:
                 if 2 * a > x1 - x0 or 2 * b > y1 - y0:
                     return None
             u, v = _spot(spot, x0 + a + EDGE, x1 - a - EDGE, y0 + b + EDGE, y1 - b - EDGE, rng)
-            if any(u - a < t[2] + 0.008 and u + a > t[0] - 0.008 and v - b < t[3] + 0.008 and v + b > t[1] - 0.008
-                   for t in taken):
+            if any(
+                u - a < t[2] + 0.008 and u + a > t[0] - 0.008 and v - b < t[3] + 0.008 and v + b > t[1] - 0.008
+                for t in taken
+            ):
                 continue
             x, y = parent.local(u, v)
             own = box(x, y, w, d, parent.yaw + yaw, z, z + h)
             support = parent.box
-            if not ctx.space.inside(own) or any(
-                overlap(own, q) and not same_box(q, support) for q in ctx.space.solids
-            ):
+            if not ctx.space.inside(own) or any(overlap(own, q) and not same_box(q, support) for q in ctx.space.solids):
                 continue
-            thing = Thing(asset, x, y, z, parent.yaw + yaw, (w, d, h), looks(ctx, asset), parent, surface.name,
-                          parent.group, "small", None)
+            thing = Thing(
+                asset,
+                x,
+                y,
+                z,
+                parent.yaw + yaw,
+                (w, d, h),
+                looks(ctx, asset),
+                parent,
+                surface.name,
+                parent.group,
+                "small",
+                None,
+            )
             taken.append((u - a, v - b, u + a, v + b))
             self.alike[asset.object_class] += 1
             ctx.space.add([own])
@@ -158,8 +183,10 @@ def clutter(ctx: Context) -> None:
 
 def _hollow(asset: Asset) -> bool:
     """Whether its one surface is the opening of a bowl rather than a rim."""
-    return asset.object_class in BOWLS and max(
-        (s.x1 - s.x0) * (s.y1 - s.y0) for s in asset.surfaces) > 0.5 * asset.size[0] * asset.size[1]
+    return (
+        asset.object_class in BOWLS
+        and max((s.x1 - s.x0) * (s.y1 - s.y0) for s in asset.surfaces) > 0.5 * asset.size[0] * asset.size[1]
+    )
 
 
 def _main(thing: Thing) -> SupportSurface:
@@ -171,7 +198,17 @@ def _set_table(tops: Tops, table: Thing) -> None:
     """Something in the middle, and now and then places laid before the chairs."""
     ctx = tops.ctx
     top = _main(table)
-    roles = ("fruit bowl", "vase", "bouquet", "tulips", "candlestick", "bowl of apples", "lilies", "salad bowl", "orchid")
+    roles = (
+        "fruit bowl",
+        "vase",
+        "bouquet",
+        "tulips",
+        "candlestick",
+        "bowl of apples",
+        "lilies",
+        "salad bowl",
+        "orchid",
+    )
     for role in ctx.rng.permutation(len(roles))[: 1 + int(ctx.chance(0.3))]:
         asset = ctx.pick(roles[int(role)], most=(0.5, 0.5, 0.6))
         if asset is not None and ctx.chance(0.85):
@@ -191,8 +228,9 @@ def _set_table(tops: Tops, table: Thing) -> None:
             place, turn = (math.copysign(w / 2 - 0.24, u), v), -math.copysign(math.pi / 2, u)
         else:
             place, turn = (u, math.copysign(d / 2 - 0.24, v)), (0.0 if v < 0 else math.pi)
-        fixed = SupportSurface(top.name, top.z, place[0] - 0.26, place[1] - 0.26, place[0] + 0.26, place[1] + 0.26,
-                               top.headroom)
+        fixed = SupportSurface(
+            top.name, top.z, place[0] - 0.26, place[1] - 0.26, place[0] + 0.26, place[1] + 0.26, top.headroom
+        )
         _put_exactly(tops, asset, table, top, fixed, turn)
 
 
@@ -209,8 +247,20 @@ def _put_exactly(tops: Tops, asset: Asset, parent: Thing, top: SupportSurface, a
         return
     x, y = parent.local(u, v)
     z = parent.z + top.z * parent.size[2] / parent.asset.size[2]
-    thing = Thing(asset, x, y, z, parent.yaw + turn, asset.size, looks(tops.ctx, asset), parent, top.name,
-                  parent.group, "small", None)
+    thing = Thing(
+        asset,
+        x,
+        y,
+        z,
+        parent.yaw + turn,
+        asset.size,
+        looks(tops.ctx, asset),
+        parent,
+        top.name,
+        parent.group,
+        "small",
+        None,
+    )
     if any(overlap(thing.box, q) and not same_box(q, parent.box) for q in tops.ctx.space.solids):
         return
     taken.append((u - a, v - b, u + a, v + b))
@@ -247,8 +297,17 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
             tops.put(asset, thing, board, "any", 0.2, size=size, tries=5)
 
 
-SHELVES = ("bookcase", "shelving unit", "wall unit", "storage shelf", "open wall shelf", "clothes rack", "cupboard",
-           "media cabinet", "workbench")
+SHELVES = (
+    "bookcase",
+    "shelving unit",
+    "wall unit",
+    "storage shelf",
+    "open wall shelf",
+    "clothes rack",
+    "cupboard",
+    "media cabinet",
+    "workbench",
+)
 
 
 def _book_row(tops: Tops, thing: Thing, board: SupportSurface, books: Asset, scale) -> None:
@@ -265,8 +324,15 @@ def _book_row(tops: Tops, thing: Thing, board: SupportSurface, books: Asset, sca
     side = 1 if ctx.chance(0.5) else -1
     middle = (board.x0 + board.x1) / 2 * scale[0] + side * (width / 2 - w / 2 - EDGE)
     back = board.y1 * scale[1] - d - 0.02
-    at = SupportSurface(board.name, board.z, (middle - w / 2) / scale[0] - 2 * EDGE, back / scale[1] - 2 * EDGE,
-                        (middle + w / 2) / scale[0] + 2 * EDGE, (back + d) / scale[1] + 2 * EDGE, board.headroom)
+    at = SupportSurface(
+        board.name,
+        board.z,
+        (middle - w / 2) / scale[0] - 2 * EDGE,
+        back / scale[1] - 2 * EDGE,
+        (middle + w / 2) / scale[0] + 2 * EDGE,
+        (back + d) / scale[1] + 2 * EDGE,
+        board.headroom,
+    )
     tops.put(books, thing, at, "centre", 0.0, size=(w, d, h), tries=2)
 
 
@@ -284,8 +350,11 @@ def _resident(tops: Tops, thing: Thing, board: SupportSurface, most_alike: int) 
     """Something that is kept on such a board in such a room, of which there are fewer than `most_alike`."""
     ctx = tops.ctx
     most = ((board.x1 - board.x0) * 0.8, board.y1 - board.y0, board.headroom - 0.01)
-    fitting = [(a, w) for a, w in resting_on(ctx, thing.asset.object_class)
-               if a.object_class != "row of books" and all(s <= m for s, m in zip(a.size, most))]
+    fitting = [
+        (a, w)
+        for a, w in resting_on(ctx, thing.asset.object_class)
+        if a.object_class != "row of books" and all(s <= m for s, m in zip(a.size, most))
+    ]
     if fitting and ctx.chance(0.45):
         weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in fitting])
         asset = fitting[int(ctx.rng.choice(len(fitting), p=weights / weights.sum()))][0]
@@ -322,7 +391,8 @@ def resting_on(ctx: Context, object_class: str) -> list[tuple[Asset, float]]:
     key = (object_class, ctx.kind)
     if key not in memo:
         memo[key] = [
-            (a, a.rooms[ctx.kind]) for a in ctx.stock.catalogue.assets.values()
+            (a, a.rooms[ctx.kind])
+            for a in ctx.stock.catalogue.assets.values()
             if object_class in a.on and a.rooms.get(ctx.kind, 0.0) > 0 and max(a.size[:2]) < 0.6 and a.size[2] < 0.6
         ]
     return memo[key]

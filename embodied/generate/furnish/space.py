@@ -49,9 +49,9 @@ class Box:
         """(4, 2) corners counter-clockwise, metres; `grow` widens it on all sides."""
         a, b = self.half_width + grow, self.half_depth + grow
         c, s = self.cos, self.sin
-        return np.array([
-            (self.x + c * u - s * v, self.y + s * u + c * v) for u, v in ((-a, -b), (a, -b), (a, b), (-a, b))
-        ])
+        return np.array(
+            [(self.x + c * u - s * v, self.y + s * u + c * v) for u, v in ((-a, -b), (a, -b), (a, b), (-a, b))]
+        )
 
 
 def box(x: float, y: float, width: float, depth: float, yaw: float, bottom: float, top: float) -> Box:
@@ -59,9 +59,7 @@ def box(x: float, y: float, width: float, depth: float, yaw: float, bottom: floa
     c, s = math.cos(yaw), math.sin(yaw)
     square = min(abs(c), abs(s)) < 1e-6
     a, b = max(width / 2, 0.0), max(depth / 2, 0.0)
-    return Box(
-        x, y, a, b, yaw, bottom, top, c, s, abs(c) * a + abs(s) * b, abs(s) * a + abs(c) * b, square,
-    )
+    return Box(x, y, a, b, yaw, bottom, top, c, s, abs(c) * a + abs(s) * b, abs(s) * a + abs(c) * b, square)
 
 
 def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
@@ -160,7 +158,8 @@ class RoomSpace:
         x0, y0, x1, y1 = self.polygon.bounds
         self._rectangle = (
             (x0 - TOUCH, y0 - TOUCH, x1 + TOUCH, y1 + TOUCH)
-            if (x1 - x0) * (y1 - y0) - self.polygon.area < 1e-4 else None
+            if (x1 - x0) * (y1 - y0) - self.polygon.area < 1e-4
+            else None
         )
 
     def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False) -> bool:
@@ -172,7 +171,9 @@ class RoomSpace:
         """
         if self._rectangle is not None:
             x0, y0, x1, y1 = self._rectangle
-            if not (x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1):
+            if not (
+                x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1
+            ):
                 return False
         elif not self.inside(b):
             return False
@@ -234,7 +235,7 @@ class RoomSpace:
     def _label(labels: np.ndarray, cell: tuple[int, int]) -> int:
         """The free part that contains the cell or one of its close neighbours, else 0."""
         r, c = cell
-        near = labels[max(r - 2, 0): r + 3, max(c - 2, 0): c + 3]
+        near = labels[max(r - 2, 0) : r + 3, max(c - 2, 0) : c + 3]
         here = int(labels[r, c])
         return here if here else int(near.max(initial=0))
 
@@ -257,7 +258,9 @@ def room_space(house: House, room: Room) -> RoomSpace:
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
     flights = [
-        b for stair in house.stairs if room.id in stair.rooms
+        b
+        for stair in house.stairs
+        if room.id in stair.rooms
         for b in _stair_keepouts(stair, storey.elevation, storey.height)
     ]
     keepouts.extend(flights)
@@ -270,7 +273,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
             ring = np.asarray(part.exterior.coords)[:-1]
             cv2.fillPoly(walk, [np.rint((ring - origin) / CELL).astype(np.int32)], 1)
     space = RoomSpace(
-        room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin,
+        room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin
     )
     for wall in walls:
         for s0, s1, o in wall.openings:
@@ -311,11 +314,18 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
             found.append((s0, s1, o))
         found.sort(key=lambda f: (f[0], f[2].id))
         outer = any(None in o.rooms for _, _, o in found)
-        walls.append(Wall(
-            i, (float(ring[i][0]), float(ring[i][1])), (float(along[0]), float(along[1])),
-            (float(inward[0]), float(inward[1])), float(lengths[i]), outer, tuple(found),
-            (convex[i], convex[(i + 1) % n]),
-        ))
+        walls.append(
+            Wall(
+                i,
+                (float(ring[i][0]), float(ring[i][1])),
+                (float(along[0]), float(along[1])),
+                (float(inward[0]), float(inward[1])),
+                float(lengths[i]),
+                outer,
+                tuple(found),
+                (convex[i], convex[(i + 1) % n]),
+            )
+        )
     return tuple(walls)
 
 
@@ -331,7 +341,9 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     if o.kind == "window":
         return [before(s0 - 0.05, s1 + 0.05, 0.3, o.sill, o.head)]
     swings_here = o.rooms[0] == room.id and o.kind in ("door", "front_door", "back_door")
-    depth = {"passage": 0.6 if area > 9.0 else 0.4, "french_window": 0.6, "garage_door": 1.2}.get(o.kind, 0.6 if area > 3.0 else 0.4)
+    depth = {"passage": 0.6 if area > 9.0 else 0.4, "french_window": 0.6, "garage_door": 1.2}.get(
+        o.kind, 0.6 if area > 3.0 else 0.4
+    )
     if o.kind in ("front_door",):
         depth = 1.0
     if swings_here:
@@ -368,7 +380,5 @@ def _stair_keepouts(stair, z: float, height: float) -> list[Box]:
     for end, next_ in ends:
         length = math.hypot(next_[0] - end[0], next_[1] - end[1]) or 1.0
         ux, uy = (end[0] - next_[0]) / length, (end[1] - next_[1]) / length
-        boxes.append(box(
-            end[0] + 0.45 * ux, end[1] + 0.45 * uy, 0.9, stair.width, math.atan2(uy, ux), z, z + 2.1,
-        ))
+        boxes.append(box(end[0] + 0.45 * ux, end[1] + 0.45 * uy, 0.9, stair.width, math.atan2(uy, ux), z, z + 2.1))
     return boxes

@@ -40,9 +40,15 @@ class Stock:
         return self._by_role[role]
 
     def pick(
-        self, role: str, *, rng: np.random.Generator, kind: str | None = None,
-        most: tuple[float, float, float] = (99.0, 99.0, 99.0), least: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        where: Callable[[Asset], bool] | None = None, avoid: Sequence[str] = (),
+        self,
+        role: str,
+        *,
+        rng: np.random.Generator,
+        kind: str | None = None,
+        most: tuple[float, float, float] = (99.0, 99.0, 99.0),
+        least: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        where: Callable[[Asset], bool] | None = None,
+        avoid: Sequence[str] = (),
     ) -> Asset | None:
         """An asset for `role` within the size limits, or None.
 
@@ -53,7 +59,8 @@ class Stock:
           avoid: keys not to take unless nothing else is left.
         """
         fit = [
-            a for a in self.of_role(role)
+            a
+            for a in self.of_role(role)
             if all(lo <= s <= hi for lo, s, hi in zip(least, a.size, most)) and (where is None or where(a))
         ]
         if kind not in CHILDREN:

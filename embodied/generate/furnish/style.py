@@ -27,16 +27,36 @@ class Style:
 
 
 STYLES = (
-    Style("light", ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
-          ("black", "dark", "antique", "red", "gothic", "ornate"), ("beige", "grey", "white", "blue")),
-    Style("warm", ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
-          ("black", "metal", "glass", "plastic", "purple"), ("beige", "terracotta", "green", "brown")),
-    Style("dark", ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
-          ("pine", "pink", "rustic", "beige"), ("grey", "black", "blue", "white")),
-    Style("classic", ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
-          ("plastic", "modern", "white", "glass", "metal"), ("red", "brown", "green", "beige")),
-    Style("colourful", ("blue", "green", "red", "yellow", "orange", "white", "modern"),
-          ("brown", "dark", "antique", "black"), ("blue", "green", "yellow", "terracotta")),
+    Style(
+        "light",
+        ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
+        ("black", "dark", "antique", "red", "gothic", "ornate"),
+        ("beige", "grey", "white", "blue"),
+    ),
+    Style(
+        "warm",
+        ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
+        ("black", "metal", "glass", "plastic", "purple"),
+        ("beige", "terracotta", "green", "brown"),
+    ),
+    Style(
+        "dark",
+        ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
+        ("pine", "pink", "rustic", "beige"),
+        ("grey", "black", "blue", "white"),
+    ),
+    Style(
+        "classic",
+        ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
+        ("plastic", "modern", "white", "glass", "metal"),
+        ("red", "brown", "green", "beige"),
+    ),
+    Style(
+        "colourful",
+        ("blue", "green", "red", "yellow", "orange", "white", "modern"),
+        ("brown", "dark", "antique", "black"),
+        ("blue", "green", "yellow", "terracotta"),
+    ),
 )
 
 
@@ -44,7 +64,12 @@ def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Styl
     """The taste called `name` (House.style), drawn up for one house of that disorder."""
     base = next((s for s in STYLES if s.name == name), STYLES[0])
     return Style(
-        base.name, base.favours, base.shuns, base.fabric, 1.0 - disorder, float(rng.uniform(0.2, 1.0)),
+        base.name,
+        base.favours,
+        base.shuns,
+        base.fabric,
+        1.0 - disorder,
+        float(rng.uniform(0.2, 1.0)),
         int(rng.integers(1 << 30)),
     )
 

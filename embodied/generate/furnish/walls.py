@@ -43,8 +43,17 @@ def hang_all(ctx: Context) -> None:
 
 
 def mount(
-    ctx: Context, asset: Asset | None, wall: Wall, s: float, z: float, group: str, *,
-    size: tuple[float, float, float] | None = None, margin: float = 0.0, passage: bool = False, role: str = "",
+    ctx: Context,
+    asset: Asset | None,
+    wall: Wall,
+    s: float,
+    z: float,
+    group: str,
+    *,
+    size: tuple[float, float, float] | None = None,
+    margin: float = 0.0,
+    passage: bool = False,
+    role: str = "",
     away: float = 0.0,
 ) -> Thing | None:
     """Hang `asset` on the wall with the middle of its back at `s` and its underside at `z`, if it fits.
@@ -66,7 +75,9 @@ def mount(
     exact = box(x, y, w, d, wall.yaw, base, base + h)
     if not ctx.space.fits(exact, passage=passage) or any(overlap(wide, q) for q in ctx.space.solids):
         return None
-    thing = Thing(asset, x, y, base, wall.yaw, (w, d, h), looks(ctx, asset), None, None, f"{group}", role or group, wall)
+    thing = Thing(
+        asset, x, y, base, wall.yaw, (w, d, h), looks(ctx, asset), None, None, f"{group}", role or group, wall
+    )
     ctx.space.add([exact])
     ctx.things.append(thing)
     ctx.stock.note([asset])
@@ -91,8 +102,11 @@ def ceiling_lamps(ctx: Context) -> None:
         pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
         if _ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
             spots.append((table.x, table.y))
-    centre = space.polygon.representative_point() if not space.polygon.contains(space.polygon.centroid) else \
-        space.polygon.centroid
+    centre = (
+        space.polygon.representative_point()
+        if not space.polygon.contains(space.polygon.centroid)
+        else space.polygon.centroid
+    )
     for i in range(nx):
         for j in range(ny):
             x, y = x0 + (i + 0.5) * wx / nx, y0 + (j + 0.5) * wy / ny
@@ -157,8 +171,9 @@ def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | N
     if low or not ctx.space.fits(b, passage=True):
         return False
     ctx.space.add([b])
-    ctx.things.append(Thing(lamp, x, y, top - h, 0.0, (w, d, h), looks(ctx, lamp), None, None, "ceiling",
-                            "ceiling lamp", None))
+    ctx.things.append(
+        Thing(lamp, x, y, top - h, 0.0, (w, d, h), looks(ctx, lamp), None, None, "ceiling", "ceiling lamp", None)
+    )
     return True
 
 
@@ -212,8 +227,21 @@ def radiators(ctx: Context) -> None:
 def above_furniture(ctx: Context) -> None:
     """Pictures and mirrors over sofas, beds, sideboards, desks and consoles; a television over its bench."""
     for thing in list(ctx.things):
-        if thing.role not in ("sofa", "bed", "sideboard", "dresser", "console", "desk", "bench", "cupboard", "chest",
-                              "fireplace", "dressing", "tv stand", "storage"):
+        if thing.role not in (
+            "sofa",
+            "bed",
+            "sideboard",
+            "dresser",
+            "console",
+            "desk",
+            "bench",
+            "cupboard",
+            "chest",
+            "fireplace",
+            "dressing",
+            "tv stand",
+            "storage",
+        ):
             continue
         wall, s = _wall_behind(ctx, thing)
         top = thing.z - ctx.space.bottom + thing.size[2]
@@ -267,8 +295,10 @@ def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: flo
     for k in range(count):
         piece = asset if k == 0 else _art(ctx)
         at = s + (k - (count - 1) / 2) * (w + 0.1)
-        hung += mount(ctx, piece, wall, at, z, "picture", size=(w, piece.size[1], h), margin=0.04,
-                      role="picture") is not None
+        hung += (
+            mount(ctx, piece, wall, at, z, "picture", size=(w, piece.size[1], h), margin=0.04, role="picture")
+            is not None
+        )
     return hung
 
 
@@ -353,8 +383,16 @@ def mirrors(ctx: Context) -> None:
 
 def clock(ctx: Context) -> None:
     """A wall clock in rooms where one looks at it."""
-    if ctx.kind not in ("kitchen", "living_room", "study", "hall", "dining_room", "family_room", "kids_room", "gym") or \
-            not ctx.chance(0.45):
+    if ctx.kind not in (
+        "kitchen",
+        "living_room",
+        "study",
+        "hall",
+        "dining_room",
+        "family_room",
+        "kids_room",
+        "gym",
+    ) or not ctx.chance(0.45):
         return
     asset = ctx.pick("wall clock")
     if asset is None:
@@ -368,8 +406,9 @@ def clock(ctx: Context) -> None:
 
 def wall_lamps(ctx: Context) -> None:
     """Sconces in halls, corridors and living rooms."""
-    if ctx.kind not in ("corridor", "hall", "living_room", "stairwell", "family_room", "library") or \
-            not ctx.chance(0.45):
+    if ctx.kind not in ("corridor", "hall", "living_room", "stairwell", "family_room", "library") or not ctx.chance(
+        0.45
+    ):
         return
     asset = ctx.pick("wall lamp", most=(0.5, 0.35, 0.7))
     for wall in sorted(ctx.space.walls, key=lambda w: -w.length)[:2]:
@@ -391,7 +430,7 @@ def switches(ctx: Context) -> None:
             if o.kind in ("window", "french_window", "passage") or not left:
                 continue
             hinge_at_s0 = abs(_along(wall, o.a if o.hinge == "a" else o.b) - s0) < 1e-6
-            for at in ((s1 + 0.2, s0 - 0.2) if hinge_at_s0 else (s0 - 0.2, s1 + 0.2)):
+            for at in (s1 + 0.2, s0 - 0.2) if hinge_at_s0 else (s0 - 0.2, s1 + 0.2):
                 if mount(ctx, asset, wall, at, 1.06, "electric", role="light switch"):
                     left -= 1
                     break
@@ -412,8 +451,11 @@ def sockets(ctx: Context) -> None:
     left = 1 + (ctx.space.area > 9) + (ctx.space.area > 20)
     for wall in sorted(ctx.space.walls, key=lambda w: -w.length):
         for share in (0.12, 0.88):
-            if left and wall.length > 1.2 and mount(ctx, asset, wall, wall.length * share, z, "electric",
-                                                    role="wall socket"):
+            if (
+                left
+                and wall.length > 1.2
+                and mount(ctx, asset, wall, wall.length * share, z, "electric", role="wall socket")
+            ):
                 left -= 1
 
 
