@@ -15,11 +15,12 @@ from assets.materials import MATERIALS
 from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.generate.clearing import cleared
-from embodied.generate.finishes import STYLES
+from embodied.generate.finishes import TASTES
 from embodied.generate.footprint import draw_footprint
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.stages import Draft
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
+from embodied.house.validation import STYLES
 from embodied.navigation.free_space import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
@@ -200,6 +201,10 @@ def test_living_rooms_mostly_look_south():
         widest = max(glass, key=lambda o: math.dist(o.a, o.b) * (o.head - o.sill))
         south += float(np.dot(-inward(house, widest), [-math.cos(house.sky.north), -math.sin(house.sky.north)])) > 0
     assert south > 0.75 * SEEDS
+
+
+def test_every_style_has_a_taste():
+    assert tuple(TASTES) == STYLES
 
 
 def test_palettes_use_known_materials_and_one_style_per_house():

@@ -13,8 +13,8 @@ from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogu
 from embodied.cli.options import add_options, read_options
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
-from embodied.generate.finishes import STYLES
 from embodied.house.house import WEATHERS
+from embodied.house.validation import STYLES
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
     group = parser.add_argument_group("what kind of house", "what is not given is drawn from the seed")
-    add_options(group, HouseConfig, words={"shape": SHAPES, "style": tuple(STYLES), "weather": WEATHERS})
+    add_options(group, HouseConfig, words={"shape": SHAPES, "style": STYLES, "weather": WEATHERS})
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

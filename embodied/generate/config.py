@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from embodied.generate.finishes import STYLES
 from embodied.house.house import HouseError
+from embodied.house.validation import STYLES
 
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 AREAS = (32.0, 700.0)
@@ -57,7 +57,7 @@ class HouseConfig:
         if self.weather not in (None, "clear", "hazy", "overcast"):
             raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
         if self.style is not None and self.style not in STYLES:
-            raise HouseError(f"style should be one of {tuple(STYLES)}, got {self.style!r}")
+            raise HouseError(f"style should be one of {STYLES}, got {self.style!r}")
         if self.shape not in (None, *SHAPES):
             raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
         if self.storeys != 1:

@@ -15,6 +15,7 @@ import shapely
 
 from embodied.generate.kinds import BEDROOMS
 from embodied.house.house import House, HouseError, Room
+from embodied.house.validation import STYLES
 
 WET = ("bathroom", "toilet", "laundry_room")
 TALK = ("living_room", "dining_room", "family_room", "hall", "corridor", "library", "study")
@@ -44,7 +45,7 @@ def _all(stem: str, count: int) -> tuple[str, ...]:
     return tuple(f"{stem}/{k}" for k in range(count))
 
 
-STYLES: Mapping[str, Taste] = {
+TASTES: Mapping[str, Taste] = {
     "light": Taste(
         (
             "light_oak_planks/0",
@@ -204,7 +205,7 @@ STYLES: Mapping[str, Taste] = {
         ("lacquer_red/0", "lacquer_navy_blue/0", "paint_sage_green/0", "teak/0"),
     ),
 }
-"""Style name to taste; the names are those of embodied.generate.furnish.style."""
+"""Style name to taste; the names are those of embodied.house.validation.STYLES."""
 ROUGH = ("concrete/0", "concrete/1", "concrete/3")
 KIDS = (
     "paint_mint/0",
@@ -249,9 +250,9 @@ def draw_palette(style: str | None, *, rng: np.random.Generator) -> Palette:
       HouseError: an unknown style.
     """
     if style is not None and style not in STYLES:
-        raise HouseError(f"style should be one of {tuple(STYLES)}, got {style!r}")
-    name = style or str(rng.choice(tuple(STYLES)))
-    taste = STYLES[name]
+        raise HouseError(f"style should be one of {STYLES}, got {style!r}")
+    name = style or str(rng.choice(STYLES))
+    taste = TASTES[name]
     floor, stone = _one(taste.woods, rng), _one(taste.stones, rng)
     if rng.random() < 0.1:
         floor = stone

@@ -172,7 +172,7 @@ class House:
     outer_wall: float = 0.32
     """Wall thicknesses, metres."""
     style: str = "light"
-    """The palette and taste of its furnishing: one of embodied.generate.finishes.STYLES."""
+    """The palette and taste of its furnishing: one of embodied.house.validation.STYLES."""
     disorder: float = 0.4
     """0 is tidy, 1 is thoroughly lived in."""
 

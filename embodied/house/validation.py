@@ -9,8 +9,10 @@ from pathlib import Path
 
 from assets.catalogue import Catalogue
 from assets.materials import MATERIALS
-from embodied.generate.finishes import STYLES
 from embodied.house.house import House, HouseError, Placement
+
+STYLES = ("light", "warm", "dark", "classic", "colourful")
+"""Names of the palettes and tastes of a house's furnishing; embodied.generate.finishes says what each chooses from."""
 
 
 def load_house(path: Path, catalogue: Catalogue) -> House:
@@ -32,7 +34,7 @@ def check_known(house: House, catalogue: Catalogue) -> None:
       HouseError: an unknown style, material, asset, object class, surface or parameter.
     """
     if house.style not in STYLES:
-        raise HouseError(f"the house has the unknown style {house.style!r}; use one of {tuple(STYLES)}")
+        raise HouseError(f"the house has the unknown style {house.style!r}; use one of {STYLES}")
     for room in house.rooms:
         for finish in (
             room.floor_finish,
