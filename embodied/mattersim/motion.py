@@ -1,0 +1,206 @@
+"""How agents move and turn: in steps of 30 degrees (`Views`), or freely (`Angles`). Both hold a batch of poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, Bearings, Lookout, ViewPoint
+
+
+class Motion(Protocol):
+    """A batch of poses."""
+
+    lookout: Lookout
+
+    @property
+    def started(self) -> bool:
+        """Whether agents stand anywhere yet."""
+        ...
+
+    def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
+        """Put every agent somewhere."""
+        ...
+
+    def act(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
+        """Let every agent move to one of its locations, then turn. Raises ValueError for an index it does not have."""
+        ...
+
+    def row(self, agent: int) -> int:
+        """Row of its viewpoint in the graphs."""
+        ...
+
+    def here(self, agent: int) -> ViewPoint: ...
+
+    def locations(self, agent: int) -> tuple[ViewPoint, ...]: ...
+
+    def heading(self, agent: int) -> float: ...
+
+    def elevation(self, agent: int) -> float: ...
+
+    def view(self, agent: int) -> int: ...
+
+
+def heading_step(heading: float) -> int:
+    """The discretized heading 0..11 nearest to an angle, radians; halves round up, as lround does."""
+    return math.floor(normal(heading) / STEP + 0.5) % HEADINGS
+
+
+def elevation_step(elevation: float) -> int:
+    """-1, 0 or 1: beyond 15 degrees the camera looks 30 degrees down or up."""
+    return -1 if elevation < -TILT / 2 else 1 if elevation > TILT / 2 else 0
+
+
+def normal(heading: float) -> float:
+    """The heading in [0, 2 pi)."""
+    heading = math.fmod(heading, 2 * math.pi)
+    if heading < 0.0:
+        heading += 2 * math.pi
+    return heading if heading < 2 * math.pi else 0.0
+
+
+def sign_steps(change: float) -> int:
+    """Upstream: only the sign counts."""
+    return int(change > 0) - int(change < 0)
+
+
+def counted_steps(change: float) -> float:
+    """HANNA's fork: the change is a number of steps."""
+    return change
+
+
+class Views:
+    """Discretized: a pose is row * 36 + viewIndex."""
+
+    def __init__(self, lookout: Lookout, steps: Callable[[float], float]) -> None:
+        """Args:
+        steps: turns a requested change into steps of 30 degrees, `sign_steps` or `counted_steps`.
+        """
+        self.lookout, self._steps = lookout, steps
+        self._codes: list[int] = []
+
+    @property
+    def started(self) -> bool:
+        return bool(self._codes)
+
+    def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
+        self._codes = [
+            row * VIEWS + HEADINGS * (elevation_step(e) + 1) + heading_step(h)
+            for row, h, e in zip(rows, headings, elevations, strict=True)
+        ]
+
+    def act(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
+        steps, look, codes = self._steps, self.lookout.view, []
+        for agent, (code, k, h, e) in enumerate(zip(self._codes, index, heading, elevation, strict=True)):
+            row, view = divmod(code, VIEWS)
+            if k:
+                row = _chosen(look(code)[0], k, agent, len(self._codes))
+            if h:
+                view += _turned(view % HEADINGS, steps(h)) - view % HEADINGS
+            if e:
+                view += HEADINGS * (_tilted(view // HEADINGS - 1, steps(e)) + 1 - view // HEADINGS)
+            codes.append(row * VIEWS + view)
+        self._codes = codes
+
+    def row(self, agent: int) -> int:
+        return self._codes[agent] // VIEWS
+
+    def here(self, agent: int) -> ViewPoint:
+        return self.lookout.view(self._codes[agent])[1][0]
+
+    def locations(self, agent: int) -> tuple[ViewPoint, ...]:
+        return self.lookout.view(self._codes[agent])[1]
+
+    def heading(self, agent: int) -> float:
+        return self._codes[agent] % HEADINGS * STEP
+
+    def elevation(self, agent: int) -> float:
+        return (self._codes[agent] % VIEWS // HEADINGS - 1) * TILT
+
+    def view(self, agent: int) -> int:
+        return self._codes[agent] % VIEWS
+
+
+def _chosen(rows: tuple[int, ...], k: int, agent: int, agents: int) -> int:
+    if not 0 <= k < len(rows):
+        raise ValueError(
+            f"MatterSim: Invalid action index: {k} in environment {agent} of {agents}; it has 0 to {len(rows) - 1}"
+        )
+    return rows[k]
+
+
+def _turned(at: int, steps: float) -> int:
+    if isinstance(steps, int):
+        return (at + steps) % HEADINGS
+    return heading_step(at * STEP + steps * STEP)
+
+
+def _tilted(at: int, steps: float) -> int:
+    if isinstance(steps, int):
+        return max(-1, min(1, at + steps))
+    return elevation_step(at * TILT + steps * TILT)
+
+
+class Angles:
+    """Continuous: any heading, elevations within limits. Vectorised over the batch; locations are found when wanted."""
+
+    def __init__(self, lookout: Lookout, limits: tuple[float, float]) -> None:
+        """Args:
+        limits: lowest and highest elevation, radians.
+        """
+        self.lookout, self.limits = lookout, limits
+        self._rows, self._headings, self._elevations = np.zeros(0, int), np.zeros(0), np.zeros(0)
+        self._seen: Bearings | None = None
+
+    @property
+    def started(self) -> bool:
+        return bool(len(self._rows))
+
+    def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
+        self._rows = np.array(rows, int)
+        self._look(np.array(headings, float), np.array(elevations, float))
+
+    def act(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
+        chosen = np.array(index, int)
+        if chosen.any():
+            seen, agents = self._bearings(), np.arange(len(chosen))
+            wrong = np.flatnonzero((chosen < 0) | (chosen > seen.count))
+            if len(wrong):
+                agent = int(wrong[0])
+                _chosen((0,) * (int(seen.count[agent]) + 1), int(chosen[agent]), agent, len(chosen))
+            there = seen.rows[agents, np.maximum(chosen - 1, 0)]
+            self._rows = np.where(chosen > 0, there, self._rows)
+        self._look(self._headings + np.array(heading, float), self._elevations + np.array(elevation, float))
+
+    def _look(self, headings: np.ndarray, elevations: np.ndarray) -> None:
+        turn = np.fmod(headings, 2 * math.pi)
+        turn = np.where(turn < 0, turn + 2 * math.pi, turn)
+        self._headings = np.where(turn < 2 * math.pi, turn, 0.0)
+        self._elevations = np.clip(elevations, *self.limits)
+        self._seen = None
+
+    def _bearings(self) -> Bearings:
+        if self._seen is None:
+            self._seen = self.lookout.bearings(self._rows, self._headings, self._elevations)
+        return self._seen
+
+    def row(self, agent: int) -> int:
+        return int(self._rows[agent])
+
+    def here(self, agent: int) -> ViewPoint:
+        return self.lookout.here(int(self._rows[agent]))
+
+    def locations(self, agent: int) -> tuple[ViewPoint, ...]:
+        return self.lookout.locations(int(self._rows[agent]), self._bearings(), agent)[1]
+
+    def heading(self, agent: int) -> float:
+        return float(self._headings[agent])
+
+    def elevation(self, agent: int) -> float:
+        return float(self._elevations[agent])
+
+    def view(self, agent: int) -> int:
+        return 0  # as there: set only when angles are discretized

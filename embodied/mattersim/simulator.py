@@ -1,0 +1,320 @@
+"""The batched simulator (upstream, and the fork of HANNA and ILIAD): `Simulator`, `SimState`, `ViewPoint`.
+
+Names, defaults and errors are those of the C++ module (Anderson et al. 2018). Angles are radians, headings clockwise
+from +y, elevations up; positions metres. Settings are ignored once `initialize` was called, but for the camera's
+resolution, its field of view and the limits of elevation, as there.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from embodied.mattersim.chance import Engine
+from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
+from embodied.mattersim.motion import Angles, Motion, Views, counted_steps, sign_steps
+from embodied.mattersim.pictures import Skyboxes
+from embodied.mattersim.sight import ViewPoint, lookout
+
+Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]
+"""(scan, viewpoint, heading, elevation, vertical field of view, (height, width)) -> picture."""
+
+
+class SimState:
+    """What one agent of a batch sees. It is alive: after the next action it shows the new state."""
+
+    __slots__ = ("_agent", "_motion", "_simulator")
+
+    def __init__(self, simulator: Simulator, motion: Motion, agent: int) -> None:
+        self._simulator, self._motion, self._agent = simulator, motion, agent
+
+    @property
+    def scanId(self) -> str:
+        return self._simulator._scans[self._agent]
+
+    @property
+    def step(self) -> int:
+        """Actions since the episode began."""
+        return self._simulator._step
+
+    @property
+    def rgb(self) -> np.ndarray:
+        """(H, W, 3) uint8, blue, green, red; row 0 is on top. Black without rendering."""
+        return self._simulator._picture(self._agent, depth=False)
+
+    @property
+    def depth(self) -> np.ndarray:
+        """(H, W, 1) uint16, quarters of a millimetre along the optical axis. 0 without depth."""
+        return self._simulator._picture(self._agent, depth=True)
+
+    @property
+    def location(self) -> ViewPoint | None:
+        """None before the first episode."""
+        return self._motion.here(self._agent) if self._motion.started else None
+
+    @property
+    def heading(self) -> float:
+        """In [0, 2 pi)."""
+        return self._motion.heading(self._agent) if self._motion.started else 0.0
+
+    @property
+    def elevation(self) -> float:
+        return self._motion.elevation(self._agent) if self._motion.started else 0.0
+
+    @property
+    def viewIndex(self) -> int:
+        """0..35 when angles are discretized (0..11 look down), else 0."""
+        return self._motion.view(self._agent) if self._motion.started else 0
+
+    @property
+    def navigableLocations(self) -> list[ViewPoint]:
+        """Its own location first, then the others from the middle of the view outwards."""
+        return list(self._motion.locations(self._agent)) if self._motion.started else []
+
+
+class Simulator:
+    """Upstream: with discretized angles the sign of a change turns or tilts by 30 degrees."""
+
+    _steps: Callable[[float], float] = staticmethod(sign_steps)
+
+    def __init__(self) -> None:
+        self._graph_path, self._dataset_path = "./connectivity", "./data/v1/scans/"
+        self._width, self._height, self._vfov = 320, 240, 0.8
+        self._limits = (-0.94, 0.94)
+        self._rendering, self._discrete, self._restricted, self._depth = True, False, True, False
+        self._preload = False
+        self._batch, self._cache, self._seed = 1, 200, 1
+        self._ready = False
+        self._forget()
+
+    def _forget(self) -> None:
+        self._states: list[SimState] = []
+        self._scans: list[str] = []
+        self._step = self._frames = 0
+        self._motion: Motion | None = None  # until `initialize`
+        self._drawn: dict[tuple[int, bool], np.ndarray] = {}
+        self._began = time.perf_counter()
+
+    # Settings -----------------------------------------------------------------------------------
+
+    def setDatasetPath(self, path: str) -> None:
+        """Folder of `<scan>/matterport_skybox_images`."""
+        self._set("_dataset_path", str(path))
+
+    def setNavGraphPath(self, path: str) -> None:
+        """Folder of scans.txt and of `<scan>_connectivity.json`."""
+        self._set("_graph_path", str(path))
+
+    def setRenderingEnabled(self, value: bool) -> None:
+        self._set("_rendering", bool(value))
+
+    def setDiscretizedViewingAngles(self, value: bool) -> None:
+        self._set("_discrete", bool(value))
+
+    def setRestrictedNavigation(self, value: bool) -> None:
+        self._set("_restricted", bool(value))
+
+    def setPreloadingEnabled(self, value: bool) -> None:
+        """Whether `initialize` reads all skyboxes; no more than setCacheSize are kept."""
+        self._set("_preload", bool(value))
+
+    def setDepthEnabled(self, value: bool) -> None:
+        self._set("_depth", bool(value))
+
+    def setBatchSize(self, size: int) -> None:
+        if size < 0:
+            raise TypeError(f"setBatchSize wants a whole number of agents, got {size}")
+        self._set("_batch", int(size))
+
+    def setCacheSize(self, size: int) -> None:
+        """How many decoded skyboxes are kept; one of 512 pixels takes 20 MB."""
+        self._set("_cache", int(size))
+
+    def setSeed(self, seed: int) -> None:
+        """Of the viewpoints of newRandomEpisode; its headings are the same at every call, as there."""
+        self._set("_seed", int(seed))
+
+    def setCameraResolution(self, width: int, height: int) -> None:
+        """Pixels; enters the navigable field of view even without rendering."""
+        self._width, self._height = int(width), int(height)
+        self._watch()
+
+    def setCameraVFOV(self, vfov: float) -> None:
+        """Vertical field of view, radians."""
+        self._vfov = float(vfov)
+        self._watch()
+
+    def setElevationLimits(self, low: float, high: float) -> bool:
+        """Whether the limits were taken: they should lie within a right angle on either side of the horizon."""
+        if not -math.pi / 2 < low < 0.0 < high < math.pi / 2:
+            return False
+        self._limits = (float(low), float(high))
+        if isinstance(self._motion, Angles):
+            self._motion.limits = self._limits
+        return True
+
+    def _set(self, name: str, value: object) -> None:
+        if not self._ready:
+            setattr(self, name, value)
+
+    # Play ---------------------------------------------------------------------------------------
+
+    def initialize(self) -> None:
+        """Read the graphs.
+
+        Raises:
+          ValueError: no scans.txt, or a scan of it has no graph.
+        """
+        self._graphs: Graphs = load_graphs(self._graph_path, listed_scans(self._graph_path))
+        self._engine = Engine(self._seed)
+        self._skyboxes = Skyboxes(self._dataset_path, self._cache, depth=self._depth)
+        self._motion = self._new_motion()
+        self._states = [SimState(self, self._motion, agent) for agent in range(self._batch)]
+        self._scans = [""] * self._batch
+        self._ready = True
+        if self._rendering and self._preload:
+            for row in np.flatnonzero(self._graphs.included)[: self._cache].tolist():
+                self._skyboxes.panorama(self._graphs.scans[row], self._graphs.ids[row])
+
+    def newEpisode(
+        self,
+        scanIds: Sequence[str],
+        viewpointIds: Sequence[str],
+        headings: Sequence[float],
+        elevations: Sequence[float],
+    ) -> None:
+        """Put every agent of the batch somewhere.
+
+        Raises:
+          IndexError: an unknown scan, or fewer values than agents.
+          ValueError: an unknown or an excluded viewpoint.
+        """
+        if not self._ready:
+            self.initialize()
+        scans = self._each(scanIds)
+        rows = [self._graphs.row(s, v) for s, v in zip(scans, self._each(viewpointIds), strict=True)]
+        self._moving.start(rows, self._each(headings), self._each(elevations))
+        self._scans, self._step = scans, 0
+        self._drawn = {}
+
+    def newRandomEpisode(self, scanIds: Sequence[str]) -> None:
+        """Put every agent at a random viewpoint of its scan, level, along a random heading."""
+        if not self._ready:
+            self.initialize()
+        scans, turn = self._each(scanIds), Engine()
+        viewpoints = [self._random_viewpoint(scan) for scan in scans]
+        self.newEpisode(scans, viewpoints, [turn.uniform() * 2 * math.pi for _ in scans], [0.0] * len(scans))
+
+    def getState(self) -> list[SimState]:
+        """One state per agent: the same objects every time, which show what is now."""
+        return list(self._states)
+
+    def makeAction(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
+        """Let every agent move to a location of its list, then turn and tilt.
+
+        Args:
+          index: into each agent's navigableLocations; 0 stays.
+          heading: changes in radians, right is positive; see the class for discretized angles.
+          elevation: likewise, up is positive.
+
+        Raises:
+          RuntimeError: before `initialize`.
+          ValueError: an index that is not in an agent's list; nobody has moved.
+          IndexError: fewer values than agents.
+        """
+        if not self._ready:
+            raise RuntimeError("MatterSim: newEpisode must be called before makeAction")
+        if not self._moving.started:
+            raise ValueError("MatterSim: Invalid action index: there are no locations before newEpisode")
+        self._moving.act(self._each(index), self._each(heading), self._each(elevation))
+        self._step += 1
+        self._drawn = {}
+
+    def close(self) -> None:
+        """Forget the episode and the pictures; settings may be changed again."""
+        self._ready = False
+        self._forget()
+
+    def resetTimers(self) -> None:
+        self._began, self._frames = time.perf_counter(), 0
+
+    def timingInfo(self) -> str:
+        """Pictures drawn since the timers were reset."""
+        wall = time.perf_counter() - self._began
+        return f"Rendered {self._frames} frames\nWall time: {wall * 1000:.1f} ms, ({self._frames / wall:.1f} fps)\n"
+
+    # ---------------------------------------------------------------------------------------------
+
+    @property
+    def _moving(self) -> Motion:
+        """The poses of the batch, after `initialize`."""
+        assert self._motion is not None, "initialize makes it"
+        return self._motion
+
+    def _each(self, values: Sequence) -> list:
+        """A value per agent; more are ignored, as there."""
+        values = list(values)
+        if len(values) < self._batch:
+            raise IndexError(f"MatterSim: {len(values)} values for {self._batch} agents")
+        return values[: self._batch] if len(values) > self._batch else values
+
+    def _half_field(self) -> float | None:
+        return self._vfov * self._width / self._height / 2 if self._restricted else None
+
+    def _new_motion(self) -> Motion:
+        look = lookout(self._graphs, self._half_field())
+        return Views(look, self._steps) if self._discrete else Angles(look, self._limits)
+
+    def _watch(self) -> None:
+        """Apply a changed camera from the next action on."""
+        if self._motion is not None:
+            self._motion.lookout = lookout(self._graphs, self._half_field())
+
+    def _random_viewpoint(self, scan: str) -> str:
+        graphs = self._graphs
+        if scan not in graphs.first:
+            raise IndexError(f"MatterSim: there is no scan {scan!r}; scans.txt names {len(graphs.first)} others")
+        first, size = graphs.first[scan], graphs.size[scan]
+        start = self._engine.below(size)
+        for k in range(size):
+            row = first + (start + k) % size
+            if graphs.included[row]:
+                return graphs.ids[row]
+        raise RuntimeError(f"MatterSim: ScanId: {scan} has no included viewpoints!")
+
+    def _picture(self, agent: int, *, depth: bool) -> np.ndarray:
+        if not self._rendering or not self._moving.started or (depth and not self._depth):
+            return np.zeros((self._height, self._width, 1 if depth else 3), np.uint16 if depth else np.uint8)
+        if (agent, depth) not in self._drawn:
+            self._drawn[agent, depth] = self._draw(agent, self._skyboxes.metres if depth else self._skyboxes.rgb)
+            self._frames += not depth
+        return self._drawn[agent, depth]
+
+    def _draw(self, agent: int, draw: Draw) -> np.ndarray:
+        motion, row = self._moving, self._moving.row(agent)
+        if self._graphs.turned[row]:
+            raise ValueError(
+                f"MatterSim: the camera of viewpoint {self._graphs.ids[row]} is turned; pictures are drawn of the "
+                "upright skyboxes of `embodied export` only; call setRenderingEnabled(False)"
+            )
+        return draw(
+            self._graphs.scans[row],
+            self._graphs.ids[row],
+            motion.heading(agent),
+            motion.elevation(agent),
+            self._vfov,
+            (self._height, self._width),
+        )
+
+
+class ForkSimulator(Simulator):
+    """HANNA and ILIAD: with discretized angles a change counts steps of 30 degrees; navigation is always restricted."""
+
+    _steps = staticmethod(counted_steps)
+    setRestrictedNavigation = property()  # the fork has no such method
+
+
+__all__ = ["ForkSimulator", "SimState", "Simulator", "ViewPoint"]

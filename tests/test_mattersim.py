@@ -1,0 +1,367 @@
+"""The stand-in for MatterSim answers as the C++ simulator did, and is what programs written for it expect.
+
+data/mattersim.json holds what the simulator's own C++ code (graph, navigation and angles; drawing left out) answered
+on 500 poses: four runs of 25 states of five agents in three generated houses to which two excluded viewpoints and a
+viewpoint straight above and one straight below another were added. Upstream and the fork with discretized angles,
+upstream with continuous angles, and with unrestricted navigation. Numbers were rounded to seven digits.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from embodied import mattersim
+from embodied.mattersim.chance import Engine
+from embodied.mattersim.pictures import faces_of, tiles_of
+
+RECORD = json.loads((Path(__file__).parent / "data" / "mattersim.json").read_text())
+SCANS = sorted(RECORD["graphs"])
+DIALECT = {"hanna": "hanna"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The connectivity files of the record."""
+    folder = tmp_path_factory.mktemp("connectivity")
+    for scan, graph in RECORD["graphs"].items():
+        n = len(graph["ids"])
+        open_ = np.zeros((n, n), bool)
+        for i, j in graph["edges"]:
+            open_[i, j] = open_[j, i] = True
+        items = []
+        for k, (x, y, z) in enumerate(graph["positions"]):
+            pose = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0]
+            items.append(
+                {
+                    "image_id": graph["ids"][k],
+                    "pose": pose,
+                    "included": bool(graph["included"][k]),
+                    "visible": open_[k].tolist(),
+                    "unobstructed": open_[k].tolist(),
+                    "height": 1.5,
+                }
+            )
+        (folder / f"{scan}_connectivity.json").write_text(json.dumps(items))
+    (folder / "scans.txt").write_text("\n".join(SCANS) + "\n")
+    return folder
+
+
+def simulator(folder: Path, dialect: str = "upstream", *, discrete: bool = True, batch: int = 1):
+    sim = mattersim.module(dialect).Simulator()
+    sim.setNavGraphPath(str(folder))
+    sim.setRenderingEnabled(False)
+    sim.setDiscretizedViewingAngles(discrete)
+    sim.setCameraResolution(640, 480)
+    sim.setCameraVFOV(math.radians(60))
+    if dialect != "v0.1":
+        sim.setBatchSize(batch)
+    return sim
+
+
+@pytest.mark.parametrize("run", RECORD["runs"], ids=[r["kind"] for r in RECORD["runs"]])
+def test_every_field_of_the_recorded_poses_is_as_the_simulator_gave_it(run, folder):
+    sim = simulator(
+        folder, DIALECT.get(run["kind"], "upstream"), discrete=run["kind"] in ("upstream", "hanna"), batch=5
+    )
+    if run["kind"] == "unrestricted":
+        sim.setRestrictedNavigation(False)
+    sim.initialize()
+    sim.newEpisode(*run["start"])
+    for number, wanted in enumerate(run["states"]):
+        if number:
+            sim.makeAction(*run["actions"][number - 1])
+        for state, (scan, step, view, heading, elevation, locations) in zip(sim.getState(), wanted, strict=True):
+            ids = RECORD["graphs"][SCANS[scan]]["ids"]
+            assert (state.scanId, state.step, state.viewIndex) == (SCANS[scan], step, view)
+            assert (state.heading, state.elevation) == pytest.approx((heading, elevation), abs=2e-7)
+            assert [v.ix for v in state.navigableLocations] == [v[0] for v in locations], (
+                "the same viewpoints, in order"
+            )
+            assert [v.viewpointId for v in state.navigableLocations] == [ids[v[0]] for v in locations]
+            got = [(v.x, v.y, v.z, v.rel_heading, v.rel_elevation, v.rel_distance) for v in state.navigableLocations]
+            np.testing.assert_allclose(got, [v[1:] for v in locations], atol=5e-7)
+            assert (state.location.ix, state.location.rel_heading) == (locations[0][0], 0.0)
+
+
+def test_the_record_has_500_poses_of_three_houses_and_meets_neighbours_straight_above():
+    states = [s for run in RECORD["runs"] for batch in run["states"] for s in batch]
+    assert len(states) == 500 and {s[0] for s in states} == {0, 1, 2}
+    above = [s for s in states if any(v[1:3] == s[5][0][1:3] for v in s[5][1:])]
+    assert above, "unrestricted navigation lists a viewpoint above the agent"
+
+
+def test_random_starts_are_the_simulators(folder):
+    sim = simulator(folder, discrete=False, batch=4)
+    for wanted in RECORD["random"]:
+        sim.newRandomEpisode([SCANS[0], SCANS[1], SCANS[2], SCANS[0]])
+        assert [s.location.viewpointId for s in sim.getState()] == [viewpoint for viewpoint, _ in wanted]
+        assert [s.heading for s in sim.getState()] == pytest.approx([heading for _, heading in wanted], abs=1e-6)
+
+
+def test_the_engine_is_the_minimal_standard_of_park_and_miller():
+    engine = Engine(1)
+    for _ in range(10_000):
+        engine._draw()
+    assert engine._state == 1043618065, "the 10,000th number of minstd_rand0, as the C++ standard prints it"
+
+
+def walk(folder: Path, dialect: str, steps: int = 40, batch: int = 6):
+    """States of a random walk."""
+    rng = np.random.default_rng(1)
+    sim = simulator(folder, dialect, discrete=True, batch=batch)
+    sim.newEpisode([SCANS[k % 3] for k in range(batch)], ["v001"] * batch, rng.uniform(-9, 9, batch), [0] * batch)
+    for _ in range(steps):
+        states = sim.getState()
+        yield from states
+        sim.makeAction(
+            [int(rng.integers(len(s.navigableLocations))) for s in states],
+            rng.integers(-5, 6, batch).tolist(),
+            rng.integers(-1, 2, batch).tolist(),
+        )
+
+
+@pytest.mark.parametrize("dialect", ["upstream", "hanna"])
+def test_a_walk_keeps_the_rules_of_the_interface(dialect, folder):
+    for state in walk(folder, dialect):
+        assert 0 <= state.heading < 2 * math.pi
+        assert state.viewIndex == 12 * (round(state.elevation / (math.pi / 6)) + 1) + round(
+            state.heading / (math.pi / 6)
+        )
+        first, *others = state.navigableLocations
+        assert first == state.location and first[5:] == (0.0, 0.0, 0.0), "index 0 stays"
+        angles = [math.hypot(v.rel_heading, v.rel_elevation) for v in others]
+        assert angles == sorted(angles)
+        for v in others:
+            heading, elevation = state.heading + v.rel_heading, state.elevation + v.rel_elevation
+            there = v.rel_distance * np.array(
+                [math.sin(heading) * math.cos(elevation), math.cos(heading) * math.cos(elevation), math.sin(elevation)]
+            )
+            np.testing.assert_allclose(there, np.subtract(v[2:5], first[2:5]), atol=1e-5)
+            assert abs(v.rel_heading) <= math.radians(40) + 1e-6, "60 degrees * 640 / 480 / 2"
+
+
+def test_only_the_sign_counts_upstream_and_steps_are_counted_in_the_fork(folder):
+    views = {}
+    for dialect in ("upstream", "hanna"):
+        sim = simulator(folder, dialect)
+        sim.newEpisode([SCANS[0]], ["v001"], [0], [0])
+        sim.makeAction([0], [5], [-2])
+        views[dialect] = sim.getState()[0].viewIndex
+    assert views == {"upstream": 1, "hanna": 5}
+    assert not hasattr(mattersim.module("hanna").Simulator(), "setRestrictedNavigation")
+
+
+def test_discretized_angles_snap_to_the_nearest_30_degrees(folder):
+    sim = simulator(folder, batch=4)
+    sim.newEpisode(
+        [SCANS[0]] * 4,
+        ["v001"] * 4,
+        [math.radians(d) for d in (14.9, 15.1, 345.1, -44)],
+        [math.radians(d) for d in (14.9, 15.1, -80, -14.9)],
+    )
+    assert [s.viewIndex for s in sim.getState()] == [12, 25, 0, 23]
+
+
+def test_continuous_motion_of_the_simulators_own_test(folder):
+    """The lists of its unit test: start 10 and 10 degrees, elevation between -40 and 50."""
+    sim = simulator(folder, discrete=False)
+    assert sim.setElevationLimits(math.radians(-40), math.radians(50))
+    assert not sim.setElevationLimits(0.1, 0.5) and not sim.setElevationLimits(-2.0, 0.5)
+    sim.newEpisode((SCANS[0],), ("v001",), (math.radians(10),), (math.radians(10),))
+    turns, tilts = [-20, -360, 371, 89, 90, -90, -180, -180, -180], [0, -36, -30, -10, 0, 90, 5, -10, -40]
+    headings, elevations = [350, 350, 1, 90, 180, 90, 270, 90, 270], [10, -26, -40, -40, -40, 50, 50, 40, 0]
+    for turn, tilt, heading, elevation in zip(turns, tilts, headings, elevations, strict=True):
+        sim.makeAction((0,), (math.radians(turn),), (math.radians(tilt),))
+        state = sim.getState()[0]
+        assert (math.degrees(state.heading), math.degrees(state.elevation)) == pytest.approx(
+            (heading, elevation), abs=1e-4
+        )
+        assert state.viewIndex == 0
+
+
+def test_discrete_motion_of_the_simulators_own_test(folder):
+    sim = simulator(folder)
+    sim.newEpisode([SCANS[0]], ["v001"], [math.radians(10)], [math.radians(10)])
+    turns, tilts = [-20, -360, 371, 89, 90, -90, -180, -180, -180], [0, -36, -30, -10, 0, 90, 5, -10, -40]
+    views = [sim.getState()[0].viewIndex]
+    for turn, tilt in zip(turns, tilts, strict=True):
+        sim.makeAction([0], [math.radians(turn)], [math.radians(tilt)])
+        views.append(sim.getState()[0].viewIndex)
+    assert views == [12, 23, 10, 11, 0, 1, 12, 35, 22, 9]
+
+
+def test_states_are_alive_and_those_of_the_first_release_are_not(folder):
+    sim = simulator(folder)
+    sim.initialize()
+    state = sim.getState()[0]
+    assert state.location is None and state.navigableLocations == [] and state.rgb.shape == (480, 640, 3)
+    sim.newEpisode([SCANS[0]], ["v001"], [0], [0])
+    sim.makeAction([0], [1], [0])
+    assert (state.step, state.viewIndex) == (1, 13) and sim.getState()[0] is state
+
+    old = simulator(folder, "v0.1")
+    old.init()
+    old.newEpisode(SCANS[0], "v001", 0, 0)
+    before = old.getState()
+    old.makeAction(0, 1, 0)
+    assert (before.step, before.viewIndex, old.getState().viewIndex) == (0, 12, 13)
+    assert before.rgb is None and before.location.point == list(state.location[2:5])
+    assert [v.viewpointId for v in old.getState().navigableLocations] == [
+        v.viewpointId for v in state.navigableLocations
+    ]
+
+
+def test_the_errors_are_those_of_the_module(folder, tmp_path):
+    sim = simulator(folder)
+    with pytest.raises(RuntimeError, match="newEpisode"):
+        sim.makeAction([0], [0], [0])
+    with pytest.raises(IndexError, match="no scan 'elsewhere'"):
+        sim.newEpisode(["elsewhere"], ["v001"], [0], [0])
+    with pytest.raises(ValueError, match="Could not find viewpointId"):
+        sim.newEpisode([SCANS[0]], ["nowhere"], [0], [0])
+    shut = next(
+        i for i, open_ in zip(*(RECORD["graphs"][SCANS[0]][k] for k in ("ids", "included")), strict=True) if not open_
+    )
+    with pytest.raises(ValueError, match="excluded"):
+        sim.newEpisode([SCANS[0]], [shut], [0], [0])
+    with pytest.raises(ValueError, match="Invalid action index"):
+        sim.makeAction([0], [0], [0])
+    sim.newEpisode([SCANS[0]], ["v001"], [0], [0])
+    with pytest.raises(ValueError, match="Invalid action index: 99"):
+        sim.makeAction([99], [0], [0])
+    with pytest.raises(IndexError, match="0 values for 1 agents"):
+        sim.makeAction([], [], [])
+    empty = simulator(tmp_path)
+    with pytest.raises(ValueError, match="list of scans"):
+        empty.initialize()
+    (tmp_path / "scans.txt").write_text("gone\n")
+    with pytest.raises(ValueError, match="gone_connectivity"):
+        empty.initialize()
+    old = simulator(folder, "v0.1")
+    with pytest.raises(ValueError, match="Invalid action index"):
+        old.makeAction(0, 0, 0)
+    with pytest.raises(ValueError, match="elsewhere_connectivity"):
+        old.newEpisode("elsewhere", "v001", 0, 0)
+
+
+def test_settings_are_ignored_after_initialize_but_for_the_camera(folder):
+    sim = simulator(folder, batch=2)
+    sim.initialize()
+    sim.setBatchSize(7)
+    sim.setDiscretizedViewingAngles(False)
+    sim.newEpisode([SCANS[0]] * 2, ["v001"] * 2, [0.4, 0.4], [0, 0])
+    assert len(sim.getState()) == 2 and sim.getState()[0].viewIndex == 13
+    seen = len(sim.getState()[0].navigableLocations)
+    sim.setCameraVFOV(math.radians(180) * 3 / 4)
+    sim.makeAction([0, 0], [0, 0], [0, 0])
+    assert len(sim.getState()[0].navigableLocations) > seen
+    sim.close()
+    with pytest.raises(RuntimeError):
+        sim.makeAction([0, 0], [0, 0], [0, 0])
+
+
+def test_a_face_survives_the_way_into_a_skybox_and_back():
+    faces = np.random.default_rng(0).integers(0, 255, (6, 8, 8, 3), np.uint8)
+    np.testing.assert_array_equal(faces_of(tiles_of(faces)), faces)
+
+
+def box(folder: Path, scan: str, viewpoint: str, *, apart: bool = False) -> None:
+    """A skybox around a viewpoint: each side of the world in a colour of its own, two metres away."""
+    colours = {0: (0, 0, 255), 1: (0, 255, 0), 2: (255, 0, 0), 3: (0, 255, 255), 4: (255, 255, 255), 5: (0, 0, 0)}
+    faces = np.stack([np.full((64, 64, 3), colours[k], np.uint8) for k in range(6)])
+    u = (np.arange(64) + 0.5) / 32 - 1
+    ray = 2.0 * np.sqrt(1 + u[None] ** 2 + u[:, None] ** 2)
+    depth = np.stack([np.rint(ray * 4000).astype(np.uint16)] * 6)
+    home = folder / scan / "matterport_skybox_images"
+    home.mkdir(parents=True)
+    tiles = tiles_of(faces)
+    for k in range(6) if apart else ():
+        cv2.imwrite(str(home / f"{viewpoint}_skybox{k}_sami.jpg"), tiles[k])
+    if not apart:
+        cv2.imwrite(str(home / f"{viewpoint}_skybox_small.jpg"), np.concatenate(list(tiles), 1))
+        cv2.imwrite(str(home / f"{viewpoint}_skybox_depth_small.png"), np.concatenate(list(tiles_of(depth)), 1))
+
+
+SIDES = {0: (0, 255, 0), 3: (0, 0, 255), 6: (0, 255, 255), 9: (255, 0, 0)}
+"""Heading in steps of 30 degrees to the colour that is seen there: north, east, south, west."""
+
+
+def test_pictures_look_where_the_agent_looks(folder, tmp_path):
+    box(tmp_path, SCANS[0], "v001")
+    sim = simulator(folder, "hanna")
+    sim.setRenderingEnabled(True)
+    sim.setDepthEnabled(True)
+    sim.setDatasetPath(str(tmp_path))
+    for step, colour in SIDES.items():
+        sim.newEpisode([SCANS[0]], ["v001"], [step * math.pi / 6], [0])
+        state = sim.getState()[0]
+        assert (
+            state.rgb.shape == (480, 640, 3) and state.depth.shape == (480, 640, 1) and state.depth.dtype == np.uint16
+        )
+        assert np.abs(state.rgb[240, 320].astype(int) - colour).max() < 12, "blue, green, red"
+        assert state.depth[240, 320, 0] == pytest.approx(8000, abs=4), "two metres along the axis"
+        assert state.depth[240, 5, 0] == pytest.approx(8000, abs=8), "not along the ray"
+    sim.makeAction([0], [0], [1])
+    assert sim.getState()[0].rgb[2, 320].min() > 240, "the ceiling is on top"
+    sim.newEpisode([SCANS[0]], ["v002"], [0], [0])
+    with pytest.raises(ValueError, match="v002_skybox_small"):
+        _ = sim.getState()[0].rgb
+
+
+def test_the_first_release_reads_six_files(folder, tmp_path):
+    box(tmp_path / "v1" / "scans", SCANS[0], "v001", apart=True)
+    sim = simulator(folder, "v0.1")
+    sim.setRenderingEnabled(True)
+    sim.setDatasetPath(str(tmp_path))
+    for step, colour in SIDES.items():
+        sim.newEpisode(SCANS[0], "v001", step * math.pi / 6, 0)
+        assert np.abs(sim.getState().rgb[240, 320].astype(int) - colour).max() < 12
+
+
+SCRIPT = """
+import sys
+sys.path.append('../../build')
+import MatterSim
+from beside import name
+sim = MatterSim.Simulator()
+sim.setNavGraphPath(sys.argv[1])
+sim.setDiscretizedViewingAngles(True)
+sim.setRenderingEnabled(False)
+sim.newEpisode([sys.argv[2]], ['v001'], [0], [0])
+sim.makeAction([0], [4], [0])
+print(name, __name__, sim.getState()[0].viewIndex)
+"""
+
+
+def test_a_script_runs_unchanged_with_the_launcher(folder, tmp_path):
+    (tmp_path / "train.py").write_text(SCRIPT)
+    (tmp_path / "beside.py").write_text("name = 'found'\n")
+    root = str(Path(mattersim.__file__).parents[2])
+    for dialect, view in (("hanna", 16), ("upstream", 13)):
+        command = [
+            sys.executable,
+            "-m",
+            "embodied.mattersim",
+            dialect,
+            str(tmp_path / "train.py"),
+            str(folder),
+            SCANS[0],
+        ]
+        done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+        assert done.stdout == f"found __main__ {view}\n"
+    done = subprocess.run(
+        [sys.executable, "-m", "embodied.mattersim", "other", "x.py"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2 and "expected a dialect" in done.stderr
