@@ -2,7 +2,8 @@
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
 with help; light compares the ways of drawing with a path tracer. Close other programs first: the
-numbers are only as good as the quiet.
+numbers are only as good as the quiet. freeze measures nothing: it prints digests of houses, a lit flat,
+data sets, episodes and tables, and with --against what has changed since a file of them was written.
 """
 
 from __future__ import annotations
@@ -11,10 +12,14 @@ import argparse
 import itertools
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 
-PARTS = ("houses", "pictures", "steps", "plays", "memory", "light")
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+
+PARTS = ("houses", "pictures", "steps", "plays", "memory", "light", "freeze")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -31,6 +36,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures"
     )
+    parser.add_argument(
+        "--against", type=Path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
+    )
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -45,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     if "light" in parts:
         return light(args, catalogue)
+    if "freeze" in parts:
+        return freeze(args, catalogue)
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality),
@@ -62,10 +72,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def light(args: argparse.Namespace, catalogue) -> int:
+def light(args: argparse.Namespace, catalogue: Catalogue) -> int:
     """The comparison of all ways of drawing."""
     from embodied.bench.light import compare
 
     report = compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
     show(args, report.facts, report.text)
     return 0
+
+
+def freeze(args: argparse.Namespace, catalogue: Catalogue) -> int:
+    """Digests of what must not change by accident; 1 where they differ from those of --against."""
+    import json
+
+    from assets.cache import write_json
+    from embodied.bench.freeze import changes, digests
+
+    before = json.loads(args.against.read_text()) if args.against else None
+    found = digests(catalogue, args.cache, progress=note)
+    write_json(args.out / "digests.json", found, indent=1)
+    differ = [] if before is None else changes(before, found)
+    show(
+        args,
+        {"digests": found, "changed": differ},
+        "\n".join(differ) or f"{len(found)} digests in {args.out}/digests.json",
+    )
+    return 1 if differ else 0
