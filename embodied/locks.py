@@ -1,0 +1,106 @@
+"""One writer per folder: a lock that says whose it is and ends with its process, however that ends."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import json
+import logging
+import os
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from assets.cache import sweep
+from embodied.errors import UnableError
+
+LOCK = ".lock"
+"""Name of the file in a folder that somebody writes to."""
+CANNOT = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
+"""What disks say that know no locks."""
+log = logging.getLogger(__name__)
+
+
+class LockedError(UnableError):
+    """Another process writes to the folder."""
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold `folder`, which is made if missing, for writing while the body runs.
+
+    The lock is the operating system's (flock), so it is gone when its process is, also after a
+    kill; what is written into the file is for people. What killed processes left unfinished in the
+    folder is removed.
+
+    Raises:
+      LockedError: another process holds it; the message names process, machine and command.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / LOCK
+    handle = _take(path)
+    try:
+        sweep.cache_clear()
+        sweep(folder)
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _take(path: Path) -> int:
+    """The descriptor of the locked file `path`, with this process written into it."""
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            _flock(handle, path)
+            if _is_same(handle, path):  # else its holder removed it between open and lock
+                os.truncate(handle, 0)
+                os.write(handle, json.dumps(_myself()).encode())
+                return handle
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+
+
+def _flock(handle: int, path: Path) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise LockedError(
+            f"{path.parent} is being written by {_holder(path)}; wait for it, end it, or choose another folder"
+        ) from None
+    except OSError as e:
+        if e.errno not in CANNOT:
+            raise
+        log.warning("%s: this disk knows no locks (%s); see to it that nobody else writes there", path.parent, e)
+
+
+def _is_same(handle: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+def _myself() -> dict[str, object]:
+    return {
+        "pid": os.getpid(),
+        "host": socket.gethostname(),
+        "since": time.strftime("%Y-%m-%d %H:%M:%S"),
+        "command": " ".join(sys.argv)[:500],
+    }
+
+
+def _holder(path: Path) -> str:
+    """Who holds the lock, in words."""
+    try:
+        who = json.loads(path.read_text(encoding="utf-8"))
+        return f"process {who['pid']} on {who['host']} since {who['since']} ({who['command']})"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "another process"
