@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from assets.cache import write_bytes
-from embodied import interface
+from embodied import DISTRIBUTION, interface
 
 T = typing.TypeVar("T")
 
@@ -74,7 +74,8 @@ def episodes_file(split: str, agent: str) -> str:
 
 def fingerprint(**facts: object) -> dict[str, object]:
     """What a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
-    versions = {name: importlib.metadata.version(name) for name in ("embodied", "numpy", "scipy", "shapely", "mujoco")}
+    versions = {"embodied": importlib.metadata.version(DISTRIBUTION)}
+    versions |= {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "shapely", "mujoco")}
     machine = f"{platform.machine()} {platform.system()}"
     return {"python": platform.python_version(), "versions": versions, "machine": machine, **facts}
 

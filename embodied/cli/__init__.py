@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from embodied.cli.origins import REMEDY, strangers
 from embodied.errors import UnableError
 
 COMMANDS = (
@@ -104,6 +105,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "--traceback" in argv:
             raise
         print(f"error: {message_of(e)}", file=sys.stderr)
+        return 2
+    except ImportError:
+        found = strangers()
+        if "--traceback" in argv or not found:
+            raise
+        print(f"error: {'; '.join(found)}; {REMEDY}", file=sys.stderr)
         return 2
 
 

@@ -13,11 +13,13 @@ import shutil
 import warnings
 from dataclasses import asdict, dataclass
 
+from embodied import DISTRIBUTION
 from embodied.cli import message_of
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
+from embodied.cli.origins import REMEDY, strangers
 
 LIBRARIES = (
-    "embodied",
+    DISTRIBUTION,
     "mujoco",
     "trimesh",
     "torch",
@@ -52,7 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     findings = []
-    for look in (versions, renderer, packs, path_tracer, vulkan, body, disk):
+    for look in (versions, packages, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -83,14 +85,20 @@ def versions(_: argparse.Namespace) -> Finding:
     return Finding("versions", not missing, text, "run `make setup`, or pip install -e . -c constraints.txt")
 
 
+def packages(_: argparse.Namespace) -> Finding:
+    """Whether embodied, agents, assets and viz are ours wherever Python is started."""
+    found = strangers()
+    return Finding("packages", not found, "; ".join(found) or "embodied, agents, assets and viz are ours", REMEDY)
+
+
 def renderer(_: argparse.Namespace) -> Finding:
     """The off-screen renderer that MuJoCo gets."""
-    from embodied.gl import REMEDY, GLError, info
+    from embodied import gl
 
     try:
-        device = info()
-    except GLError as e:
-        return Finding("renderer", False, str(e), REMEDY)
+        device = gl.info()
+    except gl.GLError as e:
+        return Finding("renderer", False, str(e), gl.REMEDY)
     return Finding("renderer", True, str(device))
 
 
