@@ -1,0 +1,70 @@
+"""BanditConfig: sizes and hyperparameters of dissertation 3.1.5.2, in one record."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+
+UNITS = ("words", "pieces")
+
+
+@dataclass(frozen=True)
+class BanditConfig:
+    """The defaults are the dissertation's; SCALES holds the smaller settings."""
+
+    hidden_size: int = 500
+    """Width of word embeddings and LSTMs of the translator and of the critic."""
+    units: str = "words"
+    """'words', as in the dissertation, or 'pieces' of words (needs the library sentencepiece)."""
+    source_words: int = 50_000
+    """Most frequent units of the source language that are known."""
+    target_words: int = 50_000
+    """Most frequent units of the target language that are known."""
+    longest: int = 50
+    """Units of the longest translation; corpora leave out sentences of more words."""
+    batch: int = 64
+    """Sentences per update."""
+    pretraining_passes: int = 10
+    """Passes over the supervised set; the weakly trained reference has had one."""
+    decay_from: int = 5
+    """From this pass on the learning rate halves when dev perplexity rises."""
+    critic_passes: int = 5
+    """Passes over the supervised set, with sampled translations, that teach the critic."""
+    pretraining_rate: float = 1e-3
+    """Adam's learning rate in pre-training, of translator and critic."""
+    bandit_rate: float = 1e-4
+    """Adam's learning rate while learning from ratings, of translator and critic, and of the supervised control."""
+    bandit_set: str = "bandit_overlap"
+    """The split that is rated: 'bandit_overlap' (the dissertation's case) or 'bandit_disjoint'."""
+    clip: float = 5.0
+    """Longest gradient; the authors' program's."""
+    checkpoint_minutes: float = 2.0
+    """How often a run is saved, so that it can go on after an interruption."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        if self.units not in UNITS:
+            raise ValueError(f"units must be one of {UNITS}, got {self.units!r}")
+        for name in ("hidden_size", "longest", "batch", "pretraining_passes", "critic_passes", "decay_from"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("source_words", "target_words"):
+            if getattr(self, name) < 4:
+                raise ValueError(f"{name} must be at least 4, got {getattr(self, name)}: three stand for padding, unknown words and the end")
+        for name in ("pretraining_rate", "bandit_rate", "clip", "checkpoint_minutes"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if not self.bandit_set.startswith("bandit"):
+            raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
+
+    def to_json(self) -> str:
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+
+SCALES: dict[str, BanditConfig] = {
+    "mini": BanditConfig(hidden_size=128, source_words=6000, target_words=3000, critic_passes=2, bandit_rate=5e-4),
+    "paper": BanditConfig(),
+}
+"""'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the dissertation's corpora."""

@@ -1,0 +1,131 @@
+"""Attention encoder-decoders (dissertation 3.1.3.1, appendix A): the translator, and the critic alike.
+
+B sentences, S source and T target words, h hidden size, V target vocabulary. Each line carries the
+number of the equation it computes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from agents.bandit.words import END_NUMBER, PAD_NUMBER
+
+SPAN = 0.1
+"""Weights begin uniform in [-SPAN, SPAN], as in the authors' program."""
+
+
+@dataclass(frozen=True, eq=False)
+class Encoded:
+    """B source sentences, read."""
+
+    states: Tensor
+    """(B, S, h) hidden vectors of the encoder."""
+    keys: Tensor
+    """(B, S, h) W_a times states, for attention."""
+    mask: Tensor
+    """(B, S) bool, False on padding."""
+
+    def select(self, rows: Tensor) -> Encoded:
+        return Encoded(self.states[rows], self.keys[rows], self.mask[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Decoding:
+    """What the decoder carries from word to word."""
+
+    hidden: Tensor
+    cell: Tensor
+    """(B, h) of its LSTM; hidden is tilde h^dec."""
+    output: Tensor
+    """(B, h) h^dec, fed into the next step."""
+
+    def select(self, rows: Tensor) -> Decoding:
+        return Decoding(self.hidden[rows], self.cell[rows], self.output[rows])
+
+
+class EncoderDecoder(nn.Module):
+    """Reads a source sentence and says one number-to-be per target word: h^dec."""
+
+    def __init__(self, source_words: int, target_words: int, size: int) -> None:
+        super().__init__()
+        self.source = nn.Embedding(source_words, size)
+        self.target = nn.Embedding(target_words, size)
+        self.encoder = nn.LSTM(size, size, batch_first=True)
+        self.word_gates = nn.Linear(size, 4 * size)
+        self.gates = nn.Linear(2 * size, 4 * size, bias=False)
+        self.attend = nn.Linear(size, size, bias=False)
+        self.combine = nn.Linear(2 * size, size, bias=False)
+
+    def encode(self, source: Tensor) -> tuple[Encoded, Decoding]:
+        """Read (B, S) int64 numbers; the decoder starts where the encoder ended, Phi(x)."""
+        lengths = (source != PAD_NUMBER).sum(1)
+        packed = nn.utils.rnn.pack_padded_sequence(self.source(source), lengths, batch_first=True, enforce_sorted=False)
+        states, (hidden, cell) = self.encoder(packed)
+        states, _ = nn.utils.rnn.pad_packed_sequence(states, batch_first=True, total_length=source.shape[1])
+        encoded = Encoded(states, self.attend(states), source != PAD_NUMBER)
+        return encoded, Decoding(hidden[0], cell[0], torch.zeros_like(hidden[0]))
+
+    def step(self, encoded: Encoded, now: Decoding, word_gates: Tensor) -> Decoding:
+        """One step of Eq A.5; `word_gates` (B, 4h) is what the word before adds to the LSTM's gates."""
+        gates = word_gates + self.gates(torch.cat([now.output, now.hidden], -1))  # A.5, with input feeding
+        enter, forget, leave, content = gates.chunk(4, -1)
+        cell = forget.sigmoid() * now.cell + enter.sigmoid() * content.tanh()
+        hidden = leave.sigmoid() * cell.tanh()
+        scores = torch.bmm(encoded.keys, hidden[:, :, None])[..., 0]  # (B, S) "general": h_t^T W_a h_s
+        weights = scores.masked_fill(~encoded.mask, -torch.inf).softmax(-1)
+        context = torch.bmm(weights[:, None], encoded.states)[:, 0]  # (B, h) A.4
+        return Decoding(hidden, cell, torch.tanh(self.combine(torch.cat([hidden, context], -1))))  # A.3
+
+    def word_before(self, words: Tensor) -> Tensor:
+        """What known words (...) int64 add to the gates, (..., 4h); END stands before the first one."""
+        return self.word_gates(self.target(words))
+
+    def read(self, source: Tensor, target: Tensor) -> Tensor:
+        """h^dec before each word of `target` (B, T), whose words are given (teacher forcing): (B, T, h)."""
+        encoded, now = self.encode(source)
+        begin = torch.full_like(target[:, :1], END_NUMBER)
+        outputs = []
+        for gates in self.word_before(torch.cat([begin, target[:, :-1]], 1)).unbind(1):
+            now = self.step(encoded, now, gates)
+            outputs.append(now.output)
+        return torch.stack(outputs, 1)
+
+
+class Translator(nn.Module):
+    """P_theta(y | x), Eq 3.1."""
+
+    def __init__(self, source_words: int, target_words: int, size: int) -> None:
+        super().__init__()
+        self.body = EncoderDecoder(source_words, target_words, size)
+        self.out = nn.Linear(size, target_words, bias=False)
+
+    def forward(self, source: Tensor, target: Tensor) -> Tensor:
+        """log P(y_t | y_<t, x), (B, T), zero on padding."""
+        said = target != PAD_NUMBER
+        logits = self.out(self.body.read(source, target)[said])  # (words, V)
+        loss = nn.functional.cross_entropy(logits, target[said], reduction="none")  # A.2
+        return torch.zeros(target.shape).masked_scatter(said, -loss)
+
+
+class Critic(nn.Module):
+    """V_omega(y_<t, x) = w^T h_t^crt (3.1.3.4)."""
+
+    def __init__(self, source_words: int, target_words: int, size: int) -> None:
+        super().__init__()
+        self.body = EncoderDecoder(source_words, target_words, size)
+        self.out = nn.Linear(size, 1, bias=False)
+
+    def forward(self, source: Tensor, target: Tensor) -> Tensor:
+        """The rating to be expected before each word, (B, T)."""
+        return self.out(self.body.read(source, target))[..., 0]
+
+
+def begin(network: nn.Module, generator: torch.Generator) -> nn.Module:
+    """Draw all weights anew, uniform in [-SPAN, SPAN]."""
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.uniform_(-SPAN, SPAN, generator=generator)
+    return network

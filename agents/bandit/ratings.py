@@ -1,0 +1,58 @@
+"""Ratings of imperfect people (3.1.4): true scores made coarse, noisy and skewed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Rater:
+    """How a simulated person's rating differs from the true score in [0, 1]; as it is: not at all."""
+
+    granularity: int = 0
+    """Steps g of the scale, so that there are g + 1 ratings (4 for one to five stars); 0: any number (Eq 3.8)."""
+    variance: float = 0.0
+    """Scale lambda of the variance of people around their mean; 1 is as was measured (Eq 3.9)."""
+    skew: float = 1.0
+    """Exponent rho: above 1 the rater is harsh, below it motivating (Eq 3.10)."""
+
+    def __post_init__(self) -> None:
+        if self.granularity < 0 or self.variance < 0 or self.skew < 0:
+            raise ValueError(f"a rater's granularity, variance and skew must not be negative, got {self}")
+
+    def rate(self, score: float, *, rng: np.random.Generator) -> float:
+        """One rating of a true score in [0, 1]; several perturbations are applied in the order skew, variance, granularity.
+
+        One draw is made whatever the settings are, so that raters can be compared on the same noise.
+        """
+        noise = float(rng.standard_normal())
+        rating = skewed(score, self.skew)
+        if self.variance:
+            rating += math.sqrt(self.variance) * deviation(rating) * noise
+        return granular(rating, self.granularity) if self.granularity else rating
+
+
+CLEAN = Rater()
+
+
+def granular(score: float, steps: int) -> float:
+    """Eq 3.8: the nearest of 0, 1/g, ..., 1; halves go up, as in the text's list of bins (Python's `round` would not)."""
+    return min(1.0, max(0.0, math.floor(steps * score + 0.5) / steps))
+
+
+def deviation(score: float) -> float:
+    """sigma(s) of Eq 3.9, here on the scale 0 to 1: how far people are from their mean.
+
+    The authors' program multiplies it by lambda and clips the rating to [0, 1]; the text has
+    Nor(s, lambda sigma^2), which is done here: the mean stays the true score.
+    """
+    percent = 100 * score
+    return max(0.0, 0.64 * percent - 0.02 if percent < 50 else 67.0 - 0.67 * percent) / 100
+
+
+def skewed(score: float, exponent: float) -> float:
+    """Eq 3.10."""
+    return score**exponent

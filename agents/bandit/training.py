@@ -1,0 +1,239 @@
+"""The three stages of BANDITNMT (3.1.5.1): pre-training the translator, then its critic, then learning from ratings.
+
+    pretrain    supervised, Eq A.7                       -> weak.safetensors (one pass), full.safetensors (lowest dev perplexity)
+    teach_critic  the critic, on translations sampled from the frozen translator
+    bandit      NED-A2C (Algorithm 2), or its two controls: learning nothing, learning from references
+
+Every draw is named by seed, pass and sentence, so a stage that was stopped goes on exactly as if it
+had not been.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.bandit.a2c import Rated, actor_loss, critic_loss, descend
+from agents.bandit.bleu import corpus_bleu, sentence_bleu
+from agents.bandit.config import BanditConfig
+from agents.bandit.corpus import corpus_digest, load
+from agents.bandit.network import Critic, Translator, begin
+from agents.bandit.ratings import CLEAN, Rater
+from agents.bandit.runs import Note, Run, run_passes
+from agents.bandit.store import load_weights, save_weights
+from agents.bandit.translate import Numbered, decode, drawn_with, greedy, numbered, padded, perplexity
+from agents.bandit.words import BUILDERS, Lexicon
+from embodied.seeds import stream
+
+LEARNERS = ("reference", "supervised", "a2c")
+"""'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
+REFERENCES = ("full", "weak")
+_PRETRAINING = ("hidden_size", "units", "source_words", "target_words", "longest", "batch", "pretraining_passes", "decay_from",
+                "pretraining_rate", "clip", "seed")
+"""Settings that decide what pre-training gives."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A corpus in numbers, ready to be learned from."""
+
+    config: BanditConfig
+    splits: Mapping[str, Numbered]
+    lexicons: tuple[Lexicon, Lexicon]
+    digest: str
+    """Of the sets for pre-training and judging."""
+    bandit_digest: str
+    """Of the set that is rated."""
+
+    def translator(self) -> Translator:
+        """An untrained translator; its weights follow from the seed."""
+        return begin(Translator(*map(len, self.lexicons), self.config.hidden_size), self._generator("translator"))
+
+    def critic(self) -> Critic:
+        return begin(Critic(*map(len, self.lexicons), self.config.hidden_size), self._generator("critic"))
+
+    def identity(self, *fields: str, **more: object) -> dict[str, object]:
+        """What a stage depends on: settings by name, and the corpus."""
+        return {"corpus": self.digest, **{name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}, **more}
+
+    def _generator(self, name: str) -> torch.Generator:
+        return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
+
+
+def material(folder: Path, config: BanditConfig) -> Material:
+    """Read a corpus folder; words are those of its supervised set.
+
+    Raises:
+      CorpusError: see agents.bandit.corpus.load.
+    """
+    names = ("supervised", "dev", "test")
+    corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
+    build = BUILDERS[config.units]
+    lexicons = (build([a for a, _ in corpus["supervised"]], config.source_words),
+                build([b for _, b in corpus["supervised"]], config.target_words))
+    splits = {name: numbered(pairs, *lexicons) for name, pairs in corpus.items()}
+    return Material(config, splits, lexicons, corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,)))
+
+
+def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+    """Supervised pre-training (3.1.5.2); writes weak.safetensors and full.safetensors into `folder`.
+
+    Differs from the text in what 'full' is: not the tenth pass but the one of lowest dev perplexity,
+    because small corpora are learned by heart before the tenth.
+    """
+    config, data = m.config, m.splits["supervised"]
+    translator = m.translator()
+    optimizer = adam(translator, config.pretraining_rate)
+    run = Run(folder, m.identity(), {"translator": translator}, {"translator": optimizer})
+
+    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+        source, target = rows(data.source, chosen), rows(data.target, chosen)
+        loss = supervised_loss(translator, source, target)
+        descend(loss, optimizer, config.clip, f"pre-training, update {run.update}")
+        return {"loss": float(loss.detach()) * len(chosen), "sentences": len(chosen)}
+
+    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
+        found = perplexity(translator, m.splits["dev"])
+        before = [h["dev perplexity"] for h in run.history]
+        if turn == 0:
+            save_weights(translator, m, folder / "weak.safetensors")
+        if found < min(before, default=math.inf):
+            save_weights(translator, m, folder / "full.safetensors")
+        if turn + 1 >= config.decay_from and before and found > before[-1]:
+            for group in optimizer.param_groups:
+                group["lr"] /= 2
+        return {"loss": sums["loss"] / sums["sentences"], "dev perplexity": found, "dev BLEU": judged(translator, m, "dev"),
+                "learning rate": optimizer.param_groups[0]["lr"]}
+
+    return _passes(run, m, data, "pretrain", config.pretraining_passes, step, finish, note)
+
+
+def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+    """Teach a critic what ratings the translator in `reference` gets, by Eq 3.7; writes critic.safetensors into `folder`.
+
+    Ratings are unperturbed here, as in the text (3.1.5.1).
+    """
+    config, data = m.config, m.splits["supervised"]
+    translator, critic = m.translator(), m.critic()
+    load_weights(translator, reference)
+    optimizer = adam(critic, config.pretraining_rate)
+    run = Run(folder, m.identity("critic_passes", reference=reference.stem), {"critic": critic}, {"critic": optimizer})
+
+    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+        source = rows(data.source, chosen)
+        said = sampled(translator, m, data, chosen, "critic", turn)
+        scores = scores_of(said, m, data, chosen)
+        target = padded(said)
+        values = critic(source, target)
+        rated = Rated(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
+        loss = critic_loss(rated)
+        descend(loss, optimizer, config.clip, f"critic, update {run.update}")
+        return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
+
+    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
+        save_weights(critic, m, folder / "critic.safetensors")
+        return {"mean square error": sums["error"] / sums["words"]}
+
+    return _passes(run, m, data, "critic", config.critic_passes, step, finish, note)
+
+
+def bandit(
+    m: Material, reference: Path, critic_file: Path, folder: Path, learner: str, *, rater: Rater = CLEAN, passes: int = 1,
+    note: Note = print,
+) -> list[dict[str, float]]:
+    """Passes over the bandit set; each sentence is translated once per pass, before it is learned from.
+
+    Returns, for each pass: 'per-sentence BLEU' of the sampled translations (true scores, whatever the
+    rater says), 'held-out BLEU' and 'dev BLEU' of greedy translations after it.
+
+    Args:
+      reference: the pre-trained translator to begin with.
+      learner: one of LEARNERS.
+    """
+    if learner not in LEARNERS:
+        raise ValueError(f"learner must be one of {LEARNERS}, got {learner!r}")
+    config, data = m.config, m.splits[m.config.bandit_set]
+    translator, critic = m.translator(), m.critic()
+    load_weights(translator, reference)
+    modules, optimizers = {"translator": translator}, {"translator": adam(translator, config.bandit_rate)}
+    if learner == "a2c":
+        load_weights(critic, critic_file)
+        modules["critic"], optimizers["critic"] = critic, adam(critic, config.bandit_rate)
+    about = m.identity("critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, reference=reference.stem,
+                       learner=learner, rater=dataclasses.asdict(rater))
+    run = Run(folder, about, modules, optimizers)
+
+    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+        said = sampled(translator, m, data, chosen, "bandit", turn)
+        scores = scores_of(said, m, data, chosen)
+        numbers = {"score": float(sum(scores)), "sentences": len(chosen)}
+        where = f"{learner}, update {run.update}"
+        if learner == "supervised":
+            loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
+            descend(loss, optimizers["translator"], config.clip, where)
+        if learner == "a2c":
+            ratings = [rater.rate(s, rng=stream(config.seed, "rating", turn, int(i))) for s, i in zip(scores, chosen, strict=True)]
+            learn_from_ratings(translator, critic, optimizers, rows(data.source, chosen), padded(said), ratings, config.clip, where)
+            numbers["rating"] = float(sum(ratings))
+        return numbers
+
+    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
+        found = {"per-sentence BLEU": 100 * sums["score"] / sums["sentences"], "held-out BLEU": judged(translator, m, "test"),
+                 "dev BLEU": judged(translator, m, "dev")}
+        return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
+
+    return _passes(run, m, data, "bandit", passes, step, finish, note)
+
+
+def learn_from_ratings(
+    translator: Translator, critic: Critic, optimizers: Mapping[str, torch.optim.Optimizer], source: Tensor, said: Tensor,
+    ratings: Sequence[float], clip: float, where: str,
+) -> None:
+    """Lines 5 and 6 of Algorithm 2, for a batch of sampled translations `said` (B, T)."""
+    rated = Rated(translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0)
+    descend(actor_loss(rated), optimizers["translator"], clip, f"{where}, translator")
+    descend(critic_loss(rated), optimizers["critic"], clip, f"{where}, critic")
+
+
+def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> Tensor:
+    """Negative log-likelihood (A.7), summed over words, averaged over sentences."""
+    return -translator(source, target).sum() / len(source)
+
+
+def sampled(translator: Translator, m: Material, data: Numbered, chosen: np.ndarray, purpose: str, turn: int) -> list[list[int]]:
+    """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners that are compared draw alike."""
+    longest = m.config.longest
+    uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
+    return decode(translator, rows(data.source, chosen), drawn_with(uniforms), longest)
+
+
+def scores_of(said: Sequence[Sequence[int]], m: Material, data: Numbered, chosen: np.ndarray) -> list[float]:
+    """What a perfect rater would say: smoothed sentence BLEU of the words against the reference."""
+    return [sentence_bleu(m.lexicons[1].decode(s), data.references[i]) for s, i in zip(said, chosen, strict=True)]
+
+
+def judged(translator: Translator, m: Material, split: str) -> float:
+    """Corpus BLEU of greedy translations (A.6), 0 to 100."""
+    data = m.splits[split]
+    return corpus_bleu(greedy(translator, data, m.lexicons[1], m.config.longest), data.references)
+
+
+def rows(sentences: Sequence[Sequence[int]], chosen: np.ndarray) -> Tensor:
+    return padded([sentences[i] for i in chosen])
+
+
+def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
+    return torch.optim.Adam(module.parameters(), rate, fused=True)
+
+
+def _passes(run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Callable, finish: Callable, note: Note):
+    config = m.config
+    return run_passes(run, passes, [len(s) for s in data.source], config.batch, seed=config.seed, purpose=purpose,
+                      minutes=config.checkpoint_minutes, note=note, step=step, finish=finish)

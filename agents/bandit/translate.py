@@ -1,0 +1,124 @@
+"""Translating: batches of sentences, sampled and greedy decoding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.bandit.network import Translator
+from agents.bandit.words import END_NUMBER, PAD_NUMBER, Lexicon
+
+Choice = Callable[[Tensor, Tensor, int], Tensor]
+"""(logits (k, V), rows (k,) of the batch, step) to chosen words (k,)."""
+POOL = 20
+"""Batches that are sorted by length together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbered:
+    """Sentence pairs as numbers."""
+
+    source: Sequence[Sequence[int]]
+    target: Sequence[Sequence[int]]
+    """Both end with END."""
+    references: Sequence[tuple[str, ...]]
+    """The target's words as they are, unknown ones included: what ratings compare with."""
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Lexicon, target: Lexicon) -> Numbered:
+    """`pairs` in the numbers of two lexicons."""
+    return Numbered([source.encode(a) for a, _ in pairs], [target.encode(b) for _, b in pairs], [tuple(b) for _, b in pairs])
+
+
+def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
+    """(B, longest) int64, PAD behind each sentence's end."""
+    out = np.full((len(sentences), max(map(len, sentences))), PAD_NUMBER, dtype=np.int64)
+    for row, sentence in enumerate(sentences):
+        out[row, : len(sentence)] = sentence
+    return torch.from_numpy(out)
+
+
+def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list[np.ndarray]:
+    """A random order of all sentences, in batches of similar length, the shorter last batch included."""
+    order, lengths = rng.permutation(len(lengths)), np.asarray(lengths)
+    pools = [order[i : i + POOL * size] for i in range(0, len(order), POOL * size)]
+    pools = [pool[np.argsort(lengths[pool], kind="stable")] for pool in pools]
+    found = [pool[i : i + size] for pool in pools for i in range(0, len(pool), size)]
+    return [found[i] for i in rng.permutation(len(found))]
+
+
+def in_order(lengths: Sequence[int], size: int) -> Iterator[np.ndarray]:
+    """All sentences by length, in batches, for judging."""
+    order = np.argsort(np.asarray(lengths), kind="stable")
+    return (order[i : i + size] for i in range(0, len(order), size))
+
+
+def likeliest(logits: Tensor, rows: Tensor, step: int) -> Tensor:
+    """Eq A.6."""
+    return logits.argmax(-1)
+
+
+def drawn_with(uniforms: np.ndarray) -> Choice:
+    """Sample each word with one number of `uniforms` (B, steps) in [0, 1), by inverting the distribution.
+
+    Each sentence brings its own numbers, so what is drawn for it does not depend on its batch.
+    """
+    numbers = torch.from_numpy(uniforms).float()
+
+    def choose(logits: Tensor, rows: Tensor, step: int) -> Tensor:
+        edges = logits.softmax(-1).cumsum(-1)
+        wanted = numbers[rows, step, None] * edges[:, -1:]
+        return torch.searchsorted(edges, wanted, right=True)[:, 0].clamp(max=logits.shape[1] - 1)
+
+    return choose
+
+
+@torch.no_grad()
+def decode(translator: Translator, source: Tensor, choose: Choice, longest: int) -> list[list[int]]:
+    """Translations of (B, S) sentences, each with its END unless it was cut at `longest` words.
+
+    Padding is never said: it stands for no word.
+    """
+    encoded, now = translator.body.encode(source)
+    rows = torch.arange(len(source))
+    said = torch.full((len(source), longest), PAD_NUMBER)
+    word = torch.full((len(source),), END_NUMBER)
+    for t in range(longest):
+        now = translator.body.step(encoded, now, translator.body.word_before(word))
+        logits = translator.out(now.output)
+        logits[:, PAD_NUMBER] = -torch.inf
+        word = choose(logits, rows, t)
+        said[rows, t] = word
+        going = (word != END_NUMBER).nonzero()[:, 0]
+        if len(going) == 0:
+            break
+        if len(going) < len(rows):
+            rows, word, now, encoded = rows[going], word[going], now.select(going), encoded.select(going)
+    return [[n for n in row if n != PAD_NUMBER] for row in said.tolist()]
+
+
+def greedy(translator: Translator, data: Numbered, lexicon: Lexicon, longest: int, batch: int = 128) -> list[tuple[str, ...]]:
+    """The words of all sentences' likeliest translations (A.6), in their order."""
+    found: list[tuple[str, ...]] = [()] * len(data)
+    for chosen in in_order([len(s) for s in data.source], batch):
+        for i, numbers in zip(chosen, decode(translator, padded([data.source[i] for i in chosen]), likeliest, longest), strict=True):
+            found[i] = lexicon.decode(numbers)
+    return found
+
+
+@torch.no_grad()
+def perplexity(translator: Translator, data: Numbered, batch: int = 128) -> float:
+    """exp of the mean negative log-likelihood of the reference words, END included."""
+    total, words = 0.0, 0
+    for chosen in in_order([len(s) for s in data.source], batch):
+        target = padded([data.target[i] for i in chosen])
+        total -= float(translator(padded([data.source[i] for i in chosen]), target).sum())
+        words += int((target != PAD_NUMBER).sum())
+    return float(np.exp(total / words))

@@ -1,0 +1,315 @@
+"""BANDITNMT from corpus to table: it learns from ratings alone, resumes exactly, and fails clearly."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from agents.bandit import corpus, libreoffice, runs
+from agents.bandit.config import BanditConfig
+from agents.bandit.corpus import CorpusError, Pair, Sizes
+from agents.bandit.network import Critic, Translator, begin
+from agents.bandit.ratings import Rater
+from agents.bandit.store import load_translator
+from agents.bandit.study import Job, Setting, across_seeds, distinct, run_study
+from agents.bandit.training import bandit, material, pretrain, teach_critic
+from agents.bandit.translate import batches, decode, drawn_with, greedy, likeliest, padded, perplexity
+from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_words, lexicon_from_json
+from agents.imitation.checkpoint import CheckpointError
+from embodied.errors import UnableError
+from embodied.seeds import stream
+
+GERMAN = "null eins zwei drei vier fünf sechs sieben".split()
+ENGLISH = "zero one two three four five six seven".split()
+TOY = BanditConfig(hidden_size=32, source_words=20, target_words=20, longest=8, batch=32, pretraining_passes=6, critic_passes=2,
+                   pretraining_rate=1e-2, bandit_rate=3e-3)
+silent = lambda line: None
+
+
+def toy_pairs(n: int, seed: int = 0) -> list[Pair]:
+    """Numbers in German and English, four a document, each source once."""
+    rng, found = stream(seed, "toy"), {}
+    while len(found) < n:
+        digits = rng.integers(8, size=int(rng.integers(3, 7)))
+        found.setdefault(tuple(digits), len(found))
+    return [Pair(" ".join(GERMAN[d] for d in k), " ".join(ENGLISH[d] for d in k), f"page {i // 4}") for k, i in found.items()]
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("corpus")
+    corpus.make_corpus(toy_pairs(800), folder, Sizes(supervised=320, bandit=320, dev=60, test=60), seed=0, note=silent)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def trained(data, tmp_path_factory) -> Path:
+    """A weakly trained toy translator with its critic."""
+    m, home = material(data, TOY), tmp_path_factory.mktemp("trained")
+    pretrain(m, home / "pretrain", note=silent)
+    for reference in ("weak", "full"):
+        teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=silent)
+    return home
+
+
+# Corpus ------------------------------------------------------------------------------------------
+
+def test_splits_share_no_document_and_overlap_is_as_asked():
+    pairs = corpus.filtered(toy_pairs(800))
+    splits = corpus.split(pairs, Sizes(supervised=300, bandit=200, dev=40, test=40, overlap=0.95), seed=1)
+    apart = ("supervised", "bandit_disjoint", "dev", "test")
+    documents = {name: {p.document for p in splits[name]} for name in splits}
+    for i, a in enumerate(apart):
+        for b in apart[i + 1 :]:
+            assert not documents[a] & documents[b], f"{a} and {b} share documents"
+    known = {p.source for p in splits["supervised"]}
+    assert sum(p.source in known for p in splits["bandit_overlap"]) == 190
+    assert {name: len(splits[name]) for name in apart[:2]} == {"supervised": 300, "bandit_disjoint": 200}
+    assert splits == corpus.split(pairs, Sizes(supervised=300, bandit=200, dev=40, test=40, overlap=0.95), seed=1)
+
+
+def test_filter_by_length_ratio_and_unique_source():
+    kept = corpus.filtered([
+        Pair("Eins zwei.", "One two.", "d"), Pair("EINS zwei .", "again two three", "d"), Pair("zu kurz", "too short", "d"),
+        Pair("a b c", "a b c d e f", "d"), Pair("w " * 51, "w " * 50, "d"),
+    ])
+    assert kept == [Pair("eins zwei .", "one two .", "d")]
+
+
+def test_too_small_a_corpus_says_so():
+    with pytest.raises(CorpusError, match="too few"):
+        corpus.split(corpus.filtered(toy_pairs(50)), Sizes(), seed=0)
+
+
+@pytest.mark.parametrize(("german", "english", "message"), [
+    (b"eins zwei\ndrei\n", b"one two\n", "2 lines.*1; line n"),
+    (b"eins\n\ndrei\n", b"one\ntwo\nthree\n", ":2: an empty side"),
+    (b"eins\nf\xfcnf\n", b"one\nfive\n", ":2: not UTF-8.*iconv"),
+    (b"", b"", "is empty"),
+    (None, b"one\n", "is missing.*embodied corpus"),
+])
+def test_bad_files_are_named_with_line_and_remedy(tmp_path, german, english, message):
+    for language, text in (("de", german), ("en", english)):
+        if text is not None:
+            (tmp_path / f"dev.{language}").write_bytes(text)
+    with pytest.raises(CorpusError, match=message):
+        corpus.load(tmp_path, ["dev"])
+
+
+def test_moses_files_are_read_in_blocks(tmp_path):
+    (tmp_path / "a").write_text("eins zwei drei\n" * 5)
+    (tmp_path / "b").write_text("one two three\n" * 5)
+    assert [p.document for p in corpus.read_moses(tmp_path / "a", tmp_path / "b", block=2)] == [
+        "lines 000000", "lines 000000", "lines 000001", "lines 000001", "lines 000002"]
+
+
+def mo(messages: dict[str, str]) -> bytes:
+    """A gettext catalogue as msgfmt would write it."""
+    entries = sorted({"": "Content-Type: text/plain; charset=UTF-8\n", **messages}.items())
+    at, tables, body = 28 + 16 * len(entries), ([], []), b""
+    for k in range(2):
+        for entry in entries:
+            text = entry[k].encode()
+            tables[k].append(struct.pack("<2I", len(text), at + len(body)))
+            body += text + b"\0"
+    head = struct.pack("<7I", 0x950412DE, 0, len(entries), 28, 28 + 8 * len(entries), 0, 0)
+    return head + b"".join(tables[0]) + b"".join(tables[1]) + body
+
+
+def libreoffice_folder(root: Path) -> Path:
+    """What the three packages hold, small."""
+    page = '<html><body><h1 id="hd_id1">{}</h1><p id="par_id2">{}</p><p id="bm_module">{}</p></body></html>'
+    for language, texts in (("de", ("Datum <i>und</i> Zeit", "Wählen Sie ein Datum. Drücken Sie OK.", "Rahmen")),
+                            ("en-US", ("Date <i>and</i> time", "Choose a date. Press OK.", "frame"))):
+        path = root / libreoffice.HELP / language / "text" / "page.html"
+        path.parent.mkdir(parents=True)
+        path.write_text(page.format(*texts), encoding="utf-8")
+    menus = root / libreoffice.MENUS
+    menus.mkdir(parents=True)
+    (menus / "sw.mo").write_bytes(mo({"dialog|label\x04_Open a file…": "Datei ö~ffnen…"}))
+    return root
+
+
+def test_help_and_menus_are_read_sentence_by_sentence(tmp_path):
+    assert libreoffice.read(libreoffice_folder(tmp_path)) == [
+        Pair("Datum und Zeit", "Date and time", "text/page.html"),
+        Pair("Wählen Sie ein Datum.", "Choose a date.", "text/page.html"),
+        Pair("Drücken Sie OK.", "Press OK.", "text/page.html"),
+        Pair("Datei öffnen…", "Open a file…", "sw:dialog"),
+    ]
+
+
+def test_a_missing_or_damaged_package_is_named(tmp_path):
+    with pytest.raises(CorpusError, match="lacks package libreoffice-help-de .*apt-get download"):
+        libreoffice.read(tmp_path)
+    root = libreoffice_folder(tmp_path / "whole")
+    (root / libreoffice.MENUS / "sw.mo").write_bytes(b"no catalogue")
+    with pytest.raises(CorpusError, match="sw.mo: damaged"):
+        libreoffice.read(root)
+    (tmp_path / "libreoffice-help-de_1_all.deb").write_bytes(b"!<arch>\ncut")
+    with pytest.raises((CorpusError, UnableError), match="damaged|dpkg-deb is needed"):
+        libreoffice.read(tmp_path)
+
+
+def test_without_apt_the_packages_are_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UnableError, match="no apt-get here.*--from"):
+        libreoffice.fetch(tmp_path / "packages")
+
+
+# Words and networks ------------------------------------------------------------------------------
+
+def test_words_are_numbered_by_frequency_and_come_back():
+    lexicon = build_words([["b", "a", "b"], ["c", "a", "b"]], 5)
+    assert lexicon.vocabulary.words[3:] == ("b", "a")
+    assert lexicon.encode(["a", "c", "b"]) == [4, 1, 3, END_NUMBER]
+    assert lexicon.decode([4, 3, END_NUMBER, 4]) == ("a", "b")
+    assert lexicon_from_json(json.loads(json.dumps(lexicon.to_json()))) == lexicon
+
+
+def networks() -> tuple[Translator, Critic]:
+    return tuple(begin(kind(12, 9, 16), torch.Generator().manual_seed(1)) for kind in (Translator, Critic))
+
+
+SOURCE = [[3, 4, 5, 2], [6, 2], [7, 8, 9, 10, 11, 2]]
+
+
+def test_padding_changes_nothing():
+    said = [[5, 6, 2], [7, 2], [3, 3, 3, 4, 2]]
+    for network in networks():
+        together = network(padded(SOURCE), padded(said))
+        for row, (source, words) in enumerate(zip(SOURCE, said, strict=True)):
+            alone = network(padded([source]), padded([words]))[0]
+            assert torch.allclose(together[row, : len(words)], alone, atol=1e-6)
+    translator, _ = networks()
+    assert not translator(padded(SOURCE), padded(said))[1, 2:].any()
+
+
+def test_log_probabilities_sum_to_one_over_the_next_word():
+    translator, _ = networks()
+    total = sum(translator(padded([SOURCE[0]]), torch.tensor([[5, w]]))[0, 1].exp() for w in range(1, 9))
+    # word 0 is padding and never said, but the softmax gives it its share
+    nothing = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]])))[0, 1].softmax(-1)[PAD_NUMBER]
+    assert float((total + nothing).detach()) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_what_is_sampled_does_not_depend_on_the_batch():
+    translator, _ = networks()
+    uniforms = stream(0, "u").random((3, 20))
+    together = decode(translator, padded(SOURCE), drawn_with(uniforms), 20)
+    alone = [decode(translator, padded([s]), drawn_with(uniforms[[i]]), 20)[0] for i, s in enumerate(SOURCE)]
+    assert together == alone
+    assert all(PAD_NUMBER not in s and len(s) <= 20 for s in together)
+
+
+def test_samples_follow_the_distribution():
+    translator, _ = networks()
+    n = 4000
+    first = [s[0] for s in decode(translator, padded([SOURCE[0]] * n), drawn_with(stream(1, "u").random((n, 1))), 1)]
+    logits = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[3]])))[0, 0]
+    logits[PAD_NUMBER] = -torch.inf
+    wanted = logits.softmax(-1).detach().numpy()
+    assert np.abs(np.bincount(first, minlength=9) / n - wanted).max() < 4 * np.sqrt(0.25 / n)
+
+
+def test_every_sentence_is_in_one_batch():
+    lengths = list(range(1, 131))
+    found = batches(lengths, 8, stream(0, "b"))
+    assert sorted(i for b in found for i in b) == list(range(130))
+    assert len(found) == 17
+    assert np.mean([np.ptp([lengths[i] for i in b]) for b in found]) < 20
+
+
+# Learning ----------------------------------------------------------------------------------------
+
+def test_pretraining_learns_to_translate(data, trained):
+    m = material(data, TOY)
+    translator, lexicons, config = load_translator(trained / "pretrain" / "full.safetensors")
+    assert config == TOY
+    weak = load_translator(trained / "pretrain" / "weak.safetensors")[0]
+    assert perplexity(translator, m.splits["dev"]) < 0.7 * perplexity(weak, m.splits["dev"])
+    said = greedy(translator, m.splits["dev"], lexicons[1], 8)
+    assert np.mean([s[0] == r[0] for s, r in zip(said, m.splits["dev"].references, strict=True)]) > 0.5
+
+
+def test_ratings_alone_improve_translations(data, trained, tmp_path):
+    m = material(data, TOY)
+    files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
+    none = bandit(m, *files, tmp_path / "none", "reference", passes=6, note=silent)
+    clean = bandit(m, *files, tmp_path / "clean", "a2c", passes=6, note=silent)
+    assert clean[-1]["per-sentence BLEU"] > none[-1]["per-sentence BLEU"] + 5
+    assert none[-1]["held-out BLEU"] == none[0]["held-out BLEU"]
+
+
+def weights(folder: Path) -> dict[str, torch.Tensor]:
+    return {f"{k}.{n}": t for k, m in runs.read_checkpoint(folder / "checkpoint.pt")["modules"].items() for n, t in m.items()}
+
+
+def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
+    config = dataclasses.replace(TOY, checkpoint_minutes=1e-9)
+    m, files = material(data, config), (trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors")
+    rater = Rater(granularity=5, variance=0.5)
+    whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
+    save = runs.Run.save
+
+    def killed(run):
+        save(run)
+        if run.update == 13:
+            raise SystemExit
+    monkeypatch.setattr(runs.Run, "save", killed)
+    with pytest.raises(SystemExit):
+        bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
+    monkeypatch.setattr(runs.Run, "save", save)
+    parts = bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
+    assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [{k: v for k, v in p.items() if k != "seconds"} for p in whole]
+    one, other = weights(tmp_path / "whole"), weights(tmp_path / "parts")
+    assert all(torch.equal(one[k], other[k]) for k in one)
+
+
+def test_a_checkpoint_of_other_settings_or_cut_short_is_refused(data, trained, tmp_path):
+    files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
+    bandit(material(data, TOY), *files, tmp_path, "reference", note=silent)
+    with pytest.raises(CheckpointError, match="learner 'reference' -> 'a2c'"):
+        bandit(material(data, TOY), *files, tmp_path, "a2c", note=silent)
+    path = tmp_path / "checkpoint.pt"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(CheckpointError, match="cut short, delete it"):
+        bandit(material(data, TOY), *files, tmp_path, "reference", note=silent)
+
+
+def test_diverging_says_so_and_keeps_the_checkpoint(data, trained, tmp_path):
+    m = material(data, dataclasses.replace(TOY, pretraining_rate=1e39))
+    with pytest.raises(UnableError, match="not finite.*learning rate"):
+        pretrain(m, tmp_path, note=silent)
+
+
+def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
+    config = dataclasses.replace(TOY, pretraining_passes=1, critic_passes=1)
+    setting = Setting(data, tmp_path, config, seeds=2)
+    said = []
+    path = run_study(setting, ["3.2"], note=said.append)["3.2"]
+    text = path.read_text()
+    assert "2.82 ± 0.03" in text and text.count("|") == 6 * 5
+    first = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")}
+    assert len(first) == 2 * (1 + 2 + 6)
+    run_study(setting, ["3.2"], note=said.append)
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")} == first
+    with pytest.raises(ValueError, match="unknown studies"):
+        run_study(setting, ["9.9"], note=silent)
+
+
+def test_runs_that_two_studies_share_are_made_once():
+    assert distinct([Job("full", "a2c"), Job("full", "a2c", passes=5), Job("weak", "a2c")]) == [
+        Job("full", "a2c", passes=5), Job("weak", "a2c")]
+
+
+def test_intervals_over_seeds_are_students():
+    found = across_seeds([1.0, 2.0, 3.0])
+    assert found.mean == 2.0 and found.half == pytest.approx(4.302653 / np.sqrt(3), rel=1e-5)
+    assert np.isnan(across_seeds([1.0]).half)
