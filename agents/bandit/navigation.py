@@ -1,0 +1,232 @@
+"""Navigation from ratings: a person watches an episode and gives one to five stars, nothing else.
+
+The learner is the translator's (agents.bandit.a2c): an agent that was taught by imitation plays
+episodes, each episode gets one rating, and every decision of it is credited with the rating less
+what a critic expected. Decisions are words there; here they are moves, stopping, and asking.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from agents.bandit.a2c import Rated, actor_loss, critic_loss, descend
+from agents.bandit.ratings import Rater
+from agents.bandit.runs import Note, Run
+from agents.hanna.agent import HannaAgent, save_agent
+from agents.hanna.asking import RULES
+from agents.hanna.percept import DO_NOTHING, REQUEST
+from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
+from agents.imitation.collect import action_index
+from agents.imitation.training import Split, stop_signal, tasks_of_update
+from assets.cache import digest
+from embodied import metrics
+from embodied.interface import Action, Ask, Episode, Intention, Observation
+from embodied.rollout import play
+from embodied.seeds import stream
+
+SCORES = ("success", "nDTW")
+"""What a person's stars are simulated from."""
+
+
+@dataclass(frozen=True)
+class RatingConfig:
+    """Settings of learning to navigate from ratings."""
+
+    updates: int = 100
+    """Updates of the weights."""
+    batch: int = 32
+    """Episodes per update, each rated once."""
+    learning_rate: float = 1e-4
+    """Adam's, of the agent; the dissertation's for translators."""
+    critic_rate: float = 1e-3
+    """Adam's, of the critic, which begins untaught."""
+    critic_updates: int = 10
+    """First updates, in which the critic learns alone."""
+    score: str = "nDTW"
+    """What a rating is made from: 'success', or 'nDTW' of the walk against the shortest one."""
+    clip: float = 5.0
+    """Longest gradient."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        if self.score not in SCORES:
+            raise ValueError(f"score must be one of {SCORES}, got {self.score!r}")
+        for name in ("updates", "batch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("learning_rate", "critic_rate", "clip"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+
+class StateCritic(nn.Module):
+    """V of a navigation state: what the agent's own network remembers, read by two layers of its own.
+
+    Unlike the translator's critic it encodes nothing itself: features of panoramas take most of the
+    time, and no gradient flows from here into the agent.
+    """
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(nn.Linear(size, size), nn.Tanh(), nn.Linear(size, 1))
+
+    def forward(self, states: Tensor) -> Tensor:
+        """(..., h) to (...)."""
+        return self.layers(states)[..., 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Decided:
+    """One step of the episodes that were running."""
+
+    positions: tuple[int, ...]
+    log_probabilities: Tensor
+    """(k,) of what was decided, with its gradient."""
+    states: Tensor
+    """(k, h) of the navigation network, without."""
+
+
+class Watching:
+    """A policy that writes down the probability of everything it decides, and the state it decided in."""
+
+    def __init__(self, policy: HannaPolicy) -> None:
+        self.policy = policy
+        self.decided: list[Decided] = []
+
+    def act(
+        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[list[Action | None], HannaMemory]:
+        actions, memory = self.policy.act(observations, memory, rngs=rngs)
+        if memory.positions:
+            running = [(observations[p], actions[p]) for p in memory.positions]
+            scores = memory.moments[-1].scores
+            self.decided.append(Decided(memory.positions, decision_log_probability(scores.navigation, scores.ask, running),
+                                        memory.networks[0].intra_states[:, -1].detach()))
+        return actions, dataclasses.replace(memory, moments=())
+
+
+def decision_log_probability(moves: Tensor, asks: Tensor, decisions: Sequence[tuple[Observation, Action]]) -> Tensor:
+    """log pi of whole decisions, (k,): to ask or not where that could be chosen, and which move if not.
+
+    Args:
+      moves: (k, A) logits, stop first.
+      asks: (k, 2) logits.
+    """
+    asked = torch.tensor([isinstance(a, Ask) for _, a in decisions])
+    could = torch.tensor([Intention.HELP in o.can_ask for o, _ in decisions])
+    index = torch.tensor([0 if isinstance(a, Ask) else action_index(a) for _, a in decisions])
+    rows = torch.arange(len(decisions))
+    move = moves.log_softmax(-1)[rows, index].masked_fill(asked, 0.0)
+    ask = asks.log_softmax(-1)[rows, torch.where(asked, REQUEST, DO_NOTHING)].masked_fill(~could, 0.0)
+    return move + ask
+
+
+def score_of(episode: Episode, graph, kind: str) -> float:
+    """The true score of an episode in [0, 1], which only the rater sees."""
+    if kind == "success":
+        return metrics.success(episode, graph)
+    start = episode.task.start.node
+    goal = min(episode.task.goal_nodes, key=lambda g: (graph.distance[start, g], g))
+    return metrics.ndtw(metrics.without_repeats(episode.nodes), shortest_path(graph, start, goal), graph)
+
+
+def shortest_path(graph, start: int, goal: int) -> tuple[int, ...]:
+    path = [start]
+    while path[-1] != goal:
+        path.append(int(graph.next_hop[path[-1], goal]))
+    return tuple(path)
+
+
+def rated(decided: Sequence[Decided], critic: StateCritic, ratings: Sequence[float]) -> Rated:
+    """The steps of all episodes side by side, (B, T)."""
+    episodes, steps = len(ratings), len(decided)
+    log_p, states = torch.zeros(episodes, steps), torch.zeros(episodes, steps, decided[0].states.shape[-1])
+    mask = torch.zeros(episodes, steps, dtype=torch.bool)
+    columns = []
+    for t, moment in enumerate(decided):
+        rows = torch.tensor(moment.positions)
+        columns.append(log_p[:, t].index_put((rows,), moment.log_probabilities))
+        states[rows, t], mask[rows, t] = moment.states, True
+    return Rated(torch.stack(columns, 1), critic(states), torch.tensor(ratings, dtype=torch.float32), mask)
+
+
+def learn_from_stars(
+    agent: HannaAgent, split: Split, rater: Rater, config: RatingConfig, folder: Path, *, begun_with: str, note: Note = print
+) -> list[dict[str, float]]:
+    """Fine-tune `agent` in place by ratings of episodes in the houses of `split`; resumable.
+
+    Writes checkpoint.pt, result.json and, at the end, agent.safetensors into `folder`. Episodes are as
+    long as in imitation; dropout is off, so that the policy that is rated is the one that learns.
+
+    Args:
+      begun_with: fingerprint of the agent's first weights, so that a run is not continued with others.
+    """
+    critic = StateCritic(agent.config.hidden_size)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(stream(config.seed, "begin", "state critic").integers(2**31)))
+        critic.apply(lambda layer: layer.reset_parameters() if isinstance(layer, nn.Linear) else None)
+    optimizers = {"agent": torch.optim.Adam(agent.network.parameters(), config.learning_rate),
+                  "critic": torch.optim.Adam(critic.parameters(), config.critic_rate)}
+    kept = {k: v for k, v in dataclasses.asdict(config).items() if k != "updates"}
+    run = Run(folder, {**kept, "rater": dataclasses.asdict(rater), "agent": begun_with}, {"agent": agent.network, "critic": critic}, optimizers)
+    agent.network.eval()
+    policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
+    with stop_signal() as stop:
+        while run.update < config.updates:
+            numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, run.update)
+            run.update += 1
+            run.history.append({"update": run.update, **numbers})
+            if run.update % 10 == 0 or run.update == config.updates or stop.is_set():
+                run.save()
+                last = run.history[-10:]
+                note(f"{folder}: {run.update}/{config.updates}, " + ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers))
+            if stop.is_set():
+                raise KeyboardInterrupt
+    save_agent(agent, Path(folder) / "agent.safetensors")
+    return run.history[: config.updates]
+
+
+def _learn_once(
+    agent: HannaAgent, policy: HannaPolicy, critic: StateCritic, optimizers: Mapping[str, torch.optim.Optimizer], split: Split,
+    rater: Rater, config: RatingConfig, update: int,
+) -> dict[str, float]:
+    """Play, be rated, learn; returns means over the episodes."""
+    tasks = tasks_of_update(split.tasks, update, config.batch, config.seed)
+    tasks = [dataclasses.replace(t, horizon=agent.config.training_steps) for t in tasks]
+    watching = Watching(policy)
+    episodes = play(split.make_env, watching, tasks, seed=int(stream(config.seed, "update", update).integers(2**31)), batch=len(tasks))
+    scores = [score_of(e, split.worlds[e.task.world].graph, config.score) for e in episodes]
+    rngs = [stream(config.seed, "stars", update, i) for i in range(len(episodes))]
+    ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs, strict=True)]
+    found = rated(watching.decided, critic, ratings)
+    where = f"navigation from ratings, update {update}"
+    loss = critic_loss(found)
+    if update >= config.critic_updates:
+        descend(actor_loss(found), optimizers["agent"], config.clip, f"{where}, agent")
+    descend(loss, optimizers["critic"], config.clip, f"{where}, critic")
+    success = [metrics.success(e, split.worlds[e.task.world].graph) for e in episodes]
+    return {"score": float(np.mean(scores)), "rating": float(np.mean(ratings)), "success": float(np.mean(success)),
+            "critic error": math.sqrt(2 * float(loss.detach()) * len(episodes) / int(found.mask.sum()))}
+
+
+def fingerprint(agent: HannaAgent) -> str:
+    """Of an agent's weights."""
+    return digest(*(v.detach().cpu().numpy().tobytes() for _, v in sorted(agent.network.state_dict().items())))
+
+
+def read_history(folder: Path) -> list[dict[str, float]]:
+    """What `learn_from_stars` wrote of each update."""
+    return json.loads((Path(folder) / "result.json").read_text())["history"]
+
+
+Judge = Callable[[HannaAgent], Sequence[Episode]]
