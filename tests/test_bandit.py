@@ -22,38 +22,39 @@ def sacre(words: str, reference: str) -> float:
 
 
 def test_sentence_bleu_is_one_for_the_reference_only():
-    assert sentence_bleu("a b c d e".split(), "a b c d e".split()) == 1.0
-    assert sentence_bleu("a b c d".split(), "a b c d e".split()) < 1.0
+    assert sentence_bleu(["a", "b", "c", "d", "e"], ["a", "b", "c", "d", "e"]) == 1.0
+    assert sentence_bleu(["a", "b", "c", "d"], ["a", "b", "c", "d", "e"]) < 1.0
 
 
 def test_sentence_bleu_by_hand():
     # 'a b x' of 'a b c': unigrams 2 of 3, bigrams 1 of 2, trigrams 0 of 1, 4-grams 0 of 0; one added to each
-    assert sentence_bleu("a b x".split(), "a b c".split()) == pytest.approx((3 / 4 * 2 / 3 * 1 / 2 * 1 / 1) ** 0.25)
+    assert sentence_bleu(["a", "b", "x"], ["a", "b", "c"]) == pytest.approx((3 / 4 * 2 / 3 * 1 / 2 * 1 / 1) ** 0.25)
     # one word short: brevity penalty with one more on both sides
-    assert sentence_bleu("a b".split(), "a b c".split()) == pytest.approx(math.exp(1 - 4 / 3))
-    assert sentence_bleu([], "a b c".split()) == pytest.approx(math.exp(1 - 4 / 1))
+    assert sentence_bleu(["a", "b"], ["a", "b", "c"]) == pytest.approx(math.exp(1 - 4 / 3))
+    assert sentence_bleu([], ["a", "b", "c"]) == pytest.approx(math.exp(1 - 4 / 1))
 
 
 @pytest.mark.parametrize("words", ["b a d c f e", "a b d c e f", "f e d c b a", "a b c d e f"])
 def test_sentence_bleu_is_sacrebleus_where_all_words_are_right(words):
     """There the unigrams, which we smooth and sacrebleu does not, are full in both, and nothing is too short."""
-    assert sentence_bleu(words.split(), "a b c d e f".split()) == pytest.approx(sacre(words, "a b c d e f"))
+    assert sentence_bleu(words.split(), ["a", "b", "c", "d", "e", "f"]) == pytest.approx(sacre(words, "a b c d e f"))
 
 
 @pytest.mark.parametrize("words", ["a b c x y z", "a x c d e f g h", "x b c d e y"])
 def test_sentence_bleu_differs_from_sacrebleus_by_unigram_smoothing_only(words):
-    reference = "a b c d e f".split()
+    reference = ["a", "b", "c", "d", "e", "f"]
     right, all_words = len(set(words.split()) & set(reference)), len(words.split())
     ours = sentence_bleu(words.split(), reference) ** 4 / ((right + 1) / (all_words + 1))
     assert ours == pytest.approx(sacre(words, " ".join(reference)) ** 4 / (right / all_words))
 
 
 def test_repeating_a_right_word_does_not_pay():
-    assert sentence_bleu("a a a a".split(), "a b c d".split()) < sentence_bleu("a b x y".split(), "a b c d".split())
+    reference = ["a", "b", "c", "d"]
+    assert sentence_bleu(["a", "a", "a", "a"], reference) < sentence_bleu(["a", "b", "x", "y"], reference)
 
 
 def test_corpus_bleu_by_hand():
-    references = [tuple("a b c d e".split()), tuple("f g h i j".split())]
+    references = [("a", "b", "c", "d", "e"), ("f", "g", "h", "i", "j")]
     assert corpus_bleu(references, references) == pytest.approx(100)
     # second sentence without its last word: 9 of 9, 7 of 7, 5 of 5, 3 of 3 n-grams; 9 words for 10
     assert corpus_bleu([references[0], references[1][:4]], references) == pytest.approx(100 * math.exp(1 - 10 / 9))

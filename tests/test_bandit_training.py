@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import struct
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +20,26 @@ from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
 from agents.bandit.study import Job, Setting, across_seeds, distinct, run_study
 from agents.bandit.training import bandit, material, pretrain, teach_critic
-from agents.bandit.translate import batches, decode, drawn_with, greedy, likeliest, padded, perplexity
-from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_words, lexicon_from_json
+from agents.bandit.translate import batches, decode, drawn_with, greedy, padded, perplexity
+from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
 from agents.imitation.checkpoint import CheckpointError
+from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
 
-GERMAN = "null eins zwei drei vier fünf sechs sieben".split()
-ENGLISH = "zero one two three four five six seven".split()
-TOY = BanditConfig(hidden_size=32, source_words=20, target_words=20, longest=8, batch=32, pretraining_passes=6, critic_passes=2,
-                   pretraining_rate=1e-2, bandit_rate=3e-3)
+GERMAN = ["null", "eins", "zwei", "drei", "vier", "fünf", "sechs", "sieben"]
+ENGLISH = ["zero", "one", "two", "three", "four", "five", "six", "seven"]
+TOY = BanditConfig(
+    hidden_size=32,
+    source_words=20,
+    target_words=20,
+    longest=8,
+    batch=32,
+    pretraining_passes=6,
+    critic_passes=2,
+    pretraining_rate=1e-2,
+    bandit_rate=3e-3,
+)
 silent = lambda line: None
 
 
@@ -38,7 +49,10 @@ def toy_pairs(n: int, seed: int = 0) -> list[Pair]:
     while len(found) < n:
         digits = rng.integers(8, size=int(rng.integers(3, 7)))
         found.setdefault(tuple(digits), len(found))
-    return [Pair(" ".join(GERMAN[d] for d in k), " ".join(ENGLISH[d] for d in k), f"page {i // 4}") for k, i in found.items()]
+    return [
+        Pair(" ".join(GERMAN[d] for d in k), " ".join(ENGLISH[d] for d in k), f"page {i // 4}")
+        for k, i in found.items()
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +74,7 @@ def trained(data, tmp_path_factory) -> Path:
 
 # Corpus ------------------------------------------------------------------------------------------
 
+
 def test_splits_share_no_document_and_overlap_is_as_asked():
     pairs = corpus.filtered(toy_pairs(800))
     splits = corpus.split(pairs, Sizes(supervised=300, bandit=200, dev=40, test=40, overlap=0.95), seed=1)
@@ -75,10 +90,15 @@ def test_splits_share_no_document_and_overlap_is_as_asked():
 
 
 def test_filter_by_length_ratio_and_unique_source():
-    kept = corpus.filtered([
-        Pair("Eins zwei.", "One two.", "d"), Pair("EINS zwei .", "again two three", "d"), Pair("zu kurz", "too short", "d"),
-        Pair("a b c", "a b c d e f", "d"), Pair("w " * 51, "w " * 50, "d"),
-    ])
+    kept = corpus.filtered(
+        [
+            Pair("Eins zwei.", "One two.", "d"),
+            Pair("EINS zwei .", "again two three", "d"),
+            Pair("zu kurz", "too short", "d"),
+            Pair("a b c", "a b c d e f", "d"),
+            Pair("w " * 51, "w " * 50, "d"),
+        ]
+    )
     assert kept == [Pair("eins zwei .", "one two .", "d")]
 
 
@@ -87,13 +107,16 @@ def test_too_small_a_corpus_says_so():
         corpus.split(corpus.filtered(toy_pairs(50)), Sizes(), seed=0)
 
 
-@pytest.mark.parametrize(("german", "english", "message"), [
-    (b"eins zwei\ndrei\n", b"one two\n", "2 lines.*1; line n"),
-    (b"eins\n\ndrei\n", b"one\ntwo\nthree\n", ":2: an empty side"),
-    (b"eins\nf\xfcnf\n", b"one\nfive\n", ":2: not UTF-8.*iconv"),
-    (b"", b"", "is empty"),
-    (None, b"one\n", "is missing.*embodied corpus"),
-])
+@pytest.mark.parametrize(
+    ("german", "english", "message"),
+    [
+        (b"eins zwei\ndrei\n", b"one two\n", "2 lines.*1; line n"),
+        (b"eins\n\ndrei\n", b"one\ntwo\nthree\n", ":2: an empty side"),
+        (b"eins\nf\xfcnf\n", b"one\nfive\n", ":2: not UTF-8.*iconv"),
+        (b"", b"", "is empty"),
+        (None, b"one\n", "is missing.*embodied corpus"),
+    ],
+)
 def test_bad_files_are_named_with_line_and_remedy(tmp_path, german, english, message):
     for language, text in (("de", german), ("en", english)):
         if text is not None:
@@ -106,7 +129,12 @@ def test_moses_files_are_read_in_blocks(tmp_path):
     (tmp_path / "a").write_text("eins zwei drei\n" * 5)
     (tmp_path / "b").write_text("one two three\n" * 5)
     assert [p.document for p in corpus.read_moses(tmp_path / "a", tmp_path / "b", block=2)] == [
-        "lines 000000", "lines 000000", "lines 000001", "lines 000001", "lines 000002"]
+        "lines 000000",
+        "lines 000000",
+        "lines 000001",
+        "lines 000001",
+        "lines 000002",
+    ]
 
 
 def mo(messages: dict[str, str]) -> bytes:
@@ -125,8 +153,10 @@ def mo(messages: dict[str, str]) -> bytes:
 def libreoffice_folder(root: Path) -> Path:
     """What the three packages hold, small."""
     page = '<html><body><h1 id="hd_id1">{}</h1><p id="par_id2">{}</p><p id="bm_module">{}</p></body></html>'
-    for language, texts in (("de", ("Datum <i>und</i> Zeit", "Wählen Sie ein Datum. Drücken Sie OK.", "Rahmen")),
-                            ("en-US", ("Date <i>and</i> time", "Choose a date. Press OK.", "frame"))):
+    for language, texts in (
+        ("de", ("Datum <i>und</i> Zeit", "Wählen Sie ein Datum. Drücken Sie OK.", "Rahmen")),
+        ("en-US", ("Date <i>and</i> time", "Choose a date. Press OK.", "frame")),
+    ):
         path = root / libreoffice.HELP / language / "text" / "page.html"
         path.parent.mkdir(parents=True)
         path.write_text(page.format(*texts), encoding="utf-8")
@@ -165,6 +195,7 @@ def test_without_apt_the_packages_are_asked_for(tmp_path, monkeypatch):
 
 # Words and networks ------------------------------------------------------------------------------
 
+
 def test_words_are_numbered_by_frequency_and_come_back():
     lexicon = build_words([["b", "a", "b"], ["c", "a", "b"]], 5)
     assert lexicon.vocabulary.words[3:] == ("b", "a")
@@ -195,7 +226,9 @@ def test_log_probabilities_sum_to_one_over_the_next_word():
     translator, _ = networks()
     total = sum(translator(padded([SOURCE[0]]), torch.tensor([[5, w]]))[0, 1].exp() for w in range(1, 9))
     # word 0 is padding and never said, but the softmax gives it its share
-    nothing = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]])))[0, 1].softmax(-1)[PAD_NUMBER]
+    nothing = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]])))[0, 1].softmax(-1)[
+        PAD_NUMBER
+    ]
     assert float((total + nothing).detach()) == pytest.approx(1.0, abs=1e-5)
 
 
@@ -228,6 +261,7 @@ def test_every_sentence_is_in_one_batch():
 
 # Learning ----------------------------------------------------------------------------------------
 
+
 def test_pretraining_learns_to_translate(data, trained):
     m = material(data, TOY)
     translator, lexicons, config = load_translator(trained / "pretrain" / "full.safetensors")
@@ -248,12 +282,19 @@ def test_ratings_alone_improve_translations(data, trained, tmp_path):
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
-    return {f"{k}.{n}": t for k, m in runs.read_checkpoint(folder / "checkpoint.pt")["modules"].items() for n, t in m.items()}
+    return {
+        f"{k}.{n}": t
+        for k, m in runs.read_checkpoint(folder / "checkpoint.pt")["modules"].items()
+        for n, t in m.items()
+    }
 
 
 def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     config = dataclasses.replace(TOY, checkpoint_minutes=1e-9)
-    m, files = material(data, config), (trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors")
+    m, files = (
+        material(data, config),
+        (trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"),
+    )
     rater = Rater(granularity=5, variance=0.5)
     whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
     save = runs.Run.save
@@ -262,12 +303,15 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
         save(run)
         if run.update == 13:
             raise SystemExit
+
     monkeypatch.setattr(runs.Run, "save", killed)
     with pytest.raises(SystemExit):
         bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
     monkeypatch.setattr(runs.Run, "save", save)
     parts = bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
-    assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [{k: v for k, v in p.items() if k != "seconds"} for p in whole]
+    assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [
+        {k: v for k, v in p.items() if k != "seconds"} for p in whole
+    ]
     one, other = weights(tmp_path / "whole"), weights(tmp_path / "parts")
     assert all(torch.equal(one[k], other[k]) for k in one)
 
@@ -306,10 +350,43 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
 
 def test_runs_that_two_studies_share_are_made_once():
     assert distinct([Job("full", "a2c"), Job("full", "a2c", passes=5), Job("weak", "a2c")]) == [
-        Job("full", "a2c", passes=5), Job("weak", "a2c")]
+        Job("full", "a2c", passes=5),
+        Job("weak", "a2c"),
+    ]
 
 
 def test_intervals_over_seeds_are_students():
     found = across_seeds([1.0, 2.0, 3.0])
     assert found.mean == 2.0 and found.half == pytest.approx(4.302653 / np.sqrt(3), rel=1e-5)
     assert np.isnan(across_seeds([1.0]).half)
+
+
+def test_pieces_leave_no_word_unknown_and_come_back_whole():
+    pytest.importorskip("sentencepiece")
+    sentences = [p.source.split() for p in toy_pairs(100)]
+    lexicon = build_pieces(sentences, 40)
+    again = lexicon_from_json(json.loads(json.dumps(lexicon.to_json())))
+    for words in sentences[:10]:
+        numbers = lexicon.encode(words)
+        assert numbers[-1] == END_NUMBER and 1 not in numbers
+        assert again.decode(numbers) == tuple(words)
+
+
+def test_without_sentencepiece_words_are_recommended(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sentencepiece", None)
+    with pytest.raises(UnableError, match="pip install sentencepiece.*--units words"):
+        build_pieces([["a"]], 40)
+
+
+def test_the_command_makes_a_corpus_of_own_text(tmp_path, capsys):
+    pairs = toy_pairs(60)
+    for name, side in (("t.de", "source"), ("t.en", "target")):
+        (tmp_path / name).write_text("".join(f"{getattr(p, side)}\n" for p in pairs), encoding="utf-8")
+    sizes = ["--supervised", "20", "--bandit", "10", "--dev", "5", "--test", "5", "--block", "4"]
+    files = ["--moses", str(tmp_path / "t.de"), str(tmp_path / "t.en")]
+    assert main(["corpus", "--out", str(tmp_path / "c"), *files, *sizes]) == 0
+    assert len(corpus.load(tmp_path / "c", ["supervised"])["supervised"]) == 20
+    assert main(["corpus", "--out", str(tmp_path / "d"), *files]) == 2
+    assert "too few" in capsys.readouterr().err
+    assert main(["ratings", "translate", "3.2", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "s")]) == 2
+    assert "embodied corpus" in capsys.readouterr().err

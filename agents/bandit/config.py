@@ -52,7 +52,9 @@ class BanditConfig:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         for name in ("source_words", "target_words"):
             if getattr(self, name) < 4:
-                raise ValueError(f"{name} must be at least 4, got {getattr(self, name)}: three stand for padding, unknown words and the end")
+                raise ValueError(
+                    f"{name} must be at least 4, got {getattr(self, name)}: for padding, unknown words and the end"
+                )
         for name in ("pretraining_rate", "bandit_rate", "clip", "checkpoint_minutes"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
@@ -64,7 +66,15 @@ class BanditConfig:
 
 
 SCALES: dict[str, BanditConfig] = {
-    "mini": BanditConfig(hidden_size=128, source_words=6000, target_words=3000, critic_passes=2, bandit_rate=5e-4),
+    "mini": BanditConfig(
+        hidden_size=128,
+        source_words=6000,
+        target_words=3000,
+        pretraining_passes=6,
+        critic_passes=2,
+        pretraining_rate=3e-3,
+        bandit_rate=1e-3,
+    ),
     "paper": BanditConfig(),
 }
 """'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the dissertation's corpora."""

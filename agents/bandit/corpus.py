@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.bandit.sizes import Sizes
 from assets.cache import digest, write_bytes, write_json
 from embodied.seeds import stream
 
@@ -34,22 +35,6 @@ class Pair:
     target: str
     document: str
     """What it was taken from; documents are never shared between splits that must not know each other."""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """How many pairs each split gets; the defaults are a ninth of the dissertation's (Table 3.1)."""
-
-    supervised: int = 20_000
-    """Pairs for supervised pre-training."""
-    bandit: int = 18_000
-    """Pairs of each bandit set."""
-    dev: int = 1_000
-    """Pairs to choose on, at least."""
-    test: int = 2_000
-    """Pairs to judge on, at least."""
-    overlap: float = 0.95
-    """Share of bandit_overlap that was seen in supervised training (the dissertation: over 95 %)."""
 
 
 Corpus = Mapping[str, Sequence[tuple[tuple[str, ...], tuple[str, ...]]]]
@@ -93,7 +78,12 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
     rng = stream(seed, "corpus", "documents")
     order = iter([names[i] for i in rng.permutation(len(names))])
     found: dict[str, list[Pair]] = {}
-    for name, wanted in (("test", sizes.test), ("dev", sizes.dev), ("supervised", sizes.supervised), ("bandit_disjoint", sizes.bandit)):
+    for name, wanted in (
+        ("test", sizes.test),
+        ("dev", sizes.dev),
+        ("supervised", sizes.supervised),
+        ("bandit_disjoint", sizes.bandit),
+    ):
         found[name] = []
         while len(found[name]) < wanted:
             document = next(order, None)
@@ -119,8 +109,11 @@ def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) ->
         for language, text in ((SOURCE, "source"), (TARGET, "target")):
             write_bytes(folder / f"{name}.{language}", "".join(f"{getattr(p, text)}\n" for p in pairs).encode())
         words = [len(p.target.split()) for p in pairs]
-        counts[name] = {"pairs": len(pairs), "documents": len({p.document for p in pairs}),
-                        "target words per sentence": round(sum(words) / len(words), 2)}
+        counts[name] = {
+            "pairs": len(pairs),
+            "documents": len({p.document for p in pairs}),
+            "target words per sentence": round(sum(words) / len(words), 2),
+        }
     write_json(folder / "corpus.json", {"format": FORMAT, **facts, "splits": counts}, indent=1)
 
 
@@ -151,7 +144,9 @@ def moses_lines(path: Path) -> list[str]:
     """
     path = Path(path)
     if not path.is_file():
-        raise CorpusError(f"{path} is missing; make a corpus with `embodied corpus`, or put your own file there, one sentence a line")
+        raise CorpusError(
+            f"{path} is missing; make a corpus with `embodied corpus`, or put your own file there, one sentence a line"
+        )
     data = path.read_bytes()
     try:
         text = data.decode("utf-8")
@@ -168,7 +163,10 @@ def paired(source: Sequence[str], target: Sequence[str], source_path: Path, targ
       CorpusError: of different length, empty, or with an empty sentence.
     """
     if len(source) != len(target):
-        raise CorpusError(f"{source_path} has {len(source)} lines, {target_path} {len(target)}; line n of one must translate line n of the other")
+        raise CorpusError(
+            f"{source_path} has {len(source)} lines, {target_path} {len(target)}; "
+            "line n of one must translate line n of the other"
+        )
     if not source:
         raise CorpusError(f"{source_path} is empty; it must hold one sentence a line")
     for number, (a, b) in enumerate(zip(source, target, strict=True), 1):
@@ -189,7 +187,9 @@ def corpus_digest(folder: Path, names: Sequence[str]) -> str:
     return digest(*(Path(folder) / f"{name}.{language}" for name in names for language in (SOURCE, TARGET)))
 
 
-def make_corpus(pairs: Sequence[Pair], folder: Path, sizes: Sizes, *, seed: int, note: Callable[[str], None], **facts: object) -> None:
+def make_corpus(
+    pairs: Sequence[Pair], folder: Path, sizes: Sizes, *, seed: int, note: Callable[[str], None], **facts: object
+) -> None:
     """Filter, split and save `pairs`, and say how many there are."""
     kept = filtered(pairs)
     note(f"{len(pairs)} pairs, {len(kept)} after the filter, in {len({p.document for p in kept})} documents")

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from assets.cache import atomic_path
-from embodied.tables import Estimate
+from embodied.evaluation.tables import Estimate
 
 BLUE, GREY = "#2b6cb0", "#a0aec0"
 LABELS = {"granularity": "steps of the scale g", "variance": "variance λ", "skew": "skew ρ"}
@@ -19,7 +20,14 @@ def curves_figure(curves: Mapping[str, Sequence[Estimate]], path: Path) -> None:
     """Figure 3.4: gain against passes over the rated set, one panel per score."""
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     for axes, (name, curve) in zip(figure.subplots(1, len(curves)), curves.items(), strict=True):
-        axes.errorbar(range(1, len(curve) + 1), [e.mean for e in curve], [_half(e) for e in curve], marker="o", capsize=3, color=BLUE)
+        axes.errorbar(
+            range(1, len(curve) + 1),
+            [e.mean for e in curve],
+            [_half(e) for e in curve],
+            marker="o",
+            capsize=3,
+            color=BLUE,
+        )
         axes.axhline(0, color=GREY, linewidth=1)
         axes.set_xlabel("pass over the rated sentences")
         axes.set_ylabel(f"Δ {name}")
@@ -48,13 +56,21 @@ def gains_figure(
     _save(figure, path)
 
 
-def _panel(axes, values: Mapping[float, Mapping[str, Estimate]], score: str, band: Estimate) -> None:
+def _panel(axes: Axes, values: Mapping[float, Mapping[str, Estimate]], score: str, band: Estimate) -> None:
     """One perturbation at all strengths, side by side at equal distances."""
     at = range(len(values))
     axes.axhspan(band.mean - _half(band), band.mean + _half(band), color=GREY, alpha=0.35, label="clean rater")
     axes.axhline(band.mean, color=GREY, linewidth=1)
-    axes.errorbar(at, [e[score].mean for e in values.values()], [_half(e[score]) for e in values.values()],
-                  marker="o", markersize=4, capsize=3, color=BLUE, label="this rater")
+    axes.errorbar(
+        at,
+        [e[score].mean for e in values.values()],
+        [_half(e[score]) for e in values.values()],
+        marker="o",
+        markersize=4,
+        capsize=3,
+        color=BLUE,
+        label="this rater",
+    )
     axes.axhline(0, color="black", linewidth=0.8)
     axes.set_xticks(at, [f"{v:g}" for v in values])
     axes.grid(alpha=0.3)

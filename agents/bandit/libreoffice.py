@@ -46,7 +46,9 @@ def fetch(folder: Path) -> Path:
     done = subprocess.run(["apt-get", "download", *missing], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         reason = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
-        raise UnableError(f"apt-get could not download {', '.join(missing)} ({reason}); try `apt-get update`, or {BY_HAND}")
+        raise UnableError(
+            f"apt-get could not download {', '.join(missing)} ({reason}); try `apt-get update`, or {BY_HAND}"
+        )
     return folder
 
 
@@ -98,7 +100,7 @@ def _unpack(path: Path, root: Path) -> None:
 
 
 def _help(folder: Path) -> Iterator[Pair]:
-    """Headings and paragraphs of the help, sentence by sentence where both languages have as many; a page is a document.
+    """Headings and paragraphs of the help, by sentences where both languages have as many; a page is a document.
 
     Both languages of a page are made from one source, so its blocks come in the same order; where
     their ids differ nevertheless, the block is left out.
@@ -113,12 +115,19 @@ def _help(folder: Path) -> Iterator[Pair]:
 
 
 def _blocks(page: Path) -> list[tuple[str, str]]:
-    """(id, text without markup) of the headings and paragraphs of a page; many have no id, other ids are of the page's frame."""
+    """(id, text without markup) of the headings and paragraphs of a page.
+
+    Many have no id; other ids than these are of the page's frame.
+    """
     try:
         body = lxml.html.fromstring(page.read_bytes().decode("utf-8"))
     except (UnicodeDecodeError, lxml.etree.ParserError) as e:
         raise CorpusError(f"{page}: not a page of the help ({e}); fetch the packages again") from e
-    blocks = [e for e in body.iter("p", "h1", "h2", "h3", "h4", "h5", "h6") if e.get("class") != "bug" and _OWN.match(e.get("id", ""))]
+    blocks = [
+        e
+        for e in body.iter("p", "h1", "h2", "h3", "h4", "h5", "h6")
+        if e.get("class") != "bug" and _OWN.match(e.get("id", ""))
+    ]
     return [(e.get("id", ""), " ".join(e.text_content().split())) for e in blocks]
 
 

@@ -19,6 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from agents.bandit.a2c import Rated, actor_loss, critic_loss, descend
+from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
 from agents.bandit.runs import Note, Run
 from agents.hanna.agent import HannaAgent, save_agent
@@ -28,45 +29,11 @@ from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
 from agents.imitation.collect import action_index
 from agents.imitation.training import Split, stop_signal, tasks_of_update
 from assets.cache import digest
-from embodied import metrics
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
 from embodied.interface import Action, Ask, Episode, Intention, Observation
-from embodied.rollout import play
+from embodied.navigation.graph import NavGraph
 from embodied.seeds import stream
-
-SCORES = ("success", "nDTW")
-"""What a person's stars are simulated from."""
-
-
-@dataclass(frozen=True)
-class RatingConfig:
-    """Settings of learning to navigate from ratings."""
-
-    updates: int = 100
-    """Updates of the weights."""
-    batch: int = 32
-    """Episodes per update, each rated once."""
-    learning_rate: float = 1e-4
-    """Adam's, of the agent; the dissertation's for translators."""
-    critic_rate: float = 1e-3
-    """Adam's, of the critic, which begins untaught."""
-    critic_updates: int = 10
-    """First updates, in which the critic learns alone."""
-    score: str = "nDTW"
-    """What a rating is made from: 'success', or 'nDTW' of the walk against the shortest one."""
-    clip: float = 5.0
-    """Longest gradient."""
-    seed: int = 0
-    """Of everything that is drawn."""
-
-    def __post_init__(self) -> None:
-        if self.score not in SCORES:
-            raise ValueError(f"score must be one of {SCORES}, got {self.score!r}")
-        for name in ("updates", "batch"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("learning_rate", "critic_rate", "clip"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
 
 class StateCritic(nn.Module):
@@ -104,14 +71,23 @@ class Watching:
         self.decided: list[Decided] = []
 
     def act(
-        self, observations: Sequence[Observation | None], memory: HannaMemory | None, *, rngs: Sequence[np.random.Generator]
+        self,
+        observations: Sequence[Observation | None],
+        memory: HannaMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
     ) -> tuple[list[Action | None], HannaMemory]:
         actions, memory = self.policy.act(observations, memory, rngs=rngs)
         if memory.positions:
             running = [(observations[p], actions[p]) for p in memory.positions]
             scores = memory.moments[-1].scores
-            self.decided.append(Decided(memory.positions, decision_log_probability(scores.navigation, scores.ask, running),
-                                        memory.networks[0].intra_states[:, -1].detach()))
+            self.decided.append(
+                Decided(
+                    memory.positions,
+                    decision_log_probability(scores.navigation, scores.ask, running),
+                    memory.networks[0].intra_states[:, -1].detach(),
+                )
+            )
         return actions, dataclasses.replace(memory, moments=())
 
 
@@ -131,7 +107,7 @@ def decision_log_probability(moves: Tensor, asks: Tensor, decisions: Sequence[tu
     return move + ask
 
 
-def score_of(episode: Episode, graph, kind: str) -> float:
+def score_of(episode: Episode, graph: NavGraph, kind: str) -> float:
     """The true score of an episode in [0, 1], which only the rater sees."""
     if kind == "success":
         return metrics.success(episode, graph)
@@ -140,7 +116,7 @@ def score_of(episode: Episode, graph, kind: str) -> float:
     return metrics.ndtw(metrics.without_repeats(episode.nodes), shortest_path(graph, start, goal), graph)
 
 
-def shortest_path(graph, start: int, goal: int) -> tuple[int, ...]:
+def shortest_path(graph: NavGraph, start: int, goal: int) -> tuple[int, ...]:
     path = [start]
     while path[-1] != goal:
         path.append(int(graph.next_hop[path[-1], goal]))
@@ -161,7 +137,14 @@ def rated(decided: Sequence[Decided], critic: StateCritic, ratings: Sequence[flo
 
 
 def learn_from_stars(
-    agent: HannaAgent, split: Split, rater: Rater, config: RatingConfig, folder: Path, *, begun_with: str, note: Note = print
+    agent: HannaAgent,
+    split: Split,
+    rater: Rater,
+    config: RatingConfig,
+    folder: Path,
+    *,
+    begun_with: str,
+    note: Note = print,
 ) -> list[dict[str, float]]:
     """Fine-tune `agent` in place by ratings of episodes in the houses of `split`; resumable.
 
@@ -175,10 +158,17 @@ def learn_from_stars(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(stream(config.seed, "begin", "state critic").integers(2**31)))
         critic.apply(lambda layer: layer.reset_parameters() if isinstance(layer, nn.Linear) else None)
-    optimizers = {"agent": torch.optim.Adam(agent.network.parameters(), config.learning_rate),
-                  "critic": torch.optim.Adam(critic.parameters(), config.critic_rate)}
+    optimizers = {
+        "agent": torch.optim.Adam(agent.network.parameters(), config.learning_rate),
+        "critic": torch.optim.Adam(critic.parameters(), config.critic_rate),
+    }
     kept = {k: v for k, v in dataclasses.asdict(config).items() if k != "updates"}
-    run = Run(folder, {**kept, "rater": dataclasses.asdict(rater), "agent": begun_with}, {"agent": agent.network, "critic": critic}, optimizers)
+    run = Run(
+        folder,
+        {**kept, "rater": dataclasses.asdict(rater), "agent": begun_with},
+        {"agent": agent.network, "critic": critic},
+        optimizers,
+    )
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
     with stop_signal() as stop:
@@ -189,7 +179,10 @@ def learn_from_stars(
             if run.update % 10 == 0 or run.update == config.updates or stop.is_set():
                 run.save()
                 last = run.history[-10:]
-                note(f"{folder}: {run.update}/{config.updates}, " + ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers))
+                note(
+                    f"{folder}: {run.update}/{config.updates}, "
+                    + ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers)
+                )
             if stop.is_set():
                 raise KeyboardInterrupt
     save_agent(agent, Path(folder) / "agent.safetensors")
@@ -197,14 +190,26 @@ def learn_from_stars(
 
 
 def _learn_once(
-    agent: HannaAgent, policy: HannaPolicy, critic: StateCritic, optimizers: Mapping[str, torch.optim.Optimizer], split: Split,
-    rater: Rater, config: RatingConfig, update: int,
+    agent: HannaAgent,
+    policy: HannaPolicy,
+    critic: StateCritic,
+    optimizers: Mapping[str, torch.optim.Optimizer],
+    split: Split,
+    rater: Rater,
+    config: RatingConfig,
+    update: int,
 ) -> dict[str, float]:
     """Play, be rated, learn; returns means over the episodes."""
     tasks = tasks_of_update(split.tasks, update, config.batch, config.seed)
     tasks = [dataclasses.replace(t, horizon=agent.config.training_steps) for t in tasks]
     watching = Watching(policy)
-    episodes = play(split.make_env, watching, tasks, seed=int(stream(config.seed, "update", update).integers(2**31)), batch=len(tasks))
+    episodes = play(
+        split.make_env,
+        watching,
+        tasks,
+        seed=int(stream(config.seed, "update", update).integers(2**31)),
+        batch=len(tasks),
+    )
     scores = [score_of(e, split.worlds[e.task.world].graph, config.score) for e in episodes]
     rngs = [stream(config.seed, "stars", update, i) for i in range(len(episodes))]
     ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs, strict=True)]
@@ -215,8 +220,12 @@ def _learn_once(
         descend(actor_loss(found), optimizers["agent"], config.clip, f"{where}, agent")
     descend(loss, optimizers["critic"], config.clip, f"{where}, critic")
     success = [metrics.success(e, split.worlds[e.task.world].graph) for e in episodes]
-    return {"score": float(np.mean(scores)), "rating": float(np.mean(ratings)), "success": float(np.mean(success)),
-            "critic error": math.sqrt(2 * float(loss.detach()) * len(episodes) / int(found.mask.sum()))}
+    return {
+        "score": float(np.mean(scores)),
+        "rating": float(np.mean(ratings)),
+        "success": float(np.mean(success)),
+        "critic error": math.sqrt(2 * float(loss.detach()) * len(episodes) / int(found.mask.sum())),
+    }
 
 
 def fingerprint(agent: HannaAgent) -> str:

@@ -24,9 +24,10 @@ class Rater:
             raise ValueError(f"a rater's granularity, variance and skew must not be negative, got {self}")
 
     def rate(self, score: float, *, rng: np.random.Generator) -> float:
-        """One rating of a true score in [0, 1]; several perturbations are applied in the order skew, variance, granularity.
+        """One rating of a true score in [0, 1].
 
-        One draw is made whatever the settings are, so that raters can be compared on the same noise.
+        Several perturbations are applied in the order skew, variance, granularity. One draw is made
+        whatever the settings are, so that raters can be compared on the same noise.
         """
         noise = float(rng.standard_normal())
         rating = skewed(score, self.skew)
@@ -39,7 +40,7 @@ CLEAN = Rater()
 
 
 def granular(score: float, steps: int) -> float:
-    """Eq 3.8: the nearest of 0, 1/g, ..., 1; halves go up, as in the text's list of bins (Python's `round` would not)."""
+    """Eq 3.8: the nearest of 0, 1/g, ..., 1; halves go up, as in the text's bins (Python's `round` would not)."""
     return min(1.0, max(0.0, math.floor(steps * score + 0.5) / steps))
 
 

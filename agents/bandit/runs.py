@@ -27,8 +27,13 @@ class Run:
     Randomness needs no state: every draw is named by seed, pass and sentence.
     """
 
-    def __init__(self, folder: Path, identity: Mapping[str, object], modules: Mapping[str, nn.Module],
-                 optimizers: Mapping[str, torch.optim.Optimizer]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        identity: Mapping[str, object],
+        modules: Mapping[str, nn.Module],
+        optimizers: Mapping[str, torch.optim.Optimizer],
+    ) -> None:
         """Begin, or go on from the checkpoint in `folder`.
 
         Raises:
@@ -54,8 +59,13 @@ class Run:
     def save(self) -> None:
         """Write the checkpoint atomically; an interruption leaves the one before it."""
         body = {
-            "format": FORMAT, "identity": self.identity, "update": self.update, "seconds": self.seconds, "sums": self.sums,
-            "history": self.history, "modules": {k: m.state_dict() for k, m in self.modules.items()},
+            "format": FORMAT,
+            "identity": self.identity,
+            "update": self.update,
+            "seconds": self.seconds,
+            "sums": self.sums,
+            "history": self.history,
+            "modules": {k: m.state_dict() for k, m in self.modules.items()},
             "optimizers": {k: o.state_dict() for k, o in self.optimizers.items()},
         }
         with atomic_path(self.path) as temporary:
@@ -64,10 +74,14 @@ class Run:
 
     def _load(self) -> None:
         body = read_checkpoint(self.path)
-        changed = sorted(k for k in {*body["identity"], *self.identity} if body["identity"].get(k) != self.identity.get(k))
+        changed = sorted(
+            k for k in {*body["identity"], *self.identity} if body["identity"].get(k) != self.identity.get(k)
+        )
         if changed:
             pairs = ", ".join(f"{k} {body['identity'].get(k)!r} -> {self.identity.get(k)!r}" for k in changed)
-            raise CheckpointError(f"{self.path}: settings changed since this run began ({pairs}); restore them or use another folder")
+            raise CheckpointError(
+                f"{self.path}: settings changed since this run began ({pairs}); restore them or use another folder"
+            )
         for name, module in self.modules.items():
             module.load_state_dict(body["modules"][name])
         for name, optimizer in self.optimizers.items():
@@ -94,8 +108,17 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def run_passes(
-    run: Run, passes: int, lengths: Sequence[int], batch: int, *, seed: int, purpose: str, minutes: float, note: Note,
-    step: Callable[[np.ndarray, int], Mapping[str, float]], finish: Callable[[int, Mapping[str, float]], Mapping[str, float]],
+    run: Run,
+    passes: int,
+    lengths: Sequence[int],
+    batch: int,
+    *,
+    seed: int,
+    purpose: str,
+    minutes: float,
+    note: Note,
+    step: Callable[[np.ndarray, int], Mapping[str, float]],
+    finish: Callable[[int, Mapping[str, float]], Mapping[str, float]],
 ) -> list[dict[str, float]]:
     """Go on with `run` until it has had so many passes; returns what `finish` said of each.
 

@@ -23,7 +23,7 @@ from agents.bandit.figures import curves_figure, gains_figure
 from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
 from assets.cache import write_bytes, write_json
-from embodied.tables import Estimate
+from embodied.evaluation.tables import Estimate
 
 Note = Callable[[str], None]
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
@@ -86,7 +86,9 @@ def curve_jobs() -> list[Job]:
 
 
 def sweep_jobs(sweeps: Mapping[str, Sequence[float]] = SWEEPS) -> list[Job]:
-    raters = [Rater(**{name: int(v) if name == "granularity" else v}) for name, values in sweeps.items() for v in values]
+    raters = [
+        Rater(**{name: int(v) if name == "granularity" else v}) for name, values in sweeps.items() for v in values
+    ]
     return [Job("full", "reference"), Job("full", "a2c"), *(Job("full", "a2c", rater) for rater in raters)]
 
 
@@ -170,23 +172,39 @@ def _run(setting: Setting, seed: int, job: Job, note: Note) -> str:
     if history(setting, seed, job) is None:
         torch.set_num_threads(setting.threads)
         m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
-        bandit(m, home / "pretrain" / f"{job.reference}.safetensors", home / job.reference / "critic" / "critic.safetensors",
-               folder_of(setting, seed, job), job.learner, rater=job.rater, passes=job.passes, note=note)
+        bandit(
+            m,
+            home / "pretrain" / f"{job.reference}.safetensors",
+            home / job.reference / "critic" / "critic.safetensors",
+            folder_of(setting, seed, job),
+            job.learner,
+            rater=job.rater,
+            passes=job.passes,
+            note=note,
+        )
     last = history(setting, seed, job)[-1]
     return f"seed {seed}, {job.reference}, {job.name}: {SENTENCE} {last[SENTENCE]:.2f}, {HELD_OUT} {last[HELD_OUT]:.2f}"
 
 
 def _write_table(setting: Setting) -> Path:
-    lines = ["# Table 3.2: translation scores and their improvement by one round of ratings", "",
-             "| | reference | Δ supervised | Δ NED-A2C |", "|---|---|---|---|"]
+    lines = [
+        "# Table 3.2: translation scores and their improvement by one round of ratings",
+        "",
+        "| | reference | Δ supervised | Δ NED-A2C |",
+        "|---|---|---|---|",
+    ]
     facts = {}
     for reference in REFERENCES:
         for column in (SENTENCE, HELD_OUT):
             base = [history(setting, s, Job(reference, "reference"))[0][column] for s in setting.repeats]
-            found = [across_seeds(v) for v in (base, *(gains(setting, Job(reference, x), column) for x in LEARNERS[1:]))]
+            found = [
+                across_seeds(v) for v in (base, *(gains(setting, Job(reference, x), column) for x in LEARNERS[1:]))
+            ]
             facts[f"{reference}, {column}"] = [dataclasses.asdict(e) for e in found]
             cells = [f"{shown(e)} ({p})" for e, p in zip(found, PRINTED[reference, column], strict=True)]
-            lines.append(f"| {'fully' if reference == 'full' else 'weakly'} pre-trained, {column} | " + " | ".join(cells) + " |")
+            lines.append(
+                f"| {'fully' if reference == 'full' else 'weakly'} pre-trained, {column} | " + " | ".join(cells) + " |"
+            )
     write_json(setting.out / "table_3.2.json", facts, indent=1)
     return _markdown(setting, "table_3.2.md", lines)
 
@@ -195,11 +213,19 @@ def _write_curves(setting: Setting) -> Path:
     job = Job("full", "a2c", passes=PASSES)
     curves = {c: [across_seeds(gains(setting, job, c, turn)) for turn in range(PASSES)] for c in (SENTENCE, HELD_OUT)}
     curves_figure(curves, setting.out / "figure_3.4.png")
-    lines = ["# Figure 3.4: NED-A2C for five passes, gain over the fully pre-trained reference", "",
-             "| | " + " | ".join(f"pass {k + 1}" for k in range(PASSES)) + " |", "|---|" + "---|" * PASSES]
+    lines = [
+        "# Figure 3.4: NED-A2C for five passes, gain over the fully pre-trained reference",
+        "",
+        "| | " + " | ".join(f"pass {k + 1}" for k in range(PASSES)) + " |",
+        "|---|" + "---|" * PASSES,
+    ]
     lines += [f"| Δ {c} | " + " | ".join(shown(e) for e in curve) + " |" for c, curve in curves.items()]
-    write_json(setting.out / "figure_3.4.json", {c: [dataclasses.asdict(e) for e in v] for c, v in curves.items()}, indent=1)
-    return _markdown(setting, "figure_3.4.md", [*lines, "", "The dissertation (De-En): +6.73 per-sentence BLEU in the fifth pass."])
+    write_json(
+        setting.out / "figure_3.4.json", {c: [dataclasses.asdict(e) for e in v] for c, v in curves.items()}, indent=1
+    )
+    return _markdown(
+        setting, "figure_3.4.md", [*lines, "", "The dissertation (De-En): +6.73 per-sentence BLEU in the fifth pass."]
+    )
 
 
 def _write_sweeps(setting: Setting) -> Path:
@@ -216,16 +242,25 @@ def _write_sweeps(setting: Setting) -> Path:
             else:
                 found[name][value] = {c: across_seeds(v) for c, v in each.items()}
     gains_figure(found, clean, setting.out / "figure_3.5.png")
-    lines = ["# Figure 3.5: gain by NED-A2C under imperfect ratings", "",
-             f"| rater | Δ {SENTENCE} | share of the clean rater's | Δ {HELD_OUT} |", "|---|---|---|---|",
-             f"| clean | {shown(clean[SENTENCE])} | 100 % | {shown(clean[HELD_OUT])} |"]
+    lines = [
+        "# Figure 3.5: gain by NED-A2C under imperfect ratings",
+        "",
+        f"| rater | Δ {SENTENCE} | share of the clean rater's | Δ {HELD_OUT} |",
+        "|---|---|---|---|",
+        f"| clean | {shown(clean[SENTENCE])} | 100 % | {shown(clean[HELD_OUT])} |",
+    ]
     for name, values in found.items():
         for value, e in values.items():
             share = 100 * e[SENTENCE].mean / clean[SENTENCE].mean
             lines.append(f"| {name} {value:g} | {shown(e[SENTENCE])} | {share:.0f} % | {shown(e[HELD_OUT])} |")
-    write_json(setting.out / "figure_3.5.json", {
-        name: {f"{value:g}": {c: dataclasses.asdict(x) for c, x in e.items()} for value, e in values.items()} for name, values in found.items()
-    }, indent=1)
+    write_json(
+        setting.out / "figure_3.5.json",
+        {
+            name: {f"{value:g}": {c: dataclasses.asdict(x) for c, x in e.items()} for value, e in values.items()}
+            for name, values in found.items()
+        },
+        indent=1,
+    )
     return _markdown(setting, "figure_3.5.md", lines + (["", f"Not run yet: {', '.join(missing)}."] if missing else []))
 
 
@@ -236,13 +271,18 @@ def shown(e: Estimate) -> str:
 
 def _markdown(setting: Setting, name: str, lines: Sequence[str]) -> Path:
     c = setting.config
-    splits = json.loads((setting.data / "corpus.json").read_text())["splits"] if (setting.data / "corpus.json").exists() else {}
+    splits = (
+        json.loads((setting.data / "corpus.json").read_text())["splits"]
+        if (setting.data / "corpus.json").exists()
+        else {}
+    )
     sizes = ", ".join(f"{s} {splits[s]['pairs']:,}" for s in ("supervised", c.bandit_set, "dev", "test") if s in splits)
     how = (
-        f"Pairs: {sizes}. Hidden size {c.hidden_size}, {c.source_words:,} and {c.target_words:,} {c.units}, {c.pretraining_passes} passes of "
-        f"pre-training, {c.critic_passes} of the critic, learning rate {c.bandit_rate:g} with ratings. Mean over seeds "
-        f"{', '.join(map(str, setting.repeats))}, each with its own pre-training, and Student's 95 % interval; differences are taken "
-        "seed by seed. In brackets the dissertation's numbers (De-En TED talks, hidden size 500, 167,000 ratings): comparable in shape, not in level."
+        f"Pairs: {sizes}. Hidden size {c.hidden_size}, {c.source_words:,} and {c.target_words:,} {c.units}, "
+        f"{c.pretraining_passes} passes of pre-training at {c.pretraining_rate:g}, {c.critic_passes} of the critic, "
+        f"learning rate {c.bandit_rate:g} with ratings. Mean over seeds {', '.join(map(str, setting.repeats))}, each "
+        "with its own pre-training, and Student's 95 % interval; differences are taken seed by seed. In brackets the "
+        "dissertation's numbers (De-En TED talks, hidden size 500, 167,000 ratings): comparable in shape, not in level."
     )
     path = setting.out / name
     write_bytes(path, "\n".join([*lines, "", how, ""]).encode())

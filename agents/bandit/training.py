@@ -1,8 +1,8 @@
 """The three stages of BANDITNMT (3.1.5.1): pre-training the translator, then its critic, then learning from ratings.
 
-    pretrain    supervised, Eq A.7                       -> weak.safetensors (one pass), full.safetensors (lowest dev perplexity)
+    pretrain      supervised, Eq A.7 -> weak.safetensors (one pass), full.safetensors (lowest dev perplexity)
     teach_critic  the critic, on translations sampled from the frozen translator
-    bandit      NED-A2C (Algorithm 2), or its two controls: learning nothing, learning from references
+    bandit        NED-A2C (Algorithm 2), or its two controls: learning nothing, learning from references
 
 Every draw is named by seed, pass and sentence, so a stage that was stopped goes on exactly as if it
 had not been.
@@ -35,8 +35,19 @@ from embodied.seeds import stream
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
 REFERENCES = ("full", "weak")
-_PRETRAINING = ("hidden_size", "units", "source_words", "target_words", "longest", "batch", "pretraining_passes", "decay_from",
-                "pretraining_rate", "clip", "seed")
+_PRETRAINING = (
+    "hidden_size",
+    "units",
+    "source_words",
+    "target_words",
+    "longest",
+    "batch",
+    "pretraining_passes",
+    "decay_from",
+    "pretraining_rate",
+    "clip",
+    "seed",
+)
 """Settings that decide what pre-training gives."""
 
 
@@ -61,7 +72,11 @@ class Material:
 
     def identity(self, *fields: str, **more: object) -> dict[str, object]:
         """What a stage depends on: settings by name, and the corpus."""
-        return {"corpus": self.digest, **{name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}, **more}
+        return {
+            "corpus": self.digest,
+            **{name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)},
+            **more,
+        }
 
     def _generator(self, name: str) -> torch.Generator:
         return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
@@ -76,8 +91,10 @@ def material(folder: Path, config: BanditConfig) -> Material:
     names = ("supervised", "dev", "test")
     corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
     build = BUILDERS[config.units]
-    lexicons = (build([a for a, _ in corpus["supervised"]], config.source_words),
-                build([b for _, b in corpus["supervised"]], config.target_words))
+    lexicons = (
+        build([a for a, _ in corpus["supervised"]], config.source_words),
+        build([b for _, b in corpus["supervised"]], config.target_words),
+    )
     splits = {name: numbered(pairs, *lexicons) for name, pairs in corpus.items()}
     return Material(config, splits, lexicons, corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,)))
 
@@ -109,14 +126,18 @@ def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str,
         if turn + 1 >= config.decay_from and before and found > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
-        return {"loss": sums["loss"] / sums["sentences"], "dev perplexity": found, "dev BLEU": judged(translator, m, "dev"),
-                "learning rate": optimizer.param_groups[0]["lr"]}
+        return {
+            "loss": sums["loss"] / sums["sentences"],
+            "dev perplexity": found,
+            "dev BLEU": judged(translator, m, "dev"),
+            "learning rate": optimizer.param_groups[0]["lr"],
+        }
 
     return _passes(run, m, data, "pretrain", config.pretraining_passes, step, finish, note)
 
 
 def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
-    """Teach a critic what ratings the translator in `reference` gets, by Eq 3.7; writes critic.safetensors into `folder`.
+    """Teach a critic what ratings the translator in `reference` gets (Eq 3.7); writes critic.safetensors.
 
     Ratings are unperturbed here, as in the text (3.1.5.1).
     """
@@ -145,7 +166,14 @@ def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = pri
 
 
 def bandit(
-    m: Material, reference: Path, critic_file: Path, folder: Path, learner: str, *, rater: Rater = CLEAN, passes: int = 1,
+    m: Material,
+    reference: Path,
+    critic_file: Path,
+    folder: Path,
+    learner: str,
+    *,
+    rater: Rater = CLEAN,
+    passes: int = 1,
     note: Note = print,
 ) -> list[dict[str, float]]:
     """Passes over the bandit set; each sentence is translated once per pass, before it is learned from.
@@ -166,8 +194,15 @@ def bandit(
     if learner == "a2c":
         load_weights(critic, critic_file)
         modules["critic"], optimizers["critic"] = critic, adam(critic, config.bandit_rate)
-    about = m.identity("critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, reference=reference.stem,
-                       learner=learner, rater=dataclasses.asdict(rater))
+    about = m.identity(
+        "critic_passes",
+        "bandit_rate",
+        "bandit_set",
+        ratings=m.bandit_digest,
+        reference=reference.stem,
+        learner=learner,
+        rater=dataclasses.asdict(rater),
+    )
     run = Run(folder, about, modules, optimizers)
 
     def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
@@ -179,22 +214,36 @@ def bandit(
             loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
             descend(loss, optimizers["translator"], config.clip, where)
         if learner == "a2c":
-            ratings = [rater.rate(s, rng=stream(config.seed, "rating", turn, int(i))) for s, i in zip(scores, chosen, strict=True)]
-            learn_from_ratings(translator, critic, optimizers, rows(data.source, chosen), padded(said), ratings, config.clip, where)
+            ratings = [
+                rater.rate(s, rng=stream(config.seed, "rating", turn, int(i)))
+                for s, i in zip(scores, chosen, strict=True)
+            ]
+            learn_from_ratings(
+                translator, critic, optimizers, rows(data.source, chosen), padded(said), ratings, config.clip, where
+            )
             numbers["rating"] = float(sum(ratings))
         return numbers
 
     def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
-        found = {"per-sentence BLEU": 100 * sums["score"] / sums["sentences"], "held-out BLEU": judged(translator, m, "test"),
-                 "dev BLEU": judged(translator, m, "dev")}
+        found = {
+            "per-sentence BLEU": 100 * sums["score"] / sums["sentences"],
+            "held-out BLEU": judged(translator, m, "test"),
+            "dev BLEU": judged(translator, m, "dev"),
+        }
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
     return _passes(run, m, data, "bandit", passes, step, finish, note)
 
 
 def learn_from_ratings(
-    translator: Translator, critic: Critic, optimizers: Mapping[str, torch.optim.Optimizer], source: Tensor, said: Tensor,
-    ratings: Sequence[float], clip: float, where: str,
+    translator: Translator,
+    critic: Critic,
+    optimizers: Mapping[str, torch.optim.Optimizer],
+    source: Tensor,
+    said: Tensor,
+    ratings: Sequence[float],
+    clip: float,
+    where: str,
 ) -> None:
     """Lines 5 and 6 of Algorithm 2, for a batch of sampled translations `said` (B, T)."""
     rated = Rated(translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0)
@@ -207,8 +256,10 @@ def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> T
     return -translator(source, target).sum() / len(source)
 
 
-def sampled(translator: Translator, m: Material, data: Numbered, chosen: np.ndarray, purpose: str, turn: int) -> list[list[int]]:
-    """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners that are compared draw alike."""
+def sampled(
+    translator: Translator, m: Material, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
+) -> list[list[int]]:
+    """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners draw alike."""
     longest = m.config.longest
     uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
     return decode(translator, rows(data.source, chosen), drawn_with(uniforms), longest)
@@ -233,7 +284,19 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
     return torch.optim.Adam(module.parameters(), rate, fused=True)
 
 
-def _passes(run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Callable, finish: Callable, note: Note):
+def _passes(
+    run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Callable, finish: Callable, note: Note
+) -> list[dict[str, float]]:
     config = m.config
-    return run_passes(run, passes, [len(s) for s in data.source], config.batch, seed=config.seed, purpose=purpose,
-                      minutes=config.checkpoint_minutes, note=note, step=step, finish=finish)
+    return run_passes(
+        run,
+        passes,
+        [len(s) for s in data.source],
+        config.batch,
+        seed=config.seed,
+        purpose=purpose,
+        minutes=config.checkpoint_minutes,
+        note=note,
+        step=step,
+        finish=finish,
+    )

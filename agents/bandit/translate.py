@@ -34,7 +34,9 @@ class Numbered:
 
 def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Lexicon, target: Lexicon) -> Numbered:
     """`pairs` in the numbers of two lexicons."""
-    return Numbered([source.encode(a) for a, _ in pairs], [target.encode(b) for _, b in pairs], [tuple(b) for _, b in pairs])
+    return Numbered(
+        [source.encode(a) for a, _ in pairs], [target.encode(b) for _, b in pairs], [tuple(b) for _, b in pairs]
+    )
 
 
 def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
@@ -104,11 +106,15 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
     return [[n for n in row if n != PAD_NUMBER] for row in said.tolist()]
 
 
-def greedy(translator: Translator, data: Numbered, lexicon: Lexicon, longest: int, batch: int = 128) -> list[tuple[str, ...]]:
+def greedy(
+    translator: Translator, data: Numbered, lexicon: Lexicon, longest: int, batch: int = 128
+) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
     found: list[tuple[str, ...]] = [()] * len(data)
     for chosen in in_order([len(s) for s in data.source], batch):
-        for i, numbers in zip(chosen, decode(translator, padded([data.source[i] for i in chosen]), likeliest, longest), strict=True):
+        for i, numbers in zip(
+            chosen, decode(translator, padded([data.source[i] for i in chosen]), likeliest, longest), strict=True
+        ):
             found[i] = lexicon.decode(numbers)
     return found
 

@@ -6,9 +6,10 @@ import collections
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Protocol
 
-from agents.vocabulary import END, PAD, UNKNOWN, Vocabulary
+from agents.hanna.vocabulary import END, PAD, UNKNOWN, Vocabulary
 from embodied.errors import UnableError
 
 PAD_NUMBER, UNKNOWN_NUMBER, END_NUMBER = 0, 1, 2
@@ -89,11 +90,19 @@ def build_pieces(sentences: Iterable[Sequence[str]], most: int) -> Pieces:
       UnableError: sentencepiece is not installed.
       ValueError: too few sentences for so many pieces.
     """
-    buffer = io.BytesIO()
+    buffer, trainer = io.BytesIO(), _sentencepiece().SentencePieceTrainer
     try:
-        _sentencepiece().SentencePieceTrainer.train(
-            sentence_iterator=iter(" ".join(s) for s in sentences), model_writer=buffer, vocab_size=most, model_type="bpe",
-            pad_id=PAD_NUMBER, unk_id=UNKNOWN_NUMBER, eos_id=END_NUMBER, bos_id=-1, num_threads=1, minloglevel=2,
+        trainer.train(
+            sentence_iterator=iter(" ".join(s) for s in sentences),
+            model_writer=buffer,
+            vocab_size=most,
+            model_type="bpe",
+            pad_id=PAD_NUMBER,
+            unk_id=UNKNOWN_NUMBER,
+            eos_id=END_NUMBER,
+            bos_id=-1,
+            num_threads=1,
+            minloglevel=2,
         )
     except RuntimeError as e:
         raise ValueError(f"{most} pieces cannot be made of these sentences ({e}); ask for fewer") from e
@@ -110,9 +119,11 @@ def lexicon_from_json(body: dict[str, object]) -> Lexicon:
     return Pieces(bytes.fromhex(body["model"]))
 
 
-def _sentencepiece():
+def _sentencepiece() -> ModuleType:
     try:
         import sentencepiece  # optional
     except ImportError as e:
-        raise UnableError("pieces need the library sentencepiece, which is not installed; `pip install sentencepiece`, or use --units words") from e
+        raise UnableError(
+            "pieces need the library sentencepiece; `pip install sentencepiece`, or use --units words"
+        ) from e
     return sentencepiece

@@ -31,10 +31,12 @@ COMMANDS = (
     "view",
     "dataset",
     "features",
+    "corpus",
     "train",
     "eval",
     "judge",
     "study",
+    "ratings",
     "bench",
 )
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from agents.imitation.config import SCALES, TrainingConfig
@@ -52,7 +52,9 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = ()) -> None:
+def add_fields(
+    parser: argparse.ArgumentParser, config: type, skip: Sequence[str] = (), scales: Mapping[str, object] = SCALES
+) -> None:
     """One option per field of a configuration, explained by the sentence below the field; without it, the field
     keeps its default, or that of --scale."""
     hints, helps = typing.get_type_hints(config), field_docs(config)
@@ -61,7 +63,7 @@ def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str
             continue
         option, text = (
             f"--{f.name.replace('_', '-')}",
-            f"{helps[f.name]} (default: {default_of(config, f)})".replace("%", "%%"),
+            f"{helps[f.name]} (default: {default_of(config, f, scales)})".replace("%", "%%"),
         )
         if hints[f.name] is bool:
             parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
@@ -69,9 +71,9 @@ def add_fields(parser: argparse.ArgumentParser, config: type, skip: Sequence[str
             parser.add_argument(option, type=hints[f.name], default=None, metavar=METAVARS[hints[f.name]], help=text)
 
 
-def default_of(config: type, field: dataclasses.Field) -> str:
+def default_of(config: type, field: dataclasses.Field, scales: Mapping[str, object]) -> str:
     """The field's default in words, for every --scale where they differ."""
-    of_scale = {name: getattr(c, field.name) for name, c in sorted(SCALES.items()) if isinstance(c, config)}
+    of_scale = {name: getattr(c, field.name) for name, c in sorted(scales.items()) if isinstance(c, config)}
     if len(set(of_scale.values())) > 1:
         return ", ".join(f"{name}: {value}" for name, value in of_scale.items())
     return str(field.default)

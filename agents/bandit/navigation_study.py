@@ -1,0 +1,195 @@
+"""Navigation from ratings, studied: gain against granularity, noise and skew, in houses that were not rated."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from agents.bandit.figures import gains_figure
+from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
+from agents.bandit.rating_config import RatingConfig
+from agents.bandit.ratings import CLEAN, Rater
+from agents.hanna.agent import HannaAgent, load_agent
+from agents.imitation.run import split_of
+from agents.imitation.training import Split
+from agents.vision.encoder import Encoder
+from assets.cache import write_bytes, write_json
+from embodied.datasets.store import Dataset
+from embodied.evaluation import metrics
+from embodied.evaluation.evaluate import spread
+from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import Estimate, estimate
+from embodied.interface import Episode
+from embodied.records import load_lines, save_lines
+
+Note = Callable[[str], None]
+SWEEPS: Mapping[str, Sequence[float]] = {
+    "granularity": (1, 2, 4, 9),
+    "variance": (0.5, 1, 2, 5),
+    "skew": (0.25, 0.5, 2, 4),
+}
+"""A granularity of 4 is one to five stars, of 9 one to ten."""
+COLUMNS = ("success", "nDTW", "requests")
+
+
+@dataclass(frozen=True)
+class NavigationSetting:
+    """What all runs share."""
+
+    data: Path
+    encoder: Encoder
+    agent: Path
+    """The imitation-trained agent that all begin with."""
+    out: Path
+    config: RatingConfig
+    seeds: tuple[int, ...]
+    """One run of each rater per seed."""
+    split: str = "test_unseen"
+    """Whose houses are judged in; nobody rated an episode there."""
+    tasks: int | None = None
+    """Judge on at most so many tasks."""
+    threads: int = 1
+
+
+def raters() -> dict[str, Rater]:
+    """By name: 'clean', and each perturbation at each strength."""
+    swept = {
+        f"{name} {value:g}": Rater(**{name: int(value) if name == "granularity" else value})
+        for name, values in SWEEPS.items()
+        for value in values
+    }
+    return {"clean": CLEAN, **swept}
+
+
+def run_navigation_study(setting: NavigationSetting, only: Sequence[str] | None = None, *, note: Note = print) -> Path:
+    """Run and judge what is missing; write table and figure of all that is there; returns the table's path.
+
+    Raises:
+      ValueError: an unknown rater, or a data set without the agent's features.
+    """
+    known, wanted = raters(), list(only or raters())
+    if unknown := [name for name in wanted if name not in known]:
+        raise ValueError(f"unknown raters {unknown}; there are {list(known)}")
+    torch.set_num_threads(setting.threads)
+    data = Dataset(setting.data)
+    rated, judged = split_of(data, "train", setting.encoder), split_of(data, setting.split, setting.encoder)
+    _judge(setting, judged, None, None, note)
+    for seed in setting.seeds:
+        for name in wanted:
+            _learn(setting, rated, name, seed, note)
+            _judge(setting, judged, name, seed, note)
+    return _write(setting, judged)
+
+
+def _folder(setting: NavigationSetting, name: str | None, seed: int | None) -> Path:
+    return setting.out / "before" if name is None else setting.out / f"seed_{seed}" / name.replace(" ", "_")
+
+
+def _learn(setting: NavigationSetting, split: Split, name: str, seed: int, note: Note) -> None:
+    folder = _folder(setting, name, seed)
+    if (folder / "agent.safetensors").exists():
+        return
+    agent, config = load_agent(setting.agent), dataclasses.replace(setting.config, seed=seed)
+    learn_from_stars(agent, split, raters()[name], config, folder, begun_with=fingerprint(agent), note=note)
+
+
+def _judge(setting: NavigationSetting, split: Split, name: str | None, seed: int | None, note: Note) -> None:
+    """Play the tasks to be judged on, as `embodied judge` does, and keep the episodes."""
+    folder = _folder(setting, name, seed)
+    path = folder / "episodes.jsonl"
+    if path.exists():
+        return
+    agent: HannaAgent = load_agent(setting.agent if name is None else folder / "agent.safetensors")
+    with torch.inference_mode():
+        episodes = play(split.make_env, agent.policy(split.bank), spread(split.tasks, setting.tasks), seed=0, batch=32)
+    save_lines(path, episodes)
+    success = np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes])
+    note(f"{folder}: success {100 * success:.1f} % on {len(episodes)} tasks of {setting.split}")
+
+
+def values(episodes: Sequence[Episode], split: Split) -> dict[str, np.ndarray]:
+    """Column to one number per episode; success in per cent."""
+    graphs = [split.worlds[e.task.world].graph for e in episodes]
+    pairs = list(zip(episodes, graphs, strict=True))
+    return {
+        "success": np.array([100 * metrics.success(e, g) for e, g in pairs]),
+        "nDTW": np.array([100 * score_of(e, g, "nDTW") for e, g in pairs]),
+        "requests": np.array([float(e.requests) for e in episodes]),
+    }
+
+
+def gain(after: Sequence[np.ndarray], before: np.ndarray, houses: Sequence[str]) -> Estimate:
+    """Mean difference on the same tasks, averaged over seeds, its interval clustered by house."""
+    return estimate((np.mean(after, 0) - before).tolist(), houses)
+
+
+def _write(setting: NavigationSetting, split: Split) -> Path:
+    first = list(load_lines(_folder(setting, None, None) / "episodes.jsonl", Episode))
+    houses, before = [e.task.world for e in first], values(first, split)
+    found: dict[str, dict[str, Estimate]] = {}
+    each: dict[str, list[float]] = {}
+    for name in raters():
+        paths = [_folder(setting, name, seed) / "episodes.jsonl" for seed in setting.seeds]
+        if all(p.exists() for p in paths):
+            after = [values(list(load_lines(p, Episode)), split) for p in paths]
+            found[name] = {c: gain([a[c] for a in after], before[c], houses) for c in COLUMNS}
+            each[name] = [float((a["success"] - before["success"]).mean()) for a in after]
+    base = {c: estimate(before[c].tolist(), houses) for c in COLUMNS}
+    write_json(
+        setting.out / "navigation.json", {k: {c: vars(e) for c, e in v.items()} for k, v in found.items()}, indent=1
+    )
+    if "clean" in found:
+        _figure(setting, found)
+    path = setting.out / "navigation.md"
+    write_bytes(path, _markdown(setting, base, found, each, len(set(houses))).encode())
+    return path
+
+
+def _figure(setting: NavigationSetting, found: Mapping[str, Mapping[str, Estimate]]) -> None:
+    columns = {"success": "success (points)", "nDTW": "nDTW (points)"}
+    swept = {
+        name: {
+            v: {columns[c]: found[f"{name} {v:g}"][c] for c in columns} for v in strengths if f"{name} {v:g}" in found
+        }
+        for name, strengths in SWEEPS.items()
+    }
+    swept = {name: points for name, points in swept.items() if points}
+    if swept:
+        clean = {columns[c]: found["clean"][c] for c in columns}
+        gains_figure(swept, clean, setting.out / "figure_navigation.png")
+
+
+def _markdown(
+    setting: NavigationSetting,
+    base: Mapping[str, Estimate],
+    found: Mapping[str, Mapping[str, Estimate]],
+    each: Mapping[str, Sequence[float]],
+    houses: int,
+) -> str:
+    shown = lambda e: f"{e.mean:.1f} ± {e.half:.1f}"
+    lines = [
+        "# Navigation from ratings: gain in houses that were not rated",
+        "",
+        "| rater | Δ success (points) | of each seed | Δ nDTW (points) | Δ requests |",
+        "|---|---|---|---|---|",
+    ]
+    for name, row in found.items():
+        seeds = ", ".join(f"{x:+.1f}" for x in each[name])
+        lines.append(
+            f"| {name} | {shown(row['success'])} | {seeds} | {shown(row['nDTW'])} | {shown(row['requests'])} |"
+        )
+    missing = [name for name in raters() if name not in found]
+    c = setting.config
+    how = (
+        f"Before: success {shown(base['success'])} %, nDTW {shown(base['nDTW'])}, {shown(base['requests'])} requests, "
+        f"on {base['success'].n} tasks in {houses} houses ({setting.split}). {c.updates} updates of {c.batch} "
+        f"episodes, each rated once by its {c.score}; learning rate {c.learning_rate:g}; seeds "
+        f"{', '.join(map(str, setting.seeds))}. Differences are task by task, averaged over seeds; intervals 95 %, "
+        "clustered by house."
+    )
+    return "\n".join([*lines, "", how, *([f"Not run: {', '.join(missing)}."] if missing else []), ""])
