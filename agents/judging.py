@@ -12,7 +12,7 @@ import torch
 
 from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
-from agents.imitation.run import split_of
+from agents.hanna.run import split_of
 from agents.vision.run import encoder_of
 from assets.cache import write_json
 from embodied.datasets.store import Dataset

@@ -19,8 +19,8 @@ import torch
 from agents.failures import hanna_policies
 from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.imitation.config import TrainingConfig
-from agents.imitation.run import split_of, train_agent
+from agents.hanna.run import split_of, train_agent
+from agents.hanna.training_config import TrainingConfig
 from agents.judging import about
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json

@@ -18,7 +18,7 @@ import pytest
 from conftest import two_rooms
 
 import embodied
-from agents.imitation.config import TrainingConfig
+from agents.hanna.training_config import TrainingConfig
 from agents.vision.config import VisionConfig
 from assets.cache import atomic_path
 from assets.catalogue import CatalogueError, load_catalogue

@@ -21,12 +21,8 @@ from hand_worlds import grid_world
 
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
-from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
-from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
-from agents.imitation.checkpoint import CheckpointError
-from agents.imitation.collect import collect, imitation_loss
-from agents.imitation.config import SCALES, TrainingConfig
-from agents.imitation.losses import (
+from agents.hanna.collect import collect, imitation_loss
+from agents.hanna.losses import (
     IGNORE,
     curiosity,
     help_loss,
@@ -35,18 +31,12 @@ from agents.imitation.losses import (
     reason_loss,
     relative_entropy,
 )
-from agents.imitation.training import (
-    ADDED,
-    NUMBERS,
-    Clock,
-    Split,
-    TrainingError,
-    as_good,
-    for_training,
-    learn_once,
-    tasks_of_update,
-    train,
-)
+from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
+from agents.hanna.training import ADDED, NUMBERS, Split, for_training, learn_once, train
+from agents.hanna.training_config import SCALES, TrainingConfig
+from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
+from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.loop import Clock, TrainingError, as_good, tasks_of_update
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

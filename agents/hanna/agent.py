@@ -14,8 +14,8 @@ from agents.hanna.asking import RULES, ask_above
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy, choose_at
+from agents.hanna.training_config import TrainingConfig
 from agents.hanna.vocabulary import Vocabulary
-from agents.imitation.config import TrainingConfig
 from agents.shipped import SHIPPED_AGENT
 from agents.vision.bank import FeatureBank
 from agents.vision.resnet import read_weights

@@ -1,6 +1,6 @@
 """Options of the commands that learn: `embodied train vision | hanna`, `embodied features`, `embodied eval --learned`.
 
-Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run, agents.imitation.run and agents.judging.
+Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run, agents.hanna.run and agents.judging.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from agents.imitation.config import SCALES, TrainingConfig
+from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import VisionConfig
 from assets.cache import default_cache

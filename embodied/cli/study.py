@@ -21,7 +21,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.imitation.config import SCALES
+    from agents.hanna.training_config import SCALES
     from agents.study import Setting, run_study
     from embodied.cli.learning import chosen
 

@@ -49,8 +49,8 @@ def run_vision(args: argparse.Namespace) -> int:
 
 def run_hanna(args: argparse.Namespace) -> int:
     """Teach an agent by imitation to navigate, to ask for help and to follow it, on data that `embodied features` prepared."""
-    from agents.imitation.config import SCALES
-    from agents.imitation.run import run_train_hanna
+    from agents.hanna.run import run_train_hanna
+    from agents.hanna.training_config import SCALES
     from embodied.cli.learning import chosen
 
     return run_train_hanna(

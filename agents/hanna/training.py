@@ -15,12 +15,9 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,27 +25,30 @@ import torch
 
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
+from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
+from agents.hanna.collect import Experience, collect, imitation_loss
+from agents.hanna.losses import IGNORE
 from agents.hanna.policy import for_training
 from agents.imitation import parallel
-from agents.imitation.checkpoint import Progress, load_checkpoint, save_checkpoint
-from agents.imitation.collect import Experience, collect, imitation_loss
-from agents.imitation.losses import IGNORE
+from agents.imitation.loop import (
+    Clock,
+    Note,
+    Progress,
+    TrainingError,
+    as_good,
+    dropout_of,
+    seed_of,
+    stop_signal,
+    tasks_of_update,
+)
 from agents.vision.bank import FeatureBank
 from embodied.envs.base import HelpEnv
-from embodied.errors import UnableError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, Task, Teacher
-from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from embodied.world import World
-
-Note = Callable[[str], None]
-
-
-class TrainingError(UnableError):
-    """Training cannot go on; the last checkpoint is intact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,26 +59,6 @@ class Split:
     tasks: Sequence[Task]
     make_env: Callable[[], HelpEnv]
     bank: FeatureBank
-
-
-@dataclass
-class Clock:
-    """Seconds spent on each kind of work since the last report."""
-
-    spent: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def on(self, what: str) -> Iterator[None]:
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - began
-
-    def move(self, seconds: float, source: str, to: str) -> None:
-        """Count some of the seconds spent on one kind of work as another's."""
-        self.spent[source] -= seconds
-        self.spent[to] = self.spent.get(to, 0.0) + seconds
 
 
 def train(
@@ -200,30 +180,6 @@ def learn_once(
     return parallel.whole(numbers, NUMBERS, ADDED, norm.device)
 
 
-def tasks_of_update(tasks: Sequence[Task], update: int, batch: int, seed: int) -> list[Task]:
-    """The tasks of one update: every task once per pass, each pass in its own random order."""
-    chosen = []
-    for k in range(update * batch, (update + 1) * batch):
-        turn, place = divmod(k, len(tasks))
-        chosen.append((turn, place))
-    orders = {turn: stream(seed, "tasks", turn).permutation(len(tasks)) for turn in sorted({t for t, _ in chosen})}
-    return [tasks[int(orders[turn][place])] for turn, place in chosen]
-
-
-def seed_of(seed: int, update: int) -> int:
-    """The seed of the episodes of one update."""
-    return int(stream(seed, "update", update).integers(2**31))
-
-
-@contextmanager
-def dropout_of(seed: int, update: int) -> Iterator[None]:
-    """PyTorch's own draws (dropout) follow from (seed, update) inside, and are as before outside."""
-    devices = list(range(torch.cuda.device_count()))
-    with torch.random.fork_rng(devices=devices):
-        torch.manual_seed(int(stream(seed, "dropout", update).integers(2**31)))
-        yield
-
-
 NUMBERS = (
     "loss navigation",
     "loss asking",
@@ -302,11 +258,6 @@ def validate(
     return progress
 
 
-def as_good(success: float, best: float, episodes: int) -> bool:
-    """Whether a success rate on `episodes` tasks is within one standard error of the best one (Breiman's rule)."""
-    return success >= best - math.sqrt(best * (1 - best) / episodes)
-
-
 class Report:
     """Owns the progress line, validation.jsonl and TensorBoard's scalars of one session."""
 
@@ -366,22 +317,3 @@ class Report:
 
     def close(self) -> None:
         self._writer.close()
-
-
-@contextmanager
-def stop_signal() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C sets, so that the update at hand can end; the second interrupts at once."""
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-
-    def once(number: int, frame: Any) -> None:
-        event.set()
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, once)
-    try:
-        yield event
-    finally:
-        signal.signal(signal.SIGINT, before)

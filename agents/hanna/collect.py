@@ -17,8 +17,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from agents.hanna.losses import IGNORE, help_loss, navigation_loss
 from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
-from agents.imitation.losses import IGNORE, help_loss, navigation_loss
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import rollout
 from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher

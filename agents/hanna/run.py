@@ -9,11 +9,11 @@ from pathlib import Path
 import torch
 
 from agents.hanna.agent import load_agent, new_agent, take_weights
+from agents.hanna.training import Split, train
+from agents.hanna.training_config import TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary
-from agents.imitation.checkpoint import Progress
-from agents.imitation.config import TrainingConfig
+from agents.imitation.loop import Progress
 from agents.imitation.parallel import join_launcher, one_voice
-from agents.imitation.training import Split, train
 from agents.vision.encoder import Encoder
 from agents.vision.features import feature_path, load_bank
 from agents.vision.run import encoder_of
@@ -81,7 +81,7 @@ def train_agent(
     note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.imitation.training.train.
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.hanna.training.train.
 
     Args:
       begin: a trained agent whose weights and words a new run begins with.
