@@ -24,10 +24,11 @@ from agents.bandit.ratings import Rater
 from agents.bandit.runs import Note, Run
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
+from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
-from agents.imitation.collect import action_index
-from agents.imitation.training import Split, stop_signal, tasks_of_update
+from agents.hanna.training import Split
+from agents.imitation.loop import stop_signal, tasks_of_update
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

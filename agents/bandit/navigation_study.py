@@ -15,8 +15,8 @@ from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.imitation.run import split_of
-from agents.imitation.training import Split
+from agents.hanna.run import split_of
+from agents.hanna.training import Split
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset

@@ -13,7 +13,7 @@ from torch import nn
 
 from agents.bandit.translate import batches
 from agents.imitation.checkpoint import CheckpointError
-from agents.imitation.training import stop_signal
+from agents.imitation.loop import stop_signal
 from assets.cache import atomic_path, write_json
 from embodied.seeds import stream
 
