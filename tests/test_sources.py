@@ -1,0 +1,57 @@
+"""Every document and every difference that code or docs cite can be opened by whoever has the repository."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CITED = re.compile(r"\bS(\d+)\b")
+LIST = re.compile(r"sources\.md((?:[,\s#*]|and|to|\bS\d+\b)+)")
+"""What follows the name of the page, also on the next line of a comment: 'docs/sources.md, S3 and S4'."""
+DOCUMENT = re.compile(r"\b[\w./-]+\.md\b")
+MADE = {"name.md", "table.md"}
+"""Files that our own commands write."""
+
+
+def texts() -> list[tuple[str, str]]:
+    """(path, text) of every Python and Markdown file that git tracks, but for this one."""
+    names = subprocess.run(["git", "ls-files", "*.py", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True)
+    files = [n for n in names.stdout.split() if n != "tests/test_sources.py" and (ROOT / n).is_file()]
+    return [(n, (ROOT / n).read_text(encoding="utf-8")) for n in files]
+
+
+def rows() -> list[int]:
+    """The numbers of the rows of docs/sources.md, in its order."""
+    return [int(n) for n in re.findall(r"^\| S(\d+) \|", (ROOT / "docs/sources.md").read_text(encoding="utf-8"), re.M)]
+
+
+def missing(text: str, known: set[int]) -> list[int]:
+    """Numbers of differences that `text` cites and docs/sources.md does not have."""
+    return [int(n) for m in LIST.finditer(text) for n in CITED.findall(m[1]) if int(n) not in known]
+
+
+def test_differences_are_numbered_without_gaps():
+    assert rows() == list(range(1, len(rows()) + 1))
+
+
+def test_every_cited_difference_exists():
+    known = set(rows())
+    wrong = [f"{name}: S{n}" for name, text in texts() for n in missing(text, known)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_number_that_is_not_there_is_noticed():
+    assert missing("as the program does (docs/sources.md, S3 and\n    # S999).", set(rows())) == [999]
+
+
+def test_no_document_is_cited_that_the_repository_does_not_have():
+    here = {p for name in texts() for p in (name[0], Path(name[0]).name)}
+    wrong = [
+        f"{name}: {cited}"
+        for name, text in texts()
+        for cited in DOCUMENT.findall(re.sub(r"https?://\S+", "", text))
+        if cited.lstrip("./") not in here and Path(cited).name not in here and Path(cited).name not in MADE
+    ]
+    assert not wrong, "\n".join(wrong)
