@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from pathlib import Path
@@ -11,8 +12,6 @@ CITED = re.compile(r"\bS(\d+)\b")
 LIST = re.compile(r"sources\.md((?:[,\s#*]|and|to|\bS\d+\b)+)")
 """What follows the name of the page, also on the next line of a comment: 'docs/sources.md, S3 and S4'."""
 DOCUMENT = re.compile(r"\b[\w./-]+\.md\b")
-MADE = {"name.md", "table.md"}
-"""Files that our own commands write."""
 
 
 def texts() -> list[tuple[str, str]]:
@@ -46,12 +45,22 @@ def test_a_number_that_is_not_there_is_noticed():
     assert missing("as the program does (docs/sources.md, S3 and\n    # S999).", set(rows())) == [999]
 
 
+def documents(text: str) -> set[str]:
+    """What `text` sends its reader to: by a path, or in capitals; a bare name may be a file that a command writes."""
+    found = DOCUMENT.findall(re.sub(r"https?://\S+", "", text))
+    return {d for d in found if "/" in d or Path(d).stem.isupper()}
+
+
 def test_no_document_is_cited_that_the_repository_does_not_have():
-    here = {p for name in texts() for p in (name[0], Path(name[0]).name)}
+    here = {name for name, _ in texts()}
     wrong = [
         f"{name}: {cited}"
         for name, text in texts()
-        for cited in DOCUMENT.findall(re.sub(r"https?://\S+", "", text))
-        if cited.lstrip("./") not in here and Path(cited).name not in here and Path(cited).name not in MADE
+        for cited in sorted(documents(text))
+        if not {cited, (Path(name).parent / cited).as_posix(), os.path.normpath(Path(name).parent / cited)} & here
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_a_document_that_is_not_there_is_noticed():
+    assert documents("see docs/nothing.md and NOTES.md, not table.md") == {"docs/nothing.md", "NOTES.md"}

@@ -24,7 +24,7 @@ from assets.cache import atomic_path
 FORMAT = "embodied-agent-1"
 NETWORKS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 SHIPPED = SHIPPED_AGENT
-"""The agent of this repository; see weights/README.md."""
+"""The agent of this repository; see agents/weights/README.md."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from assets.cache import atomic_path
 
 FORMAT = "embodied-encoder-1"
 SHIPPED = SHIPPED_ENCODER
-"""The encoder of this repository, trained on our own renders; see weights/README.md."""
+"""The encoder of this repository, trained on our own renders; see agents/weights/README.md."""
 MARGIN = 3 * CELL
 """Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""
 
