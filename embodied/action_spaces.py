@@ -81,11 +81,16 @@ def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     return np.argmin(np.round(d_yaw**2 + d_pitch**2, 9), axis=1)
 
 
+def bearing_order(bearing: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(n,) int64: candidates by |bearing|, those that differ by rounding alone by their node; exported files keep it."""
+    return np.lexsort((nodes, np.round(np.abs(bearing), 9)))
+
+
 def panoramic_reach(graph, pose: Pose) -> Reach:
     """Neighbours sorted by |bearing| from the agent's yaw (originals 2.2); the tilt does not matter."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)
-    order = np.lexsort((nodes, np.round(np.abs(bearing), 9)))
+    order = bearing_order(bearing, nodes)
     view = nearest_views(yaw, pitch)[order]
     candidates = Candidates(
         bearing[order].astype(np.float32), pitch[order].astype(np.float32), view, np.ones(len(nodes), dtype=bool)

@@ -10,12 +10,11 @@ import pytest
 from hand_worlds import line_world
 from test_datasets import build
 
+from embodied.datasets.folders import export_folder
 from embodied.datasets.matterport import (
     action_list,
-    export,
     in_matterport_order,
     read_features,
-    scan_name,
     tokenised,
     view_index,
     write_features,
@@ -49,10 +48,10 @@ def test_the_action_list_of_a_node_on_the_line():
 
 def test_hannas_files_hold_together(tmp_path):
     data = build(tmp_path / "d", tmp_path / "c")
-    export(data, tmp_path / "out")
-    items = json.loads((tmp_path / "out/hanna/hanna_train.json").read_text())
-    spaces = json.loads((tmp_path / "out/hanna/panoramic_action_space.json").read_text())
-    routes = json.loads((tmp_path / "out/hanna/routes.json").read_text())
+    export_folder("hanna", data, tmp_path)
+    items = json.loads((tmp_path / "data/hanna/hanna_train.json").read_text())
+    spaces = json.loads((tmp_path / "data/hanna/panoramic_action_space.json").read_text())
+    routes = json.loads((tmp_path / "data/hanna/routes.json").read_text())
     tasks = data.tasks("train")
     assert len(items) == len(tasks) and len({i["path_id"] for i in items}) == len(items)
     for item, task in zip(items, tasks, strict=True):
@@ -65,30 +64,12 @@ def test_hannas_files_hold_together(tmp_path):
         splits = {r["split"] for r in some}
         assert splits == ({"train_seen", "train_unseen"} if scan.startswith("train") else {scan[:-4]})
         assert all(isinstance(r["path_id"], str) and "_" not in r["path_id"] and 0 <= r["view_id"] < 36 for r in some)
-    scans = (tmp_path / "out/connectivity/scans.txt").read_text().split()
+    scans = (tmp_path / "data/connectivity/scans.txt").read_text().split()
     assert sorted(scans) == sorted(routes)
-    graph = from_matterport(tmp_path / "out/connectivity" / f"{scans[0]}_connectivity.json")
+    graph = from_matterport(tmp_path / "data/connectivity" / f"{scans[0]}_connectivity.json")
     assert np.allclose(graph.positions, data.place("test_0000").graph.positions)
-    vocabulary = (tmp_path / "out/hanna/vocab.txt").read_text().split("\n")
+    vocabulary = (tmp_path / "data/hanna/vocab.txt").read_text().split("\n")
     assert vocabulary[:3] == ["<PAD>", "<UNK>", "<EOS>"] and "find" in vocabulary
-
-
-def test_r2r_items_have_three_instructions(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c", "vln")
-    export(data, tmp_path / "out")
-    for split in data.splits:
-        items = json.loads((tmp_path / "out" / f"R2R_{split}.json").read_text())
-        assert items and all(len(i["instructions"]) == 3 and len(i["path"]) >= 2 for i in items)
-        assert {i["scan"] for i in items} <= {scan_name(n) for n in data.names(split)}
-
-
-def test_vnla_trajectories_end_with_stop_and_walk_the_path(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c", "vnla")
-    export(data, tmp_path / "out")
-    for item in json.loads((tmp_path / "out/asknav/asknav_train.json").read_text()):
-        for path, trajectory in zip(item["paths"], item["trajectories"], strict=True):
-            assert trajectory[-1] == [0, 0, 0] and sum(a == [1, 0, 0] for a in trajectory) >= len(path) - 1
-        assert item["object_name"] in item["instructions"][0]
 
 
 def test_feature_files_survive(tmp_path):
@@ -97,11 +78,6 @@ def test_feature_files_survive(tmp_path):
     ((key, again),) = read_features(tmp_path / "f.tsv").items()
     assert key == ("test0001", "v000") and (again == features).all()
     assert (in_matterport_order(features)[12] == features[15]).all(), "viewIndex 12 looks along +y, our view 15"
-
-
-def test_other_kinds_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="no published program"):
-        export(build(tmp_path / "d", tmp_path / "c", "hari"), tmp_path / "out")
 
 
 def test_tokens_are_lower_case_and_apart():

@@ -32,6 +32,7 @@ COMMANDS = (
     "dataset",
     "features",
     "corpus",
+    "export",
     "train",
     "eval",
     "judge",

@@ -61,13 +61,16 @@ def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
-    from embodied.datasets.matterport import export
+    from embodied.datasets.folders import PROGRAMS, export_folder
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
     HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
     if args.workers < 1:
         raise ValueError(f"--workers should be at least 1, got {args.workers}")
+    programs = [name for name, program in PROGRAMS.items() if program.kind == args.kind]
+    if args.export and not programs:
+        raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
     config = DatasetConfig(
         args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language
     )
@@ -93,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
         )
     data = Dataset(args.out)
     if args.export:
-        note(f"{len(export(data, args.export))} files for the published programs in {args.export}")
+        files = [f for name in programs for f in export_folder(name, data, args.export / name)]
+        note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
     show(
         args,
         {"folder": str(args.out), "digest": data.digest, "splits": data.index["splits"]},

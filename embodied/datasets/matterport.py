@@ -1,10 +1,10 @@
-"""Files that the field's programs read: R2R, HANNA and VNLA JSON, action spaces, features.
+"""Matterport's conventions, and the fields of the files that the field's programs read.
 
-Only here (and in the functions of navgraph and panorama that say so) the Matterport conventions
-apply: heading clockwise from +y, viewIndex 12 band + heading bin. Scans are named like our houses
-without underscores, because the programs join and split ids at underscores. Fields, per file:
+Only here, in embodied.mattersim and in exported files they apply: heading clockwise from +y, viewIndex
+12 band + heading bin. Scans are named like our houses without underscores, because the programs join
+and split ids at underscores. embodied.datasets.folders writes the files; their fields:
 
-  connectivity/<scan>_connectivity.json, scans.txt   see navgraph.to_matterport
+  connectivity/<scan>_connectivity.json, scans.txt   see navigation.graph.to_matterport
   R2R_<split>.json      path_id, scan, heading, path, distance, instructions (three)
   hanna_<split>.json    path_id, scan, heading, paths (one shortest path per goal), instructions
   routes.json           scan -> [path_id (text), path, instruction, view_id, split]
@@ -12,30 +12,26 @@ without underscores, because the programs join and split ids at underscores. Fie
   vocab.txt, scan_split.json, accepted_objects.txt, region_label.txt    HANNA's side files
   asknav_<split>.json   as HANNA's, with trajectories (index, dHeading, dElevation), start_region_name,
                         end_region_name, object_name
-  <scan>/house_segmentations/panorama_to_region.txt   number, viewpoint, -, region letter (VNLA)
+  <scan>/house_segmentations/panorama_to_region.txt   number, viewpoint, number of the room, region letter (VNLA)
   *.tsv                 scanId, viewpointId, image_w, image_h, vfov, base64 float32 36 x D
 """
 
 from __future__ import annotations
 
 import base64
-import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assets.cache import atomic_path, write_bytes
-from embodied.action_spaces import directions, nearest_views
+from assets.cache import atomic_path
+from embodied.action_spaces import bearing_order, directions, nearest_views
 from embodied.geometry import heading_of_yaw, wrap
-from embodied.interface import STEP, TURNS, VIEWS, FindObject, Pose, Route, Task
-from embodied.navigation.graph import to_matterport
-from embodied.teachers.vnla import VnlaTeacher
+from embodied.interface import STEP, TURNS, VIEWS, Pose
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Dataset, Place
     from embodied.navigation.graph import NavGraph
 
 REGIONS = {
@@ -133,173 +129,32 @@ def heading(pose: Pose) -> float:
 
 
 def action_list(graph: NavGraph, node: int, bin_: int) -> list[dict[str, object]]:
-    """HANNA's panoramic action list for a heading bin (originals 2.2).
+    """HANNA's panoramic action list for a heading bin, in the order of our candidates.
 
     Element 0 stops: relViewIndex -1, absViewIndex the bin, nextViewpointId itself. Then every
     neighbour: relViewIndex (0 is the current heading looking down), absViewIndex, nextViewpointId,
     rel_heading (right is positive), rel_elevation (from the horizon), distance (angular, to the
-    centre of its view). Sorted by |rel_heading|.
+    centre of its view). Sorted by |rel_heading|, as in the authors' program; a neighbour halfway between
+    two views belongs to the one of the lower number, where theirs decides by rounding and by the heading.
     """
     nodes, yaw, pitch = directions(graph, node)
     views = nearest_views(yaw, pitch)
-    actions = []
-    for j, y, p, v in zip(nodes, yaw, pitch, views, strict=True):
-        index = view_index(int(v))
-        relative = float(wrap(heading_of_yaw(y) - bin_ * STEP))
-        offset = np.hypot(wrap(y - (v % TURNS) * STEP), p - (v // TURNS - 1) * STEP)
+    relative = wrap(heading_of_yaw(yaw) - bin_ * STEP)
+    offset = np.hypot(wrap(yaw - (views % TURNS) * STEP), pitch - (views // TURNS - 1) * STEP)
+    actions: list[dict[str, object]] = [{"relViewIndex": -1, "absViewIndex": bin_, "nextViewpointId": graph.ids[node]}]
+    for k in bearing_order(relative, nodes):
+        index = view_index(int(views[k]))
         actions.append(
             {
                 "relViewIndex": TURNS * (index // TURNS) + (index - bin_) % TURNS,
                 "absViewIndex": index,
-                "nextViewpointId": graph.ids[int(j)],
-                "rel_heading": relative,
-                "rel_elevation": float(p),
-                "distance": float(offset),
+                "nextViewpointId": graph.ids[int(nodes[k])],
+                "rel_heading": float(relative[k]),
+                "rel_elevation": float(pitch[k]),
+                "distance": float(offset[k]),
             }
         )
-    stop = {"relViewIndex": -1, "absViewIndex": bin_, "nextViewpointId": graph.ids[node]}
-    return [stop, *sorted(actions, key=lambda a: (abs(a["rel_heading"]), a["nextViewpointId"]))]
-
-
-def export(data: Dataset, folder: Path) -> list[Path]:
-    """Write a data set of kind vln, hanna or vnla as its program reads it; returns the files.
-
-    Raises:
-      ValueError: another kind of data set, which no published program reads.
-    """
-    writers = {"vln": _export_r2r, "hanna": _export_hanna, "vnla": _export_vnla}
-    if data.kind not in writers:
-        raise ValueError(f"no published program reads {data.kind!r} tasks; export one of {sorted(writers)}")
-    folder = Path(folder)
-    names = sorted({n for s in data.splits for n in data.names(s)})
-    files = _export_graphs(data, names, folder / "connectivity")
-    return files + writers[data.kind](data, names, folder)
-
-
-def _export_graphs(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]:
-    files = []
-    for name in names:
-        files.append(folder / f"{scan_name(name)}_connectivity.json")
-        to_matterport(data.place(name).graph, data.place(name).house, files[-1])
-    return [*files, _text(folder / "scans.txt", [scan_name(n) for n in names])]
-
-
-def _export_r2r(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]:
-    """One item per path with its three instructions; in seen splits the wordings are the held-out ones, repeated."""
-    files, number = [], 0
-    for split in data.splits:
-        items = []
-        by_path: dict[tuple[str, tuple[int, ...]], list[Task]] = {}
-        for t in data.tasks(split):
-            by_path.setdefault((t.world, t.goal.path), []).append(t)
-        for (name, path), tasks in by_path.items():
-            graph = data.place(name).graph
-            texts = [t.request for t in tasks]
-            number += 1
-            items.append(
-                {
-                    "distance": round(float(graph.distance[path[0], path[-1]]), 4),
-                    "scan": scan_name(name),
-                    "path_id": number,
-                    "path": [graph.ids[v] for v in path],
-                    "heading": heading(tasks[0].start),
-                    "instructions": [texts[k % len(texts)] for k in range(3)],
-                }
-            )
-        files.append(_json(folder / f"R2R_{split}.json", items))
-    return files
-
-
-def _item(task: Task, number: int, place: Place) -> dict[str, object]:
-    ids, graph = place.graph.ids, place.graph
-    return {
-        "path_id": number,
-        "scan": scan_name(task.world),
-        "heading": heading(task.start),
-        "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in task.goal_nodes],
-        "instructions": [tokenised(task.request)],
-    }
-
-
-def _export_hanna(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]:
-    hanna, files, number = folder / "hanna", [], 0
-    words: dict[str, int] = {}
-    for split in data.splits:
-        items = []
-        for t in data.tasks(split):
-            number += 1
-            items.append(_item(t, number, data.place(t.world)))
-            if split == "train":
-                _count(words, items[-1]["instructions"][0])
-        files.append(_json(hanna / f"hanna_{split}.json", items))
-    routes: dict[str, list[dict[str, object]]] = {}
-    spaces: dict[str, list[dict[str, object]]] = {}
-    for name in names:
-        graph = data.place(name).graph
-        routes[scan_name(name)] = [_route(r, graph) for r in data.routes(name)]
-        for r in data.routes(name):
-            if r.split == "train_seen":
-                _count(words, tokenised(r.instruction))
-        for node, key in enumerate(graph.ids):
-            for b in range(TURNS):
-                spaces[f"{scan_name(name)}_{key}_{b}"] = action_list(graph, node, b)
-    groups = {g: [scan_name(n) for n in names if n.startswith(g)] for g in ("train", "val", "test")}
-    objects = sorted({t.goal.object_class for s in data.splits for t in data.tasks(s)})
-    return [
-        *files,
-        _json(hanna / "routes.json", routes),
-        _json(hanna / "panoramic_action_space.json", spaces),
-        _json(hanna / "scan_split.json", groups),
-        _text(hanna / "accepted_objects.txt", objects),
-        _regions(hanna),
-        _text(hanna / "vocab.txt", ["<PAD>", "<UNK>", "<EOS>", *sorted(words, key=lambda w: (-words[w], w))]),
-    ]
-
-
-def _route(route: Route, graph: NavGraph) -> dict[str, object]:
-    return {
-        "path_id": route.id.replace("_", "-"),
-        "path": [graph.ids[v] for v in route.path],
-        "instruction": tokenised(route.instruction),
-        "split": route.split,
-        "view_id": view_index(Pose(0, route.turn, route.tilt).view),
-    }
-
-
-def _export_vnla(data: Dataset, names: Sequence[str], folder: Path) -> list[Path]:
-    teacher, asknav, files, number = VnlaTeacher(), folder / "asknav", [], 0
-    words: dict[str, int] = {}
-    for split in data.splits:
-        items = []
-        for t in data.tasks(split):
-            number += 1
-            items.append({**_item(t, number, data.place(t.world)), **_vnla_fields(t, data.place(t.world), teacher)})
-            if split == "train":
-                _count(words, items[-1]["instructions"][0])
-        files.append(_json(asknav / f"asknav_{split}.json", items))
-    for name in names:
-        graph, house = data.place(name).graph, data.place(name).house
-        kinds = [house.room_by_id[r].kind for r in graph.room_of_node]
-        lines = [
-            f"{k} {key} - {REGIONS.get(kind, 'z')}" for k, (key, kind) in enumerate(zip(graph.ids, kinds, strict=True))
-        ]
-        files.append(
-            _text(folder / "v1" / "scans" / scan_name(name) / "house_segmentations" / "panorama_to_region.txt", lines)
-        )
-    vocabulary = ["<PAD>", "<UNK>", "<EOS>", *sorted(words)]
-    return [*files, _text(asknav / "train_vocab.txt", vocabulary), _regions(folder)]
-
-
-def _vnla_fields(task: Task, place: Place, teacher: VnlaTeacher) -> dict[str, object]:
-    assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
-    plan, room = teacher.plan(place), place.house.room_by_id
-    rooms = place.graph.room_of_node
-    return {
-        "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), 200)[0]] for g in task.goal_nodes],
-        "start_region_name": _region_name(room[rooms[task.start.node]].kind),
-        "end_region_name": _region_name(room[rooms[task.goal_nodes[0]]].kind),
-        "object_name": task.goal.object_class,
-    }
+    return actions
 
 
 def write_features(path: Path, rows: Iterable[tuple[str, str, np.ndarray]]) -> None:
@@ -330,24 +185,11 @@ def tokenised(text: str) -> str:
     return " ".join(re.findall(r"[a-z0-9'-]+|[^\sa-z0-9]", text.lower()))
 
 
-def _count(words: dict[str, int], text: str) -> None:
-    for w in text.split():
-        words[w] = words.get(w, 0) + 1
-
-
-def _region_name(kind: str) -> str:
+def region_name(kind: str) -> str:
+    """Matterport's name of a room of one of our kinds."""
     return REGION_NAMES[REGIONS.get(kind, "z")]
 
 
-def _regions(folder: Path) -> Path:
-    return _text(folder / "region_label.txt", [f"'{k}' = {v}" for k, v in REGION_NAMES.items()])
-
-
-def _json(path: Path, body: object) -> Path:
-    write_bytes(path, json.dumps(body).encode())
-    return path
-
-
-def _text(path: Path, lines: Sequence[str]) -> Path:
-    write_bytes(path, "".join(line + "\n" for line in lines).encode())
-    return path
+def region_lines() -> list[str]:
+    """Lines of region_label.txt."""
+    return [f"'{k}' = {v}" for k, v in REGION_NAMES.items()]

@@ -1,0 +1,164 @@
+"""Write a data set or a house as others read it: folders of published programs, Parquet, glTF, MJCF, USD.
+
+  hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
+  matterport                    graphs and skyboxes for the Matterport3D simulator
+  parquet                       tables and a card, for `datasets.load_dataset`
+  glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
+
+Folders of programs come with a README-embodied.md: which version, what goes where, which lines a current PyTorch
+needs changed. `python -m embodied.mattersim` then runs the programs without a compiled simulator.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from embodied.datasets.store import Dataset
+    from embodied.house.house import House
+    from embodied.scene.lit_pages import LitPages
+
+PROGRAMS = ("hanna", "vnla", "r2r", "iliad-nav", "matterport")
+"""As in embodied.datasets.folders, which --help should not import."""
+FORMATS = ("glb", "mjcf", "usd")
+WIDTH = 2048
+"""The length of a feature that the published programs are written for."""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    from embodied.cli.learning import add_encoder
+
+    what = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    for name in PROGRAMS:
+        sub = what.add_parser(name, help=f"the folder that {name} reads")
+        _add_data(sub)
+        sub.add_argument(
+            "--features", action="store_true", help="also write the features of `embodied features`, as TSV"
+        )
+        sub.add_argument(
+            "--pad", type=int, default=WIDTH, metavar="N",
+            help="fill features with zeros up to this length, which the programs count on (default: %(default)s)",
+        )  # fmt: skip
+        add_encoder(sub)
+    sub = what.add_parser("parquet", help="Parquet tables with a card")
+    _add_data(sub)
+    sub.add_argument(
+        "--episodes", type=Path, nargs="+", default=[], metavar="FILE", help="episodes (.jsonl) to write as tables, too"
+    )
+    for name in FORMATS:
+        sub = what.add_parser(name, help=f"a house as {name}")
+        sub.add_argument("--house", type=Path, required=True, metavar="DIR", help="folder that `embodied house` wrote")
+        sub.add_argument("--out", type=Path, required=True, metavar="PATH", help="file to write (mjcf: folder)")
+        sub.add_argument(
+            "--light", choices=("none", "draft", "normal"), default="normal",
+            help="bake light of this quality into it, or leave its materials as they are (default: %(default)s)",
+        )  # fmt: skip
+        if name == "glb":
+            sub.add_argument(
+                "--no-ceilings", action="store_true", help="leave ceilings and roof out, for a look from above"
+            )
+        add_cache(sub)
+        add_packs(sub)
+        add_json(sub)
+
+
+def _add_data(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="a data set of `embodied dataset`")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    if args.what in PROGRAMS:
+        return run_program(args)
+    return run_parquet(args) if args.what == "parquet" else run_house(args)
+
+
+def run_program(args: argparse.Namespace) -> int:
+    from embodied.datasets.folders import export_folder
+    from embodied.datasets.store import Dataset
+
+    data = Dataset(args.data)
+    features = feature_rows(data, args) if args.features else None
+    if features is None and args.what != "matterport":
+        note("no features are written; the program needs them: add --features")
+    files = export_folder(args.what, data, args.out, features)
+    facts = {"program": args.what, "files": len(files), "out": str(args.out), "readme": str(files[-1])}
+    show(args, facts, f"{len(files)} files for {args.what} in {args.out}; read {files[-1].name} there")
+    return 0
+
+
+def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str, str, np.ndarray]]:
+    """(house, viewpoint id, (36, D) features in our order) of every viewpoint, filled up to --pad.
+
+    Raises:
+      FileNotFoundError: a house has no features of this encoder.
+      ValueError: features are longer than --pad.
+    """
+    import numpy as np
+
+    from agents.vision.features import feature_path, load_features
+    from agents.vision.run import encoder_of
+    from embodied.datasets.folders import names_of
+
+    encoder = encoder_of(args)
+    for name in names_of(data):
+        place = data.place(name)
+        path = feature_path(data.folder / "features", encoder.digest, name)
+        features, _ = load_features(path, encoder=encoder.digest, source=place.house.digest)
+        if features.shape[2] > args.pad:
+            raise ValueError(f"{path} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it")
+        wide = np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - features.shape[2])))
+        for key, rows in zip(place.graph.ids, wide, strict=True):
+            yield name, key, rows
+
+
+def run_parquet(args: argparse.Namespace) -> int:
+    from embodied.datasets.parquet import export_parquet
+    from embodied.datasets.store import Dataset
+
+    files = export_parquet(Dataset(args.data), args.out, args.episodes)
+    show(args, {"files": len(files), "out": str(args.out)}, f"{len(files)} files in {args.out}; README.md is its card")
+    return 0
+
+
+def run_house(args: argparse.Namespace) -> int:
+    from embodied.house.validation import load_house
+    from embodied.scene.export import export_glb, export_mjcf
+    from embodied.scene.web import export_lit_glb
+
+    catalogue = catalogue_of(args)
+    house = load_house(args.house / "house.json", catalogue)
+    lit = light(args, house, catalogue)
+    if args.what == "mjcf":
+        path = export_mjcf(house, catalogue, args.out, lit=lit)
+    elif args.what == "usd":
+        from embodied.scene.usd import export_usd
+
+        if lit is None:
+            raise ValueError("USD is written of a lit house; leave --light none out")
+        path = export_usd(house, lit, args.out)
+    elif lit is None:
+        path = export_glb(house, catalogue, args.out, ceilings=not args.no_ceilings)
+    else:
+        path = export_lit_glb(house, lit, args.out, ceilings=not args.no_ceilings)
+    facts = {"house": house.digest, "format": args.what, "light": lit.digest if lit else None, "path": str(path)}
+    show(args, facts, f"{house.name} as {args.what}: {path}, {path.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def light(args: argparse.Namespace, house: House, catalogue: object) -> LitPages | None:
+    """The house's baked light, from the cache where it is there; None without."""
+    if args.light == "none":
+        return None
+    from embodied.light import bake, progress_bar
+
+    with progress_bar() as progress:
+        return bake(house, catalogue, args.cache, args.light, progress=progress).lit

@@ -1,0 +1,388 @@
+"""Data sets as folders that the published programs read: HANNA, VNLA, Room-to-Room, ILIAD's NAV, Matterport3DSimulator.
+
+A folder has the shape of the program's repository, so that it is laid over a copy of it; its README.md says which
+program and version, what goes where, and which lines of the program a current PyTorch needs changed. The files' fields
+are those of embodied.datasets.matterport. Where a program wants something of the data that ours need not have, the
+writer says at the line how it is met.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import json
+import re
+import string
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from assets.cache import write_bytes
+from embodied.datasets.matterport import (
+    CAMERA,
+    REGIONS,
+    action_list,
+    heading,
+    region_lines,
+    region_name,
+    scan_name,
+    tokenised,
+    view_index,
+    write_features,
+)
+from embodied.interface import TURNS, FindObject, Pose, Route, Task
+from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import to_matterport
+from embodied.seeds import stream
+from embodied.tasks.goals import count_hops, find_instances, goal_classes
+from embodied.tasks.vnla import VnlaConfig
+from embodied.teachers.vnla import MonocularPlan, VnlaTeacher, state_of
+
+if TYPE_CHECKING:
+    from embodied.datasets.store import Dataset, Place
+    from embodied.navigation.graph import NavGraph
+
+SPECIAL = ("<PAD>", "<UNK>", "<EOS>")
+FEATURES = "img_features/ResNet-152-imagenet.tsv"
+"""The one name that all of them look for, whatever network made the features."""
+LEAST_WORDS = 5
+"""How often ILIAD counts a word of the training instructions before it is one of the vocabulary."""
+MOST_NODES = 10
+"""ILIAD's NAV plays ten actions, of which the last node is never recorded: longer paths cannot be won."""
+LONGEST = 200
+"""Actions after which a teacher's walk is given up; no house is that large."""
+
+FeatureRows = Iterable[tuple[str, str, np.ndarray]]
+"""(house, viewpoint id, (36, D) features in our order)."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program that others published."""
+
+    kind: str | None
+    """The kind of data set it reads; None reads any."""
+    data: str
+    """Folder of its connectivity and img_features, below the root of its repository."""
+    write: Callable[[Dataset, Path], list[Path]]
+    """Writes what is its own, into the root."""
+
+
+def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRows | None = None) -> list[Path]:
+    """Write the folder of a program; returns its files.
+
+    Args:
+      program: one of PROGRAMS.
+      folder: as the root of a copy of the program's repository; files of the same names are replaced.
+      features: rows of the feature file; None writes none, and the program's own features are not found then.
+
+    Raises:
+      ValueError: an unknown program, or a data set of a kind that it does not read.
+    """
+    if program not in PROGRAMS:
+        raise ValueError(f"unknown program {program!r}; use one of {sorted(PROGRAMS)}")
+    about = PROGRAMS[program]
+    if about.kind not in (None, data.kind):
+        raise ValueError(
+            f"{program} reads data sets of kind {about.kind!r}, this one is of kind {data.kind!r}; "
+            f"build one with `embodied dataset {about.kind} --out DIR`"
+        )
+    folder = Path(folder)
+    files = [*_graphs(data, folder / about.data / "connectivity"), *about.write(data, folder)]
+    if features is not None:
+        files.append(folder / about.data / FEATURES)
+        write_features(files[-1], features)
+    return [*files, _text(folder / "README-embodied.md", [readme(program, data, features is not None)])]
+
+
+def readme(program: str, data: Dataset, with_features: bool) -> str:
+    """What the folder's README says."""
+    text = (Path(__file__).parent / "readmes" / f"{program}.md").read_text(encoding="utf-8")
+    if with_features:
+        note = f"`{FEATURES}` holds features of our pictures, not a ResNet-152's; the program opens it by that name."
+    else:
+        note = f"There is no `{FEATURES}`: export again with `--features`, or make one yourself."
+    facts = {
+        "KIND": data.kind,
+        "SEED": str(data.config.seed),
+        "DIGEST": data.digest[:16],
+        "TABLE": data.table().strip(),
+        "FEATURES": note,
+    }
+    return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text).rstrip()
+
+
+def names_of(data: Dataset) -> list[str]:
+    """The houses of all splits."""
+    return sorted({n for s in data.splits for n in data.names(s)})
+
+
+# HANNA -------------------------------------------------------------------------------------------
+
+
+def _hanna(data: Dataset, root: Path) -> list[Path]:
+    home, files, words, numbers = root / "data" / "hanna", [], Counter(), itertools.count(1)
+    for split in data.splits:
+        items = [_item(t, next(numbers), data.place(t.world)) for t in data.tasks(split)]
+        if split == "train":
+            words.update(w for i in items for w in i["instructions"][0].split())
+        files.append(_json(home / f"hanna_{split}.json", items))
+    routes: dict[str, list[dict[str, object]]] = {}
+    for name in names_of(data):
+        routes[scan_name(name)] = [_route(r, data.place(name).graph) for r in data.routes(name)]
+        words.update(w for r in data.routes(name) if r.split == "train_seen" for w in tokenised(r.instruction).split())
+    groups = {g: [scan_name(n) for n in names_of(data) if n.startswith(g)] for g in ("train", "val", "test")}
+    objects = sorted({t.goal.object_class for s in data.splits for t in data.tasks(s)})
+    return [
+        *files,
+        _json(home / "routes.json", routes),
+        _json(home / "panoramic_action_space.json", action_space(data)),
+        _json(home / "scan_split.json", groups),
+        _vocabulary(home / "vocab.txt", words),
+        _text(root / "data" / "accepted_objects.txt", objects),
+        _text(root / "data" / "region_label.txt", region_lines()),
+    ]
+
+
+def action_space(data: Dataset) -> dict[str, list[dict[str, object]]]:
+    """panoramic_action_space.json: '<scan>_<viewpoint>_<heading bin>' to the actions there."""
+    table = {}
+    for name in names_of(data):
+        graph = data.place(name).graph
+        for node, key in enumerate(graph.ids):
+            for b in range(TURNS):
+                table[f"{scan_name(name)}_{key}_{b}"] = action_list(graph, node, b)
+    return table
+
+
+def _item(task: Task, number: int, place: Place, goals: Sequence[int] | None = None) -> dict[str, object]:
+    ids, graph = place.graph.ids, place.graph
+    goals = task.goal_nodes if goals is None else goals
+    return {
+        "path_id": number,
+        "scan": scan_name(task.world),
+        "heading": heading(task.start),
+        "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in goals],
+        "instructions": [tokenised(task.request)],
+    }
+
+
+def _route(route: Route, graph: NavGraph) -> dict[str, object]:
+    return {
+        "path_id": route.id.replace("_", "-"),
+        "path": [graph.ids[v] for v in route.path],
+        "instruction": tokenised(route.instruction),
+        "split": route.split,
+        "view_id": view_index(Pose(0, route.turn, route.tilt).view),
+    }
+
+
+# VNLA --------------------------------------------------------------------------------------------
+
+
+def _vnla(data: Dataset, root: Path) -> list[Path]:
+    teacher, files = VnlaTeacher(), []
+    for prefix, item in (("asknav", _asknav), ("noroom", _noroom)):
+        home, words, numbers = root / "data" / prefix, Counter(), itertools.count(1)
+        for split in data.splits:
+            made = (item(t, numbers, data, teacher) for t in data.tasks(split))
+            items = [i for i in made if i is not None]
+            if split == "train":
+                words.update(w for i in items for w in i["instructions"][0].split())
+            files.append(_json(home / f"{prefix}_{split}.json", items))
+        files += [
+            _vocabulary(home / "train_vocab.txt", words),
+            _text(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),
+            _text(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
+        ]
+    for name in names_of(data):
+        regions = panorama_to_region(data.place(name))
+        files += [
+            _text(
+                root / "code/data/v1/scans" / scan_name(name) / "house_segmentations/panorama_to_region.txt", regions
+            ),
+            _text(root / "data/view_to_region" / f"{scan_name(name)}.panorama_to_region.txt", regions),
+        ]
+    return [*files, _text(root / "data" / "region_label.txt", region_lines())]
+
+
+def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> dict[str, object]:
+    place = data.place(task.world)
+    return {**_item(task, next(numbers), place), **_vnla_fields(task, task.goal_nodes, place, teacher.plan(place))}
+
+
+def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> dict[str, object] | None:
+    """The task without its room: any thing of the class in the house will do. None where that is too near."""
+    place, config, plan = data.place(task.world), VnlaConfig(by_room=False), teacher.plan(data.place(task.world))
+    goals = _anywhere(place, config)[task.goal.object_class]
+    goals = tuple(g for g in goals if plan.counts((g,))[state_of(task.start)] > 0)
+    if count_hops(place.graph.next_hop)[task.start.node, list(goals)].min() + 1 < config.fewest_nodes:
+        return None
+    rng = stream(data.config.seed, "noroom", task.id)
+    request = PlainLanguage().request(FindObject(task.goal.object_class), rng=rng)
+    item = _item(task, next(numbers), place, goals)
+    return {**item, "instructions": [tokenised(request)], **_vnla_fields(task, goals, place, plan)}
+
+
+@functools.lru_cache(maxsize=512)
+def _anywhere(place: Place, config: VnlaConfig) -> Mapping[str, tuple[int, ...]]:
+    """Class to the nodes where one of its things is nearest."""
+    classes = goal_classes(find_instances(place, config.reach), by_room=False, nearest_only=True)
+    return {c.object_class: c.goal_nodes for c in classes}
+
+
+def _vnla_fields(task: Task, goals: Sequence[int], place: Place, plan: MonocularPlan) -> dict[str, object]:
+    room, rooms = place.house.room_by_id, place.graph.room_of_node
+    nearest = min(goals, key=lambda g: (place.graph.distance[task.start.node, g], g))
+    return {
+        "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST)[0]] for g in goals],
+        "start_region_name": region_name(room[rooms[task.start.node]].kind),
+        "end_region_name": region_name(room[rooms[nearest]].kind),
+        "object_name": task.goal.object_class,
+    }
+
+
+def subgoal_words(*, merged: bool) -> list[str]:
+    """The words of VNLA's language of sub-goals.
+
+    Args:
+      merged: 'turn 60 degrees left , go forward 2 steps' (hard) rather than a phrase for every action (easy).
+    """
+    words = ["turn", "look", "go", "left", "right", "up", "down", "forward", "stop", ",", "."]
+    if not merged:
+        return words
+    return [*words, "degrees", "steps", *(str(n) for n in range(2, 10)), *(str(30 * n) for n in range(2, TURNS + 1))]
+
+
+def panorama_to_region(place: Place) -> list[str]:
+    """Lines of panorama_to_region.txt: number, viewpoint, number of its room, region letter."""
+    rooms = place.graph.room_of_node
+    order = {r.id: k for k, r in enumerate(place.house.rooms)}
+    return [
+        f"{k} {key} {order[room]} {REGIONS.get(place.house.room_by_id[room].kind, 'z')}"
+        for k, (key, room) in enumerate(zip(place.graph.ids, rooms, strict=True))
+    ]
+
+
+# Room-to-Room and ILIAD's NAV --------------------------------------------------------------------
+
+
+def _r2r(data: Dataset, root: Path) -> list[Path]:
+    """All splits, and the test split without its paths, as it was published."""
+    home, files, numbers = root / "tasks/R2R/data", [], itertools.count(1)
+    for split in data.splits:
+        items = list(_paths(data, split, numbers))
+        files.append(_json(home / f"R2R_{split}.json", items))
+        if split == "test_unseen":
+            hidden = [{**{k: v for k, v in i.items() if k != "distance"}, "path": i["path"][:1]} for i in items]
+            files.append(_json(home / "R2R_test.json", hidden))
+    return files + [_text(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
+
+
+def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[dict[str, object]]:
+    """One item per path with three instructions: the programs count on three, and where fewer people spoke (in seen
+    splits, those whose wording was held out) theirs are repeated."""
+    by_path: dict[tuple[str, tuple[int, ...]], list[Task]] = {}
+    for t in data.tasks(split):
+        by_path.setdefault((t.world, t.goal.path), []).append(t)
+    for (name, path), tasks in by_path.items():
+        graph, texts = data.place(name).graph, [t.request for t in tasks]
+        yield {
+            "distance": round(float(graph.distance[path[0], path[-1]]), 4),
+            "scan": scan_name(name),
+            "path_id": next(numbers),
+            "path": [graph.ids[v] for v in path],
+            "heading": heading(tasks[0].start),
+            "instructions": [texts[k % len(texts)] for k in range(3)],
+        }
+
+
+NAV_SPLITS = {"train": "train", "val": "val_unseen", "test": "test_unseen"}
+"""ILIAD's splits: those of houses that were not seen."""
+
+
+def _iliad_nav(data: Dataset, root: Path) -> list[Path]:
+    """Paths of at most MOST_NODES nodes: training items with three instructions, the others with one."""
+    home, files, words, numbers = root / "data" / "nav", [], Counter(), itertools.count(1)
+    for theirs, ours in NAV_SPLITS.items():
+        items = []
+        for item in _paths(data, ours, numbers):
+            if len(item["path"]) > MOST_NODES:
+                continue
+            texts = item["instructions"] if theirs == "train" else item["instructions"][:1]
+            items.append({**item, "instructions": texts})
+            words.update(w for t in texts for w in split_sentence(t) if theirs == "train")
+        files.append(_json(home / f"nav_{theirs}.json", items))
+    often = sorted((w for w, n in words.items() if n >= LEAST_WORDS), key=lambda w: (-words[w], w))
+    return [
+        *files,
+        _json(home / "vocab.json", often),
+        _json(home / "panoramic_action_space.json", action_space(data)),
+        _text(root / "code/tasks/NAV/experiments/.keep", []),
+    ]
+
+
+def split_sentence(text: str) -> list[str]:
+    """Words as Room-to-Room and ILIAD count them: split at what is no letter; full stops stay together."""
+    words: list[str] = []
+    for word in (s.strip().lower() for s in re.split(r"(\W+)", text.strip())):
+        punctuation = word and all(c in string.punctuation for c in word) and not all(c == "." for c in word)
+        words += list(word) if punctuation else [word] if word else []
+    return words
+
+
+# The simulator -----------------------------------------------------------------------------------
+
+
+def _matterport(data: Dataset, root: Path) -> list[Path]:
+    """Skyboxes of the panoramas that the data set holds, and the rooms of viewpoints."""
+    from embodied.datasets.skyboxes import write_skyboxes  # late: decodes pictures
+
+    files = []
+    for name in names_of(data):
+        scan = root / "data/v1/scans" / scan_name(name)
+        files += write_skyboxes(
+            data.folder / "houses" / name / "panoramas.pano",
+            data.place(name).graph.ids,
+            scan / "matterport_skybox_images",
+        )
+        files.append(_text(scan / "house_segmentations/panorama_to_region.txt", panorama_to_region(data.place(name))))
+    return files
+
+
+PROGRAMS: Mapping[str, Program] = {
+    "hanna": Program("hanna", "data", _hanna),
+    "vnla": Program("vnla", "data", _vnla),
+    "r2r": Program("vln", ".", _r2r),
+    "iliad-nav": Program("vln", "data/nav", _iliad_nav),
+    "matterport": Program(None, ".", _matterport),
+}
+
+
+# -------------------------------------------------------------------------------------------------
+
+
+def _graphs(data: Dataset, folder: Path) -> list[Path]:
+    files = []
+    for name in names_of(data):
+        files.append(folder / f"{scan_name(name)}_connectivity.json")
+        to_matterport(data.place(name).graph, data.place(name).house, files[-1])
+    return [*files, _text(folder / "scans.txt", [scan_name(n) for n in names_of(data)])]
+
+
+def _vocabulary(path: Path, words: Mapping[str, int]) -> Path:
+    return _text(path, [*SPECIAL, *sorted(words, key=lambda w: (-words[w], w))])
+
+
+def _json(path: Path, body: object) -> Path:
+    write_bytes(path, json.dumps(body).encode())
+    return path
+
+
+def _text(path: Path, lines: Sequence[str]) -> Path:
+    write_bytes(path, "".join(line + "\n" for line in lines).encode())
+    return path

@@ -1,0 +1,108 @@
+"""A lit house as USDZ: its baked pages as what each surface gives off, with names, classes and rooms.
+
+Needs OpenUSD (`pip install embodied[usd]`). There is no maintained converter from glTF to USD for Python, so the stage
+is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh says
+what it is, as the extras of the glTF do (embodied.scene.web).
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import PIL.Image
+
+from assets.cache import atomic_path
+from embodied.errors import UnableError
+from embodied.house.house import House
+from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.web import JPEG_QUALITY, about
+
+
+def export_usd(house: House, lit: LitPages, path: Path) -> Path:
+    """Write the house with its baked light as one USDZ file.
+
+    Raises:
+      UnableError: OpenUSD is not installed.
+      ValueError: the name does not end in .usdz.
+    """
+    try:
+        from pxr import Sdf, Usd, UsdGeom, UsdUtils
+    except ImportError as e:
+        raise UnableError("USD needs OpenUSD; install it with: pip install 'embodied[usd]'") from e
+    if Path(path).suffix != ".usdz":
+        raise ValueError(f"{path} should end in .usdz: the house and its pages are one file")
+    with tempfile.TemporaryDirectory() as folder:
+        stage = Usd.Stage.CreateNew(str(Path(folder) / "house.usdc"))
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        root = UsdGeom.Xform.Define(stage, "/house")
+        stage.SetDefaultPrim(root.GetPrim())
+        root.GetPrim().SetCustomData({"house": house.name, "house_digest": house.digest, "light": lit.digest})
+        for k, page in enumerate(lit.pages):
+            PIL.Image.fromarray(page).save(Path(folder) / f"page_{k}.jpg", quality=JPEG_QUALITY, subsampling=0)
+        materials: dict[tuple[int, float], Any] = {}
+        for k, mesh in enumerate(lit.meshes):
+            key = (mesh.page, mesh.alpha)
+            if key not in materials:
+                materials[key] = _material(stage, *key)
+            _mesh(stage, f"/house/{prim_name(mesh.owner)}_{k}", mesh, about(house, mesh), materials[key])
+        stage.GetRootLayer().Save()
+        with atomic_path(Path(path)) as temporary:
+            packed = Path(folder) / "house.usdz"
+            if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(Path(folder) / "house.usdc")), str(packed)):
+                raise UnableError("OpenUSD could not pack the house; is the temporary folder full?")
+            temporary.write_bytes(packed.read_bytes())
+    return Path(path)
+
+
+def prim_name(owner: str) -> str:
+    """An owner as USD may name it: letters, digits and underscores."""
+    return re.sub(r"\W", "_", owner if not owner[:1].isdigit() else f"_{owner}")
+
+
+def _mesh(stage: Any, path: str, mesh: LitMesh, facts: dict[str, str], material: Any) -> None:
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+    prim = UsdGeom.Mesh.Define(stage, path)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices, np.float32)))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.faces.reshape(-1), np.int32)))
+    prim.CreateExtentAttr(
+        Vt.Vec3fArray.FromNumpy(np.stack([mesh.vertices.min(0), mesh.vertices.max(0)]).astype(np.float32))
+    )
+    prim.CreateSubdivisionSchemeAttr("none")
+    uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]]).astype(np.float32)  # v counts upwards there
+    primvars = UsdGeom.PrimvarsAPI(prim)
+    primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "vertex").Set(Vt.Vec2fArray.FromNumpy(uv))
+    prim.GetPrim().SetCustomData({"owner": mesh.owner, **facts})
+    UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(material)
+
+
+def _material(stage: Any, page: int, alpha: float) -> Any:
+    """A UsdPreviewSurface that gives off its page and reflects nothing."""
+    from pxr import Sdf, UsdShade
+
+    path = f"/house/page_{page}_{round(alpha * 100)}"
+    material = UsdShade.Material.Define(stage, path)
+    reader = UsdShade.Shader.Define(stage, f"{path}/st")
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+    picture = UsdShade.Shader.Define(stage, f"{path}/picture")
+    picture.CreateIdAttr("UsdUVTexture")
+    picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./page_{page}.jpg")
+    picture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+    st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    picture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
+    surface = UsdShade.Shader.Define(stage, f"{path}/surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set((0, 0, 0))
+    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(1.0)
+    surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(float(alpha))
+    given_off = picture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+    surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(given_off)
+    material.CreateSurfaceOutput().ConnectToSource(surface.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    return material

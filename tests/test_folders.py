@@ -1,0 +1,329 @@
+"""Exported folders are what the published programs read: each file is read here as they read it, in our own words."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import math
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pytest
+from test_datasets import build
+
+from embodied import mattersim
+from embodied.datasets.matterport import scan_name
+from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, subgoal_words
+
+KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "iliad-nav": "vln"}
+
+
+@pytest.fixture(scope="module")
+def data_sets(tmp_path_factory):
+    home = tmp_path_factory.mktemp("data sets")
+    return {kind: build(home / kind, home / "cache", kind) for kind in ("hanna", "vnla", "vln")}
+
+
+def rows(data, size=2048):
+    """A feature row that says where it belongs: viewpoint number and view, in our order."""
+    for name in names_of(data):
+        for node, key in enumerate(data.place(name).graph.ids):
+            features = np.zeros((36, size), np.float32)
+            features[:, 0], features[:, 1] = node, np.arange(36)
+            yield name, key, features
+
+
+@pytest.fixture(scope="module")
+def folders(data_sets, tmp_path_factory):
+    """The folders of all programs, with features."""
+    home = tmp_path_factory.mktemp("folders")
+    for program, kind in KINDS.items():
+        export_folder(program, data_sets[kind], home / program, rows(data_sets[kind]))
+    return home
+
+
+def read(path: Path):
+    return json.loads(path.read_text())
+
+
+def program_graphs(folder: Path) -> dict[str, nx.Graph]:
+    """As utils.load_nav_graphs of all of them: edges of included viewpoints that are open both ways."""
+    graphs = {}
+    for scan in (folder / "scans.txt").read_text().strip().split("\n"):
+        graphs[scan] = graph = nx.Graph()
+        items = read(folder / f"{scan}_connectivity.json")
+        at = [np.array([i["pose"][k] for k in (3, 7, 11)]) for i in items]
+        for i, item in enumerate(items):
+            for j, open_ in enumerate(item["unobstructed"]):
+                if open_ and item["included"] and items[j]["included"]:
+                    assert items[j]["unobstructed"][i], "the programs assert it"
+                    graph.add_edge(item["image_id"], items[j]["image_id"], weight=float(np.linalg.norm(at[i] - at[j])))
+    return graphs
+
+
+def program_features(path: Path) -> dict[str, np.ndarray]:
+    """As ImageFeatures of all of them."""
+    csv.field_size_limit(sys.maxsize)
+    table = {}
+    with open(path) as f:
+        for row in csv.DictReader(
+            f, delimiter="\t", fieldnames=["scanId", "viewpointId", "image_w", "image_h", "vfov", "features"]
+        ):
+            assert (int(row["image_w"]), int(row["image_h"]), int(row["vfov"])) == (640, 480, 60)
+            code = base64.decodebytes(bytearray(row["features"], "utf-8"))
+            table[f"{row['scanId']}_{row['viewpointId']}"] = np.frombuffer(code, np.float32).reshape(36, 2048)
+    return table
+
+
+@pytest.mark.parametrize("program", KINDS)
+def test_every_viewpoint_of_the_graphs_has_features_and_view_k_is_matterports(program, folders):
+    home = folders / program / PROGRAMS[program].data
+    table, graphs = (
+        program_features(home / "img_features/ResNet-152-imagenet.tsv"),
+        program_graphs(home / "connectivity"),
+    )
+    assert set(table) == {f"{scan}_{v}" for scan, g in graphs.items() for v in g.nodes}
+    features = next(iter(table.values()))
+    turns = features[12:24, 1] % 12
+    assert turns.tolist() == [(3 - k) % 12 for k in range(12)], "heading k x 30 degrees from +y, clockwise"
+
+
+@pytest.mark.parametrize("program", KINDS)
+def test_the_readme_says_what_to_run_and_which_lines_to_change(program, folders):
+    text = (folders / program / "README-embodied.md").read_text()
+    assert (
+        "python -m embodied.mattersim" in text
+        and "commit" in text
+        and "PyTorch" in text
+        and "$" not in text.replace("$ ", "")
+    )
+    assert "not a ResNet-152's" in text
+
+
+# HANNA -------------------------------------------------------------------------------------------
+
+
+def hanna_simulator(home: Path, batch: int):
+    sim = mattersim.module("hanna").Simulator()
+    sim.setRenderingEnabled(False)
+    sim.setDiscretizedViewingAngles(True)
+    sim.setCameraResolution(640, 480)
+    sim.setCameraVFOV(math.radians(60))
+    sim.setNavGraphPath(str(home / "connectivity"))
+    sim.setBatchSize(batch)
+    sim.initialize()
+    return sim
+
+
+def turn_to(sim, views):
+    """HANNA turns to a view by the difference of its index, and asserts that it got there."""
+    now = [s.viewIndex for s in sim.getState()]
+    return [v % 12 - n % 12 for v, n in zip(views, now, strict=True)], [
+        v // 12 - n // 12 for v, n in zip(views, now, strict=True)
+    ]
+
+
+def test_hanna_can_take_every_action_of_every_list(folders):
+    """Its environment looks into the action's view, finds the next viewpoint among the navigable, and goes there."""
+    home = folders / "hanna" / "data"
+    lists, graphs = read(home / "hanna/panoramic_action_space.json"), program_graphs(home / "connectivity")
+    assert set(lists) == {f"{scan}_{v}_{b}" for scan, g in graphs.items() for v in g.nodes for b in range(12)}
+    for key, actions in lists.items():
+        scan, viewpoint, b = key.split("_")
+        assert actions[0] == {"relViewIndex": -1, "absViewIndex": int(b), "nextViewpointId": viewpoint}
+        assert {a["nextViewpointId"] for a in actions[1:]} == set(graphs[scan].neighbors(viewpoint))
+        if b != "4":
+            continue
+        n = len(actions) - 1
+        sim = hanna_simulator(home, n)
+        sim.newEpisode([scan] * n, [viewpoint] * n, [4 * math.pi / 6] * n, [0] * n)
+        sim.makeAction([0] * n, *turn_to(sim, [a["absViewIndex"] for a in actions[1:]]))
+        for state, action in zip(sim.getState(), actions[1:], strict=True):
+            assert state.viewIndex == action["absViewIndex"]
+            assert action["nextViewpointId"] in [v.viewpointId for v in state.navigableLocations]
+
+
+def swept_lists(home: Path, scan: str, viewpoints) -> dict[str, list]:
+    """The lists that the authors' builder makes: sweep 36 views, keep each neighbour where it is nearest the middle."""
+    sim, found = hanna_simulator(home, 1), {}
+    for viewpoint in viewpoints:
+        for b in range(12):
+            sim.newEpisode([scan], [viewpoint], [b * math.pi / 6], [-math.pi / 6])
+            nearest: dict[str, tuple] = {}
+            for k in range(36):
+                state = sim.getState()[0]
+                for v in state.navigableLocations[1:]:
+                    off = math.hypot(v.rel_heading, v.rel_elevation)
+                    if v.viewpointId not in nearest or off < nearest[v.viewpointId][0]:
+                        turn = k % 12 * math.pi / 6 + v.rel_heading
+                        nearest[v.viewpointId] = (off, k, state.viewIndex, abs(math.remainder(turn, 2 * math.pi)))
+                sim.makeAction([0], [1], [int(k % 12 == 11)])
+            order = sorted(nearest, key=lambda v: nearest[v][3])
+            found[f"{scan}_{viewpoint}_{b}"] = [(v, *nearest[v][1:3]) for v in order]
+    return found
+
+
+def test_the_action_lists_are_those_of_the_authors_builder_but_for_ties(data_sets, folders):
+    home, lists = folders / "hanna" / "data", action_space(data_sets["hanna"])
+    scan, graph = next(iter(program_graphs(home / "connectivity").items()))
+    swept = swept_lists(home, scan, sorted(graph.nodes)[:12])
+    for key, theirs in swept.items():
+        ours = [(a["nextViewpointId"], a["relViewIndex"], a["absViewIndex"]) for a in lists[key][1:]]
+        turns = [round(abs(a["rel_heading"]), 5) for a in lists[key][1:]]
+        assert {v for v, *_ in ours} == {v for v, *_ in theirs}
+        if len(set(turns)) == len(turns):
+            assert [v for v, *_ in ours] == [v for v, *_ in theirs], key
+
+
+def test_hannas_assistant_finds_a_route_of_the_active_split_wherever_it_can_be_asked(folders):
+    """Its choice of a route ignores splits and filters afterwards: an empty list is a crash."""
+    home = folders / "hanna" / "data"
+    routes, graphs = read(home / "hanna/routes.json"), program_graphs(home / "connectivity")
+    speakers = {"train": ("train_seen", "train_unseen"), "val": ("val",), "test": ("test",)}
+    splits = read(home / "hanna/scan_split.json")
+    for scan, known in routes.items():
+        house_split = next(s for s, scans in splits.items() if scan in scans)
+        by_path = defaultdict(set)
+        for r in known:
+            assert (
+                isinstance(r["path_id"], str)
+                and 0 <= r["view_id"] < 36
+                and r["instruction"] == r["instruction"].lower()
+            )
+            assert all(graphs[scan].has_edge(a, b) for a, b in zip(r["path"], r["path"][1:], strict=False))
+            by_path[tuple(r["path"])].add(r["split"])
+        assert all(set(speakers[house_split]) <= spoken for spoken in by_path.values()), scan
+
+
+def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(folders):
+    home = folders / "hanna" / "data"
+    graphs, words = program_graphs(home / "connectivity"), (home / "hanna/vocab.txt").read_text().split("\n")
+    assert words[:3] == ["<PAD>", "<UNK>", "<EOS>"] and len(words) == len(set(words))
+    seen = set()
+    for split in ("train", "val_seen", "val_unseen", "test_seen", "test_unseen"):
+        for item in read(home / f"hanna/hanna_{split}.json"):
+            assert item["path_id"] not in seen and not seen.add(item["path_id"])
+            for path in item["paths"]:
+                assert path[0] == item["paths"][0][0]
+                walked = sum(graphs[item["scan"]].edges[e]["weight"] for e in zip(path, path[1:], strict=False))
+                assert walked == pytest.approx(nx.dijkstra_path_length(graphs[item["scan"]], path[0], path[-1]))
+            if split == "train":
+                assert set(item["instructions"][0].split()) <= set(words)
+
+
+# VNLA --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("prefix", ["asknav", "noroom"])
+def test_vnlas_trajectories_lead_to_their_goals_in_the_first_release(prefix, folders):
+    root = folders / "vnla"
+    sim = mattersim.module("v0.1").Simulator()
+    sim.setNavGraphPath(str(root / "data/connectivity"))
+    sim.setRenderingEnabled(False)
+    sim.setDiscretizedViewingAngles(True)
+    sim.setCameraResolution(640, 480)
+    sim.setCameraVFOV(math.radians(60))
+    sim.init()
+    n = 0
+    for split in ("train", "val_seen", "val_unseen", "test_seen", "test_unseen"):
+        for item in read(root / f"data/{prefix}/{prefix}_{split}.json"):
+            assert len(item["trajectories"]) == len(item["paths"])
+            for path, actions in zip(item["paths"], item["trajectories"], strict=True):
+                assert actions[-1] == [0, 0, 0], "the teacher stops"
+                sim.newEpisode(item["scan"], path[0], item["heading"], 0)
+                for action in actions:
+                    sim.makeAction(*action)
+                assert sim.getState().location.viewpointId == path[-1]
+                n += 1
+    assert n > 20
+
+
+def test_vnlas_goals_of_a_task_lie_in_rooms_of_one_letter(folders):
+    """Its judge asserts that; the file is found from its working directory, code/tasks/VNLA."""
+    root = folders / "vnla"
+    region = {}
+    for item in read(root / "data/asknav/asknav_train.json"):
+        file = root / "code/tasks/VNLA/../../data/v1/scans".replace("tasks/VNLA/../../", "") / item["scan"]
+        lines = (file / "house_segmentations/panorama_to_region.txt").read_text().split("\n")[:-1]
+        region = {line.split()[1]: line.split()[-1] for line in lines}
+        assert len({region[p[-1]] for p in item["paths"]}) == 1
+        assert len({line.split()[-2] for line in lines}) > 1, "numbers of rooms"
+    letters = {line[1] for line in (root / "data/region_label.txt").read_text().split("\n")[:-1]}
+    assert set(region.values()) <= letters
+
+
+def test_vnlas_words_of_sub_goals_cover_what_the_advisor_says(data_sets, folders):
+    from embodied.language import PlainLanguage
+
+    words = set((folders / "vnla/data/asknav/verbal_hard_vocab.txt").read_text().split())
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        actions = [str(a) for a in rng.choice(["left", "right", "up", "down", "forward"], 3)] + ["stop"]
+        assert set(PlainLanguage().subgoal(actions).split()) <= words
+    assert set(subgoal_words(merged=False)) < words
+
+
+def test_a_no_room_request_names_no_room_and_any_room_will_do(folders):
+    root = folders / "vnla" / "data"
+    by_room = {i["path_id"]: i for i in read(root / "asknav/asknav_train.json")}
+    without = read(root / "noroom/noroom_train.json")
+    assert without and all(" in " not in i["instructions"][0] for i in without)
+    assert max(len(i["paths"]) for i in without) >= max(len(i["paths"]) for i in by_room.values())
+
+
+# Room-to-Room and ILIAD --------------------------------------------------------------------------
+
+
+def test_room_to_room_reads_three_instructions_and_hides_the_paths_of_its_test(folders):
+    root = folders / "r2r"
+    graphs, seen = program_graphs(root / "connectivity"), set()
+    for split in ("train", "val_seen", "val_unseen"):
+        for item in read(root / f"tasks/R2R/data/R2R_{split}.json"):
+            assert isinstance(item["path_id"], int) and item["path_id"] not in seen and not seen.add(item["path_id"])
+            assert len(item["instructions"]) == 3
+            assert all(
+                graphs[item["scan"]].has_edge(a, b) for a, b in zip(item["path"], item["path"][1:], strict=False)
+            )
+    hidden, whole = (read(root / f"tasks/R2R/data/R2R_{s}.json") for s in ("test", "test_unseen"))
+    assert [i["path"] for i in hidden] == [i["path"][:1] for i in whole] and "distance" not in hidden[0]
+    assert all((root / "tasks/R2R" / d).is_dir() for d in ("results", "snapshots", "plots"))
+
+
+def test_iliads_paths_can_be_won_in_ten_actions(folders):
+    home = folders / "iliad-nav/data/nav"
+    graphs, ids = program_graphs(home / "connectivity"), []
+    vocabulary = read(home / "vocab.json")
+    counts = defaultdict(int)
+    for split, wordings in (("train", 3), ("val", 1), ("test", 1)):
+        items = read(home / f"nav_{split}.json")
+        assert items
+        for item in items:
+            assert len(item["path"]) <= 10 and len(item["instructions"]) == wordings
+            assert all(
+                graphs[item["scan"]].has_edge(a, b) for a, b in zip(item["path"], item["path"][1:], strict=False)
+            )
+            ids.append(item["path_id"])
+            for text in item["instructions"] if split == "train" else ():
+                for word in split_sentence(text):
+                    counts[word] += 1
+    assert len(ids) == len(set(ids))
+    assert set(vocabulary) == {w for w, n in counts.items() if n >= 5}
+    assert (folders / "iliad-nav/code/tasks/NAV/experiments").is_dir()
+
+
+def test_words_are_split_as_room_to_room_splits_them():
+    """Signs with a blank between them stay together, as there."""
+    words = ["go", "left", ",", "then", "...", "stop", "! (", "don", "'", "t", "run", ".", ")"]
+    assert split_sentence("Go left, then... stop! (Don't run.)") == words
+
+
+def test_another_kind_is_refused_with_the_kind_that_is_read(data_sets, tmp_path):
+    with pytest.raises(ValueError, match="reads data sets of kind 'vnla'"):
+        export_folder("vnla", data_sets["hanna"], tmp_path)
+    with pytest.raises(ValueError, match="unknown program 'habitat'"):
+        export_folder("habitat", data_sets["hanna"], tmp_path)
+    assert scan_name(names_of(data_sets["hanna"])[0]) == "test0000"
