@@ -16,8 +16,8 @@ import pytest
 from test_datasets import build
 
 from embodied import mattersim
-from embodied.datasets.matterport import scan_name
 from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, subgoal_words
+from embodied.datasets.matterport import scan_name
 
 KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "iliad-nav": "vln"}
 
