@@ -6,9 +6,8 @@ The judging itself is embodied.evaluation.evaluate.evaluate, the same for everyb
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,17 +15,14 @@ from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import PerfectInterpretation
 from agents.vision.bank import FeatureBank
-from embodied.interface import Ask, Episode, Mode, Policy, Stop
+from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
 from embodied.teachers.hanna import HannaTeacher, segments
 from embodied.teachers.shortest import nearest
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 REASONS = ("lost", "uncertain_wrong", "never_asked")
 
 
-def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Policy]:
+def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5.
 
     'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
@@ -59,7 +55,7 @@ class Failures:
     """Share of sub-tasks left more than 2 m from their target."""
 
 
-def failures(episodes: Sequence[Episode], worlds: dict[str, World]) -> Failures:
+def failures(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> Failures:
     """Why episodes failed."""
     out = {"limit": 0, "stop": 0, "passed": 0, "silent": 0}
     left, wrong = 0, 0
@@ -96,7 +92,7 @@ class Prediction:
         return 2 * self.precision * self.recall / both if both else 0.0
 
 
-def predictions(episodes: Sequence[Episode], worlds: dict[str, World]) -> tuple[Prediction, ...]:
+def predictions(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> tuple[Prediction, ...]:
     """Figures D.1(b) and D.2: predicted against true conditions, reasons at probability 0.5 and more."""
     truth, said = [], []
     teacher = HannaTeacher()

@@ -19,7 +19,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import as_json, markdown, save
-from embodied.interface import Episode, Policy
+from embodied.interface import Agent, Episode
 from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
@@ -86,7 +86,7 @@ def run_eval(
     return 0
 
 
-def _without_learning() -> Mapping[str, Policy]:
+def _without_learning() -> Mapping[str, Agent]:
     return {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
 
 

@@ -28,7 +28,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, save, shown
-from embodied.interface import Episode, Policy
+from embodied.interface import Agent, Episode
 from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
@@ -336,7 +336,7 @@ class _Judge:
             self.note(f"{line.key} on {split}: success {shown('success', row.values['success'])} %")
         return self._rows[line.key, split]
 
-    def _policy(self, line: Line, split: str) -> Policy:
+    def _policy(self, line: Line, split: str) -> Agent:
         if not line.variant:
             return agent_without_learning("hanna", line.played)
         if line.variant not in self._agents:

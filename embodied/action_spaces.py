@@ -8,15 +8,12 @@ they are computed once per pose and shared by all episodes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, Candidates, Pose
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import STEP, TURNS, VIEWS, Candidates, Place, Pose
 
 WORDS = ("forward", "left", "right", "up", "down")
 """VNLA's moves, in the order of its candidates; stopping is an action of its own."""
@@ -29,7 +26,7 @@ Reach = tuple[Candidates, tuple[Pose, ...]]
 
 
 class Moves(Protocol):
-    def at(self, world: World, pose: Pose) -> Reach: ...
+    def at(self, world: Place, pose: Pose) -> Reach: ...
 
 
 class PanoramicMoves:
@@ -38,7 +35,7 @@ class PanoramicMoves:
     def __init__(self) -> None:
         self._reach: dict[tuple[str, int, int], Reach] = {}
 
-    def at(self, world: World, pose: Pose) -> Reach:
+    def at(self, world: Place, pose: Pose) -> Reach:
         key = (world.house.name, pose.node, pose.turn)
         reach = self._reach.get(key)
         if reach is None:
@@ -56,7 +53,7 @@ class MonocularMoves:
     def __init__(self) -> None:
         self._reach: dict[tuple[str, Pose], Reach] = {}
 
-    def at(self, world: World, pose: Pose) -> Reach:
+    def at(self, world: Place, pose: Pose) -> Reach:
         key = (world.house.name, pose)
         reach = self._reach.get(key)
         if reach is None:

@@ -15,12 +15,14 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from embodied.world import World
+    from assets.catalogue import Catalogue
+    from embodied.house.house import House
+    from embodied.navigation.graph import NavGraph
 
 STEP = math.pi / 6
 """The angle of one turn or tilt, radians."""
@@ -70,6 +72,52 @@ class Sight:
 
     def __repr__(self) -> str:
         return "Sight(...)"
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One object as seen from one node."""
+
+    placement: str
+    object_class: str
+    yaw: float
+    """Direction of what is visible of it, radians counter-clockwise from +x."""
+    pitch: float
+    """Radians above the horizon."""
+    distance: float
+    """Mean length of the rays that meet it, metres."""
+    pixels: int
+    """How many pixels of the six 64 x 64 faces around the node show it; all six have 24576."""
+
+
+class Place(Protocol):
+    """A house and where one can go in it: enough to play, judge and word."""
+
+    @property
+    def name(self) -> str:
+        """House.name."""
+        ...
+
+    @property
+    def house(self) -> House: ...
+
+    @property
+    def graph(self) -> NavGraph: ...
+
+
+class SeenPlace(Place, Protocol):
+    """A place of which is known, besides, what can be seen from every node; embodied.world.World is one."""
+
+    @property
+    def catalogue(self) -> Catalogue: ...
+
+    def sightings(self, node: int) -> tuple[Sighting, ...]:
+        """The objects that can be seen from a node, the largest in view first."""
+        ...
+
+
+PlaceT = TypeVar("PlaceT", bound=Place)
+PlaceT_contra = TypeVar("PlaceT_contra", bound=Place, contravariant=True)
 
 
 class FeatureSource(Protocol):
@@ -327,7 +375,7 @@ class Observation:
 class Situation:
     """The privileged view of one step: for assistants, teachers and metrics, never for a policy."""
 
-    world: World
+    world: Place
     task: Task
     pose: Pose
     mode: Mode
@@ -427,9 +475,15 @@ class Teacher(Protocol):
         """The reference action now."""
         ...
 
-    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+    def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         """Labels of every step of a finished episode (the retrospective mode of 4.2.3)."""
         ...
+
+
+Observations = Sequence[Observation | None]
+"""Of a batch of episodes; None where one has ended."""
+Situations = Sequence[Situation | None]
+Actions = list[Action | None]
 
 
 class Policy(Protocol):
@@ -442,18 +496,48 @@ class Policy(Protocol):
     """
 
     def act(
-        self, observations: Sequence[Observation | None], memory: object | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[list[Action | None], object]: ...
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]: ...
 
 
-class Language(Protocol):
-    """The voice of requesters and assistants; embodied.language implements it."""
+@runtime_checkable
+class PrivilegedPolicy(Protocol):
+    """A skyline or baseline that is shown the situations as well; otherwise as Policy."""
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]: ...
+
+
+Agent = Policy | PrivilegedPolicy
+"""Whoever can play an episode."""
+
+
+def act(
+    agent: Agent,
+    observations: Observations,
+    situations: Situations,
+    memory: Any,
+    *,
+    rngs: Sequence[np.random.Generator],
+) -> tuple[Actions, Any]:
+    """What an agent does; it is shown the situations only if it says that it needs them."""
+    if isinstance(agent, PrivilegedPolicy):
+        return agent.act_privileged(observations, situations, memory, rngs=rngs)
+    return agent.act(observations, memory, rngs=rngs)
+
+
+class Language(Protocol[PlaceT_contra]):
+    """The voice of requesters and assistants; embodied.language implements it.
+
+    Language[SeenPlace] speaks of what can be seen, Language[Place] does without.
+    """
 
     def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
         """The words of a task: 'find a mug in the kitchen'."""
         ...
 
-    def route(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+    def route(self, world: PlaceT_contra, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """How a person describes walking along `path` (nodes), starting to look along `yaw` (radians)."""
         ...
 

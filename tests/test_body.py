@@ -9,8 +9,8 @@ from conftest import two_rooms
 import embodied.gym.env
 from assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
-from embodied.datasets.store import Place
-from embodied.envs.driven import DrivenHannaEnv, Driver, driven, total_bumps
+from embodied.datasets.store import StoredPlace
+from embodied.envs.driven import DrivenHannaEnv, Driver
 from embodied.envs.hanna import HannaEnv
 from embodied.interface import Ask, FindObject, Move, Pose, Route, Stop, Task
 from embodied.navigation.graph import build_graph
@@ -19,7 +19,7 @@ from embodied.navigation.graph import build_graph
 @pytest.fixture(scope="module")
 def place():
     house = two_rooms()
-    return Place(house, build_graph(house))
+    return StoredPlace(house, build_graph(house))
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
     path = graph.path(0, far)
     task = Task("t", "hanna", name, Pose(0), FindObject("rug", None, ("rug_1",)), (far,), "find a rug", 2.0, 30)
     anna = Anna({name: graph}, {name: (Route("r", path, 0, 0, "go", "test"),)}, split="test")
-    envs = [HannaEnv({name: place}, anna), driven(DrivenHannaEnv, catalogue, {name: place}, anna)]
+    envs = [HannaEnv({name: place}, anna), DrivenHannaEnv(catalogue, {name: place}, anna)]
     for env in envs:
         env.reset(task)
         env.step(Ask())
@@ -68,7 +68,7 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
         env.step(Stop())
     walked, drove = (e.episode() for e in envs)
     assert walked == drove
-    assert len(envs[1].drives) == len(path) - 1 and total_bumps(envs[1]) == 0
+    assert len(envs[1].drives) == len(path) - 1 and envs[1].facts() == {"bumps": 0}
 
 
 def test_gymnasium_plays_on_wheels_too(place, tmp_path):

@@ -17,7 +17,7 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
-from embodied.policies.baselines import Asking, Shortest, ask_every_5
+from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.teachers.vnla import VnlaTeacher
 
 
@@ -88,7 +88,7 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
     heard = {}
     for split in ("train", "test_seen"):
-        episodes = play(data.environment(split), Asking(Shortest(), ask_every_5), data.tasks(split), seed=0)
+        episodes = play(data.environment(split), PrivilegedAsking(Shortest(), ask_every_5), data.tasks(split), seed=0)
         heard[split] = {s.reply.subtask.id for e in episodes for s in e.steps if isinstance(s.action, Ask)}
     assert heard["train"] and heard["test_seen"] and not heard["train"] & heard["test_seen"]
 

@@ -10,7 +10,7 @@ from test_datasets import build
 
 from embodied.cli import main
 from embodied.evaluation import tables
-from embodied.evaluation.evaluate import AGENTS, LOOKING, agent, evaluate, spread
+from embodied.evaluation.evaluate import AGENTS, agent, evaluate, spread
 
 
 def test_the_interval_of_independent_values_is_the_textbook_one():
@@ -45,10 +45,7 @@ def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
     data = build(tmp_path / "d", tmp_path / "c", kind)
     split = "test_unseen_env" if kind == "hari" else "test_unseen"
-    rows = {
-        r.agent: r.values
-        for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind] if n not in LOOKING}, limit=8)
-    }
+    rows = {r.agent: r.values for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
     assert rows["shortest"]["success"].mean == 1
     assert rows["random walk"]["success"].mean < 0.5
     if kind == "hanna":

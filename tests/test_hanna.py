@@ -41,8 +41,8 @@ from embodied.interface import (
 )
 from embodied.language.plain import PlainLanguage
 from embodied.policies.baselines import (
-    Asking,
     PerfectInterpreter,
+    PrivilegedAsking,
     RandomWalk,
     Shortest,
     ask_at_random,
@@ -190,7 +190,7 @@ def test_the_goal_shows_only_after_help():
 def test_teacher_navigation_solves_everything_however_it_asks():
     world, _, tasks, make = grid_setup()
     for rule in (never_ask, ask_at_random, ask_every_5):
-        episodes = play(make, Asking(Shortest(), rule), tasks, seed=2)
+        episodes = play(make, PrivilegedAsking(Shortest(), rule), tasks, seed=2)
         assert all(metrics.success(e, world.graph) for e in episodes)
     assert np.mean([e.requests for e in episodes]) > 0.2
     alone = play(make, Shortest(), tasks, seed=2)
@@ -208,7 +208,7 @@ def test_perfect_interpretation_beats_chance_by_far():
 
 def test_help_does_not_depend_on_the_batch_around_it():
     _, _, tasks, make = grid_setup(33)
-    policy = Asking(Shortest(), ask_at_random)
+    policy = PrivilegedAsking(Shortest(), ask_at_random)
     alone = play(make, policy, tasks, seed=4)
     assert alone == play(make, policy, tasks, seed=4, batch=32)
     assert alone == play(make, policy, tasks[::-1], seed=4, batch=5)[::-1]

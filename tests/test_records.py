@@ -8,13 +8,13 @@ from test_hanna import LINE_TASK, grid_setup, line_env
 
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, FollowRoute, Move, Pose, Route, Stop, Task, Thought
-from embodied.policies.baselines import Asking, Shortest, ask_at_random
+from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_at_random
 from embodied.records import RecordError, from_json, load_lines, save_lines, to_json
 
 
 def test_episodes_with_replies_survive():
     _, _, tasks, make = grid_setup(20)
-    for e in play(make, Asking(Shortest(), ask_at_random), tasks, seed=1, agent="asker"):
+    for e in play(make, PrivilegedAsking(Shortest(), ask_at_random), tasks, seed=1, agent="asker"):
         assert from_json(Episode, to_json(e)) == e
 
 

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Pose, Sight, Step, Task
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Place, Pose, Sight, Step, Task
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
@@ -103,7 +99,7 @@ class Story:
             kept.append(line)
         return "\n\n".join([self.dialogue[0], *reversed(kept)])
 
-    def stack(self, world: World, step: Step) -> str:
+    def stack(self, world: Place, step: Step) -> str:
         """HARI's goals as Markdown, the one that counts now first."""
         here, lines = step.pose.node, []
         for depth, goal in reversed(list(enumerate(self.goals))):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -21,10 +20,7 @@ from agents.hanna.losses import IGNORE, help_loss, navigation_loss
 from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import rollout
-from embodied.interface import Action, Episode, Label, Move, Observation, Stop, Task, Teacher
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import Action, Episode, Label, Move, Observation, Place, Stop, Task, Teacher
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +86,7 @@ def collect(
     policy: HannaPolicy,
     tasks: Sequence[Task],
     teacher: Teacher,
-    worlds: Mapping[str, World],
+    worlds: Mapping[str, Place],
     *,
     seed: int,
 ) -> Experience:

@@ -264,15 +264,14 @@ class PerfectInterpretation:
     """
 
     policy: HannaPolicy
-    privileged: bool = True
 
-    def act(
+    def act_privileged(
         self,
         observations: Sequence[Observation | None],
+        situations: Sequence[Situation | None],
         memory: HannaMemory | None,
         *,
         rngs: Sequence[np.random.Generator],
-        situations: Sequence[Situation | None],
     ) -> tuple[list[Action | None], HannaMemory]:
         imposed = [None if s is None or s.mode is Mode.MAIN else _teacher_index(s) for s in situations]
         return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)

@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 
@@ -45,17 +45,14 @@ from agents.vision.bank import FeatureBank
 from embodied.envs.base import HelpEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
-from embodied.interface import Ask, Episode, Task, Teacher
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import Ask, Episode, Place, Task, Teacher
 
 
 @dataclass(frozen=True, eq=False)
 class Split:
     """Tasks of some houses and the environment they are played in."""
 
-    worlds: Mapping[str, World]
+    worlds: Mapping[str, Place]
     tasks: Sequence[Task]
     make_env: Callable[[], HelpEnv]
     bank: FeatureBank
@@ -197,7 +194,7 @@ ADDED = ("loss navigation", "loss asking", "steps")
 
 
 def numbers_of(
-    experience: Experience, losses: Sequence[torch.Tensor], norm: float, worlds: Mapping[str, World]
+    experience: Experience, losses: Sequence[torch.Tensor], norm: float, worlds: Mapping[str, Place]
 ) -> dict[str, float]:
     """What a researcher wants to know about one update."""
     said, wanted, episodes = experience.said, experience.targets, experience.episodes

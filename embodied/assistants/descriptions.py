@@ -6,15 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import STEP, TURNS, Description, Feature
+from embodied.interface import STEP, TURNS, Description, Feature, Place
 from embodied.tasks.goals import NOT_OBJECTS
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 FARTHEST = 4
 """Largest distance bin: five values, metres rounded down (appendix E)."""
@@ -43,16 +39,16 @@ class Describer:
         self._frequent, self._config = frozenset(frequent), config
         self._objects: dict[tuple[str, int, float], Description] = {}
 
-    def dense(self, world: World, node: int, *, goal: bool = False) -> Description:
+    def dense(self, world: Place, node: int, *, goal: bool = False) -> Description:
         """The room's name and at most 20 objects within 5 m (3 m of a goal), nearest first."""
         return (self._room(world, node), *self._near(world, node, goal))
 
-    def sparse(self, world: World, node: int, *, goal: bool = False) -> Description:
+    def sparse(self, world: Place, node: int, *, goal: bool = False) -> Description:
         """Only frequent objects; the room's name for goals only (4.3.5)."""
         objects = tuple(f for f in self._near(world, node, goal) if f.name in self._frequent)
         return (self._room(world, node), *objects) if goal else objects
 
-    def step(self, world: World, node: int, target: int) -> Description:
+    def step(self, world: Place, node: int, target: int) -> Description:
         """The next optimal navigation action towards `target`: 'go' with its direction, or 'stop'."""
         if node == target:
             return (Feature("action", "stop"),)
@@ -63,7 +59,7 @@ class Describer:
         return (Feature("action", "go", *_bins(offset)),)
 
     def pretraining_goal(
-        self, world: World, node: int, start: int, object_class: str, *, rng: np.random.Generator
+        self, world: Place, node: int, start: int, object_class: str, *, rng: np.random.Generator
     ) -> Description:
         """The goal description of a pre-training task (appendix E, second "For d_t^s", read as d_t^g: X24).
 
@@ -76,10 +72,10 @@ class Describer:
             choices.append(self.step(world, start, node))
         return choices[int(rng.integers(len(choices)))]
 
-    def _room(self, world: World, node: int) -> Feature:
+    def _room(self, world: Place, node: int) -> Feature:
         return Feature("room", world.house.room_by_id[world.graph.room_of_node[node]].kind)
 
-    def _near(self, world: World, node: int, goal: bool) -> Description:
+    def _near(self, world: Place, node: int, goal: bool) -> Description:
         radius = self._config.goal_radius if goal else self._config.state_radius
         key = (world.house.name, node, radius)
         if key not in self._objects:
@@ -98,7 +94,7 @@ def dropped(description: Description, *, rng: np.random.Generator) -> Descriptio
     return tuple(description[i] for i in sorted(rng.choice(n, m, replace=False)))
 
 
-def near_objects(world: World, node: int, radius: float, config: DescriberConfig) -> Description:
+def near_objects(world: Place, node: int, radius: float, config: DescriberConfig) -> Description:
     """Objects within `radius` metres (3-D, from eye to the middle of the object), nearest first."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
     found = []
@@ -112,7 +108,7 @@ def near_objects(world: World, node: int, radius: float, config: DescriberConfig
     return tuple(f for _, _, f in sorted(found, key=lambda x: x[:2])[: config.most_objects])
 
 
-def frequent_classes(worlds: Iterable[World], most: int = 100) -> tuple[str, ...]:
+def frequent_classes(worlds: Iterable[Place], most: int = 100) -> tuple[str, ...]:
     """The `most` most frequent object classes of some (training) houses, most frequent first."""
     counts = Counter(p.object_class for w in worlds for p in w.house.placements if p.object_class not in NOT_OBJECTS)
     return tuple(name for name, _ in sorted(counts.items(), key=lambda x: (-x[1], x[0]))[:most])

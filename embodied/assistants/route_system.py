@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import TURNS, Language, Route
+from embodied.interface import TURNS, Language, PlaceT, Route
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-    from embodied.world import World
 
 TRIES = 12
 """How often a wording is asked for again when the house already has it."""
@@ -171,21 +170,23 @@ def route_paths(
 
 
 def build_routes(
-    world: World, *, seed: int, language: Language, house_split: str, config: RouteConfig = RouteConfig()
+    world: PlaceT, *, seed: int, language: Language[PlaceT], house_split: str, config: RouteConfig = RouteConfig()
 ) -> tuple[Route, ...]:
     """The sampled route system of one house, each path worded three times."""
     paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config)
     return worded(world, paths, WORDINGS[house_split], seed=seed, language=language)
 
 
-def build_spanning_routes(world: World, *, seed: int, language: Language, house_split: str) -> tuple[Route, ...]:
+def build_spanning_routes(
+    world: PlaceT, *, seed: int, language: Language[PlaceT], house_split: str
+) -> tuple[Route, ...]:
     """The route system of Lemma 2, each path worded once per split."""
     wordings = tuple(dict.fromkeys(WORDINGS[house_split]))
     return worded(world, spanning_paths(world.graph), wordings, seed=seed, language=language)
 
 
 def worded(
-    world: World, paths: list[tuple[int, ...]], wordings: tuple[str, ...], *, seed: int, language: Language
+    world: PlaceT, paths: list[tuple[int, ...]], wordings: tuple[str, ...], *, seed: int, language: Language[PlaceT]
 ) -> tuple[Route, ...]:
     """Routes along `paths`: a random first heading, and a text per wording, no two alike if it can be helped."""
     used: set[str] = set()

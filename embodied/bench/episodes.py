@@ -9,7 +9,7 @@ from embodied.assistants.route_system import benchmark_lemma2, build_routes
 from embodied.bench.timing import Measure, from_values, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
-from embodied.datasets.store import Place
+from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
 from embodied.interface import Ask, Intention, Move, Task
@@ -26,7 +26,7 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     language = PlainLanguage()
     for kind, aim in AIMS.items():
         house, graph = make_dataset_house(seed, "bench", DatasetConfig(kind, "tiny", seed), catalogue)
-        place = Place(house, graph)
+        place = StoredPlace(house, graph)
         routes = build_routes(place, seed=seed, language=language, house_split="test") if kind == "hanna" else ()
         part = "main_unseen" if kind == "hari" else "main"
         tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language)[part]

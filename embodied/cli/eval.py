@@ -39,13 +39,13 @@ def run(args: argparse.Namespace) -> int:
     from assets.cache import write_bytes
     from embodied.datasets.store import Dataset
     from embodied.evaluation import tables
-    from embodied.evaluation.evaluate import AGENTS, LOOKING, agent, evaluate
+    from embodied.evaluation.evaluate import LOOKING, agent, agent_names, evaluate
     from embodied.records import episodes_file, fingerprint, save_lines
 
     data = Dataset(args.data)
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
-    names = args.agent or list(AGENTS[args.kind])
+    names = args.agent or agent_names(args.kind)
 
     def watch(agents):
         return bar(agents, "agents", "agent")
@@ -57,10 +57,11 @@ def run(args: argparse.Namespace) -> int:
             if args.out:
                 save_lines(args.out / episodes_file(split, name), episodes)
 
-        agents, worlds = {name: agent(args.kind, name) for name in names}, None
-        if set(names) & set(LOOKING):
+        worlds = None
+        if set(names) & set(LOOKING.get(args.kind, {})):
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
+        agents = {name: agent(args.kind, name, worlds) for name in names}
         rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from embodied.interface import Language, Route, Task
+from embodied.interface import Language, Place, Route, Task
 from embodied.seeds import stream
 from embodied.tasks.find import Pool, find_pool, find_task
 from embodied.tasks.hanna import hanna_pool, hanna_task
@@ -13,9 +12,6 @@ from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 from embodied.tasks.vln import vln_task
 from embodied.tasks.vnla import vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 SIXTEENTHS = {"main": range(14), "val": range(14, 15), "test": range(15, 16)}
 """Positions of a pool, modulo 16, that belong to each part: seen splits hold out tasks (4.2.5)."""
@@ -25,7 +21,7 @@ WORDING_OF = {"main": ("train_seen", "val", "test"), "val": ("train_unseen",), "
 
 
 def part_tasks(
-    kind: str, world: World, routes: Sequence[Route], parts: Sequence[tuple[str, int]], *, seed: int, language: Language
+    kind: str, world: Place, routes: Sequence[Route], parts: Sequence[tuple[str, int]], *, seed: int, language: Language
 ) -> dict[str, list[Task]]:
     """Up to `n` tasks of one house for each (part, n) of `parts`; fewer where its pool is smaller.
 
@@ -49,7 +45,7 @@ def part_tasks(
     return {part: [make(i) for i in range(len(pool)) if i % 16 in SIXTEENTHS[part]][:n] for part, n in parts}
 
 
-def _vln(world: World, routes: Sequence[Route], part: str, n: int) -> list[Task]:
+def _vln(world: Place, routes: Sequence[Route], part: str, n: int) -> list[Task]:
     """Held-out wordings serve the seen splits: every other path validation, the rest test."""
     paths = {p: k for k, p in enumerate(dict.fromkeys(r.path for r in routes))}
     mine = [
@@ -58,7 +54,7 @@ def _vln(world: World, routes: Sequence[Route], part: str, n: int) -> list[Task]
     return [vln_task(world.house.name, r) for r in mine[:n]]
 
 
-def _hari(world: World, part: str, n: int, *, seed: int, language: Language) -> list[Task]:
+def _hari(world: Place, part: str, n: int, *, seed: int, language: Language) -> list[Task]:
     """HARI's conditions (4.3.5): unseen start room, unseen object class, unseen environment."""
     config = HariConfig(fewest_nodes=1) if part.startswith("pretrain") else HariConfig()
     pool = hari_pool(world, seed=seed, config=config)
@@ -66,7 +62,7 @@ def _hari(world: World, part: str, n: int, *, seed: int, language: Language) -> 
     return [hari_task(pool, i, seed=seed, language=language, config=config) for i in chosen[:n]]
 
 
-def _belongs(pool: Pool, i: int, part: str, world: World, seed: int) -> bool:
+def _belongs(pool: Pool, i: int, part: str, world: Place, seed: int) -> bool:
     if part == "main_unseen":
         return True
     goal, start = pool.classes[int(pool.pairs[i, 0])], int(pool.pairs[i, 1])
@@ -87,7 +83,7 @@ def object_part(object_class: str, *, seed: int) -> str | None:
     return "val" if draw < HELD_OBJECTS else "test" if draw < 2 * HELD_OBJECTS else None
 
 
-def room_part(world: World, room: str, *, seed: int) -> str | None:
+def room_part(world: Place, room: str, *, seed: int) -> str | None:
     """'val' or 'test' for the one room each of a house in which training never starts; else None."""
     rooms = sorted({str(r) for r in world.graph.room_of_node})
     if len(rooms) < 4:

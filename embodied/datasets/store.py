@@ -16,7 +16,7 @@ from embodied.datasets.scale import Scale, scale
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
 from embodied.house.house import House
-from embodied.interface import FindObject, Language, Route, Task
+from embodied.interface import FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import load_lines
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
@@ -41,7 +41,7 @@ class DatasetError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class StoredPlace:
     """A house and its graph, without pictures: enough to play, judge and word."""
 
     house: House
@@ -50,9 +50,6 @@ class Place:
     @property
     def name(self) -> str:
         return self.house.name
-
-    def sightings(self, node: int) -> tuple:
-        raise DatasetError("a Place has no pictures; open the world with Dataset.open_world")
 
 
 class Dataset:
@@ -94,12 +91,12 @@ class Dataset:
         return tuple(u.name for u in units(self.scale) if u.group in wanted.all_groups)
 
     @functools.cache  # noqa: B019 - a data set lives as long as its program
-    def place(self, name: str) -> Place:
+    def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
         home = self.folder / "houses" / name
-        return Place(House.load(home / "house.json"), from_matterport(home / "connectivity.json"))
+        return StoredPlace(House.load(home / "house.json"), from_matterport(home / "connectivity.json"))
 
-    def places(self, split: str) -> dict[str, Place]:
+    def places(self, split: str) -> dict[str, StoredPlace]:
         return {name: self.place(name) for name in self.names(split)}
 
     def open_world(self, name: str, catalogue: Catalogue, cache: Path, **options: object) -> World:
@@ -136,14 +133,14 @@ class Dataset:
         return tuple(tasks)
 
     def environment(
-        self, split: str, *, language: Language | None = None, worlds: Mapping[str, World] | None = None
+        self, split: str, *, language: Language | None = None, worlds: Mapping[str, Place] | None = None
     ) -> Callable[[], HelpEnv]:
         """A maker of environments for the tasks of a split; all it makes share their caches.
 
         Args:
-          worlds: worlds with pictures by house name; without, the tasks play in Places.
+          worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
         """
-        places = worlds or self.places(split)
+        places: Mapping[str, Place] = worlds or self.places(split)
         return environment_maker(
             self.kind,
             places,

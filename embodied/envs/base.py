@@ -8,7 +8,6 @@ does, what stopping does, and what may be asked.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves, PanoramicMoves, Reach
 from embodied.interface import (
@@ -22,6 +21,7 @@ from embodied.interface import (
     Mode,
     Move,
     Observation,
+    Place,
     Reply,
     Sight,
     Situation,
@@ -30,9 +30,6 @@ from embodied.interface import (
     Task,
 )
 from embodied.seeds import stream
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 class TaskError(ValueError):
@@ -54,7 +51,7 @@ class HelpEnv:
     """Whether a request uses up a step of the horizon (Algorithms 6 and 7)."""
 
     def __init__(
-        self, worlds: Mapping[str, World], assistant: Assistant | None = None, moves: Moves | None = None
+        self, worlds: Mapping[str, Place], assistant: Assistant | None = None, moves: Moves | None = None
     ) -> None:
         """
         Args:
@@ -131,6 +128,10 @@ class HelpEnv:
             )
         )
         return self._look() if self.ended is None else None
+
+    def facts(self) -> dict[str, float]:
+        """Numbers about the episode so far that its record does not hold."""
+        return {}
 
     @property
     def last_step(self) -> Step:
@@ -256,7 +257,7 @@ class HelpEnv:
             raise ActionError(f"expected Move, Ask or Stop, got {action!r}")
 
 
-def check_task(task: Task, worlds: Mapping[str, World]) -> None:
+def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
     """Refuse a task that cannot be played.
 
     Raises:

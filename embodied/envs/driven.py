@@ -8,6 +8,7 @@ leaves the agent where it came from.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,10 +23,12 @@ except ImportError as e:
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.geometry import wrap
-from embodied.interface import Reply
+from embodied.interface import Assistant, Place, Reply
 from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.action_spaces import Moves
     from embodied.house.house import House
 
 RADIUS, HEIGHT = 0.19, 1.4
@@ -113,7 +116,7 @@ class Driver:
     (1.0.50) asks MuJoCo 4.0 for fields it no longer has.
     """
 
-    def __init__(self, house: House, catalogue: object) -> None:
+    def __init__(self, house: House, catalogue: Catalogue) -> None:
         arena, self._owners = house_arena(house, catalogue)
         robot = RollingBody()
         arena.add_free_entity(robot)
@@ -189,7 +192,7 @@ class Driver:
         return frozenset(touched)
 
 
-def house_arena(house: House, catalogue: object) -> tuple[composer.Arena, dict[str, str]]:
+def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dict[str, str]]:
     """The house's collision boxes as a composer arena, and the owner of each geom by its name there."""
     model = build_spec(house, catalogue, parts=()).compile()
     data = mujoco.MjData(model)
@@ -218,17 +221,28 @@ class _Driven(HelpEnv):
     episode's, one per Move that was not blocked at once.
     """
 
-    catalogue: object = None
-    """Gives the collision shapes; set by `driven`."""
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        worlds: Mapping[str, Place],
+        assistant: Assistant | None = None,
+        moves: Moves | None = None,
+    ) -> None:
+        """`catalogue` gives the collision shapes; the rest as in HelpEnv."""
+        super().__init__(worlds, assistant, moves)
+        self._catalogue = catalogue
+        self._drivers: dict[str, Driver] = {}
+
+    def facts(self) -> dict[str, float]:
+        """Collisions of the current episode."""
+        return {"bumps": sum(len(d.bumps) for d in self.drives)}
 
     def _begin(self) -> None:
         super()._begin()
         self.drives: list[Drive] = []
         name = self.world.house.name
-        if not hasattr(self, "_drivers"):
-            self._drivers: dict[str, Driver] = {}
         if name not in self._drivers:
-            self._drivers[name] = Driver(self.world.house, self.catalogue)
+            self._drivers[name] = Driver(self.world.house, self._catalogue)
         self._driver = self._drivers[name]
         self._driver.place(self.world.graph.positions[self.pose.node], self.pose.yaw)
         self._reached = self.pose
@@ -259,15 +273,3 @@ class DrivenEnv(_Driven, HelpEnv):
 
 class DrivenHannaEnv(_Driven, HannaEnv):
     """HANNA on wheels, with the same tasks."""
-
-
-def driven(kind: type[_Driven], catalogue: object, *arguments: object, **options: object) -> _Driven:
-    """An environment on wheels: driven(DrivenHannaEnv, catalogue, worlds, anna)."""
-    env = kind(*arguments, **options)
-    env.catalogue = catalogue
-    return env
-
-
-def total_bumps(env: _Driven) -> int:
-    """Collisions of the current episode."""
-    return sum(len(d.bumps) for d in env.drives)

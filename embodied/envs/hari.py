@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING
 from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
 from embodied.envs.base import HelpEnv
-from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Reply, Stop
+from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
 from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from embodied.world import World
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class HariEnv(HelpEnv):
 
     def __init__(
         self,
-        worlds: Mapping[str, World],
+        worlds: Mapping[str, Place],
         assistant: Assistant,
         describer: Describer,
         *,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
@@ -14,17 +13,14 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import HariEnv
 from embodied.envs.vnla import VnlaEnv
-from embodied.interface import Language, Route
+from embodied.interface import Language, Place, Route
 from embodied.language.plain import PlainLanguage
 from embodied.teachers.vnla import VnlaTeacher
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 def environment_maker(
     kind: str,
-    worlds: Mapping[str, World],
+    worlds: Mapping[str, Place],
     *,
     routes: Mapping[str, Sequence[Route]] | None = None,
     wording: str = "test",

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
-from embodied.interface import Episode, Policy, Task
+from embodied.interface import Agent, Episode, Place, SeenPlace, Task
 from embodied.policies.baselines import (
-    Asking,
     Forward10,
     HalfwaySkyline,
     PerfectInterpreter,
+    PrivilegedAsking,
     RandomWalk,
     Shortest,
     SubgoalListener,
@@ -26,46 +26,59 @@ from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
-    from embodied.world import World
 
-PLAIN: Mapping[str, Callable[[], Policy]] = {"random walk": RandomWalk, "forward 10": Forward10, "shortest": Shortest}
-LOOKING = ("scripted listener",)
-"""Agents that need worlds with sightings, not only houses and graphs."""
-AGENTS: Mapping[str, Mapping[str, Callable[[], Policy]]] = {
+PLAIN: Mapping[str, Callable[[], Agent]] = {"random walk": RandomWalk, "forward 10": Forward10, "shortest": Shortest}
+AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
     "find": PLAIN,
-    "vln": {**PLAIN, "scripted listener": ScriptedListener},
+    "vln": PLAIN,
     "hanna": {
         **PLAIN,
-        "no ask": lambda: Asking(Shortest(), never_ask),
-        "random ask": lambda: Asking(Shortest(), ask_at_random),
-        "ask every 5": lambda: Asking(Shortest(), ask_every_5),
+        "no ask": lambda: PrivilegedAsking(Shortest(), never_ask),
+        "random ask": lambda: PrivilegedAsking(Shortest(), ask_at_random),
+        "ask every 5": lambda: PrivilegedAsking(Shortest(), ask_every_5),
         "perfect interpretation": PerfectInterpreter,
-        "scripted listener": ListeningInterpreter,
     },
     "vnla": {
         "random walk": RandomWalk,
         "shortest": lambda: Shortest(VnlaTeacher()),
-        **{
-            f"listener, {ask}": lambda ask=ask: VnlaAsking(SubgoalListener(), ask)
-            for ask in ("none", "first", "random", "teacher")
-        },
+        "listener, none": lambda: VnlaAsking(SubgoalListener(), "none"),
+        "listener, first": lambda: VnlaAsking(SubgoalListener(), "first"),
+        "listener, random": lambda: VnlaAsking(SubgoalListener(), "random"),
+        "listener, teacher": lambda: VnlaAsking(SubgoalListener(), "teacher"),
     },
     "hari": {"random walk": RandomWalk, "shortest": Shortest, "half-way sub-goals": HalfwaySkyline},
 }
 """Agents without learning, by kind of task. In HANNA's 'no ask', 'random ask' and 'ask every 5' the
 teacher navigates, so they show what asking by that rule costs; who learns to navigate brings an own
 policy to the same rules (embodied.policies.baselines.Asking)."""
+LOOKING: Mapping[str, Mapping[str, Callable[[Mapping[str, SeenPlace]], Agent]]] = {
+    "vln": {"scripted listener": ScriptedListener},
+    "hanna": {"scripted listener": ListeningInterpreter},
+}
+"""Agents that look around, by kind of task: made for worlds with sightings, not only houses and graphs."""
 
 
-def agent(kind: str, name: str) -> Policy:
+def agent_names(kind: str) -> list[str]:
+    """All agents without learning of a kind of task."""
+    return [*AGENTS[kind], *LOOKING.get(kind, {})]
+
+
+def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None) -> Agent:
     """A fresh agent by name.
 
+    Args:
+      worlds: what agents that look around look at.
+
     Raises:
-      ValueError: unknown for this kind of task.
+      ValueError: unknown for this kind of task, or one that looks and was given no worlds.
     """
-    if name not in AGENTS[kind]:
-        raise ValueError(f"unknown agent {name!r} for {kind}; use one of {sorted(AGENTS[kind])}")
-    return AGENTS[kind][name]()
+    if name in AGENTS[kind]:
+        return AGENTS[kind][name]()
+    if name not in LOOKING.get(kind, {}):
+        raise ValueError(f"unknown agent {name!r} for {kind}; use one of {sorted(agent_names(kind))}")
+    if worlds is None:
+        raise ValueError(f"agent {name!r} looks around; give it the worlds that it plays in")
+    return LOOKING[kind][name](worlds)
 
 
 def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
@@ -81,14 +94,14 @@ def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
 def evaluate(
     data: Dataset,
     split: str,
-    agents: Mapping[str, Policy],
+    agents: Mapping[str, Agent],
     *,
     seed: int = 0,
     limit: int | None = None,
     batch: int = 1,
     keep: Callable[[str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
-    worlds: Mapping[str, World] | None = None,
+    worlds: Mapping[str, Place] | None = None,
 ) -> list[Row]:
     """One row per agent, over the same tasks.
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from embodied.envs.base import HelpEnv
-from embodied.interface import Episode, Observation, Policy, Situation, Step, Task
+from embodied.interface import Agent, Episode, Observation, Situation, Step, Task, act
 from embodied.seeds import stream
 
 
@@ -27,13 +28,7 @@ class Frame:
 
 
 def rollout(
-    make_env: Callable[[], HelpEnv],
-    policy: Policy,
-    tasks: Iterable[Task],
-    *,
-    seed: int,
-    batch: int = 1,
-    agent: str = "",
+    make_env: Callable[[], HelpEnv], player: Agent, tasks: Iterable[Task], *, seed: int, batch: int = 1, agent: str = ""
 ) -> Iterator[Frame]:
     """Play `tasks`, `batch` at a time; frames of one episode come in order.
 
@@ -42,36 +37,32 @@ def rollout(
 
     Args:
       make_env: gives a fresh environment; called `batch` times.
+      player: who acts; `agent` is its name in the episodes.
     """
     envs: list[HelpEnv] = []
     group: list[tuple[int, Task]] = []
     for numbered in enumerate(tasks):
         group.append(numbered)
         if len(group) == batch:
-            yield from _play(make_env, envs, policy, group, seed, agent)
+            yield from _play(make_env, envs, player, group, seed, agent)
             group = []
     if group:
-        yield from _play(make_env, envs, policy, group, seed, agent)
+        yield from _play(make_env, envs, player, group, seed, agent)
 
 
 def play(
-    make_env: Callable[[], HelpEnv],
-    policy: Policy,
-    tasks: Iterable[Task],
-    *,
-    seed: int,
-    batch: int = 1,
-    agent: str = "",
+    make_env: Callable[[], HelpEnv], player: Agent, tasks: Iterable[Task], *, seed: int, batch: int = 1, agent: str = ""
 ) -> list[Episode]:
     """The finished episodes of `rollout`, in the order of the tasks."""
-    done = {f.index: f.episode for f in rollout(make_env, policy, tasks, seed=seed, batch=batch, agent=agent)}
+    frames = rollout(make_env, player, tasks, seed=seed, batch=batch, agent=agent)
+    done = {f.index: f.episode for f in frames if f.episode is not None}
     return [done[i] for i in sorted(done)]
 
 
 def _play(
     make_env: Callable[[], HelpEnv],
     envs: list[HelpEnv],
-    policy: Policy,
+    player: Agent,
     group: Sequence[tuple[int, Task]],
     seed: int,
     agent: str,
@@ -80,18 +71,16 @@ def _play(
         envs.append(make_env())
     observations: list[Observation | None] = [env.reset(task, seed=seed) for env, (_, task) in zip(envs, group)]
     rngs = [stream(seed, "policy", task.id) for _, task in group]
-    memory = None
+    memory: Any = None
     while any(o is not None for o in observations):
-        if getattr(policy, "privileged", False):
-            situations = [None if o is None else env.situation for env, o in zip(envs, observations)]
-            actions, memory = policy.act(observations, memory, rngs=rngs, situations=situations)
-        else:
-            actions, memory = policy.act(observations, memory, rngs=rngs)
+        situations = [None if o is None else env.situation for env, o in zip(envs, observations)]
+        actions, memory = act(player, observations, situations, memory, rngs=rngs)
         for i, (env, (index, _)) in enumerate(zip(envs, group)):
-            seen = observations[i]
-            if seen is None:
+            seen, situation, action = observations[i], situations[i], actions[i]
+            if seen is None or situation is None:
                 continue
-            situation = env.situation
-            observations[i] = env.step(actions[i])
+            if action is None:
+                raise TypeError(f"{type(player).__name__} gave no action for task {env.task.id!r}, which is not over")
+            observations[i] = env.step(action)
             episode = env.episode(agent) if observations[i] is None else None
             yield Frame(index, seen, situation, env.last_step, episode)

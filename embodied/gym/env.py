@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -22,10 +22,8 @@ from embodied.gym.playground import make_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import draw_plan, font
-from embodied.interface import FeatureSource, Observation, Task
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.world import World
 
 STEP_COST = 0.01
 LAYOUT = Layout()
@@ -113,8 +111,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         if self._shaping:
             reward += before - (0.0 if ended is not None and hari else self._potential())
         self._o = o if o is not None else self._o
-        if hasattr(self._env, "drives"):
-            info["bumps"] = sum(len(d.bumps) for d in self._env.drives)
+        info |= self._env.facts()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
@@ -161,8 +158,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     return np.asarray(sheet)
 
 
-def _view(world: World, pose) -> Image.Image:
-    if not hasattr(world, "panorama"):
+def _view(world: Place, pose: Pose) -> Image.Image:
+    if not isinstance(world, World):
         blank = Image.new("RGB", (VIEW[1], VIEW[0]), "lightgray")
         ImageDraw.Draw(blank).text((20, 20), "no pictures of this house", font=font(18), fill="black")
         return blank
@@ -187,7 +184,7 @@ def make(
     seed: int = 0,
     cache: str | Path | None = None,
     source: FeatureSource | None = None,
-    worlds: Mapping[str, World] | None = None,
+    worlds: Mapping[str, SeenPlace] | None = None,
     wheels: bool = False,
     **options: Any,
 ) -> HelpGymEnv:
@@ -220,7 +217,7 @@ def make(
 def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:
     """The same rule of play with a body."""
     from assets.catalogue import load_catalogue
-    from embodied.envs.driven import DrivenEnv, DrivenHannaEnv, driven  # physics, only where wanted
+    from embodied.envs.driven import DrivenEnv, DrivenHannaEnv  # physics, only where wanted
 
     kinds = {"find": DrivenEnv, "vln": DrivenEnv, "hanna": DrivenHannaEnv}
     if kind not in kinds:
@@ -229,6 +226,6 @@ def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Calla
 
     def make_driven() -> HelpEnv:
         env = make_env()
-        return driven(kinds[kind], catalogue, env.worlds, env.assistant, env.moves)
+        return kinds[kind](catalogue, env.worlds, env.assistant, env.moves)
 
     return make_driven

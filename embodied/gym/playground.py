@@ -22,9 +22,9 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
-from embodied.interface import Language, Task
+from embodied.interface import Language, SeenPlace, Task
 from embodied.language import People, PlainLanguage
-from embodied.world import World, open_world
+from embodied.world import open_world
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -37,7 +37,7 @@ AREA = (70.0, 110.0)
 
 @dataclass(frozen=True, eq=False)
 class Playground:
-    worlds: Mapping[str, World]
+    worlds: Mapping[str, SeenPlace]
     tasks: tuple[Task, ...]
     make_env: Callable[[], HelpEnv]
     features: Mapping[str, np.ndarray]
@@ -51,7 +51,7 @@ def make_playground(
     *,
     seed: int,
     cache: Path,
-    worlds: Mapping[str, World] | None = None,
+    worlds: Mapping[str, SeenPlace] | None = None,
     with_features: bool = True,
 ) -> Playground:
     """A split of a data set, or one flat generated from `seed` where `data` is None.
@@ -72,7 +72,7 @@ def make_playground(
     return Playground(worlds, tasks, make_env, features)
 
 
-def seen_features(world: World, catalogue: Catalogue, cache: Path) -> np.ndarray:
+def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
     path = (
@@ -97,8 +97,8 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 def _flat(
-    kind: str, seed: int, cache: Path, catalogue: Catalogue, worlds: Mapping[str, World] | None
-) -> tuple[Mapping[str, World], tuple[Task, ...], Callable[[], HelpEnv]]:
+    kind: str, seed: int, cache: Path, catalogue: Catalogue, worlds: Mapping[str, SeenPlace] | None
+) -> tuple[Mapping[str, SeenPlace], tuple[Task, ...], Callable[[], HelpEnv]]:
     """One world (generated unless given), tasks in it, and a maker of environments.
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.

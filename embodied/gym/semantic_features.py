@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, Sight
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import STEP, TURNS, VIEWS, SeenPlace, Sight
 
 HALF_WIDTH, HALF_HEIGHT = math.radians(37.6), math.radians(30)
 """Half the field of one of the 36 views: 60 degrees high, 4 : 3."""
@@ -46,7 +42,7 @@ class FeatureTable:
         return array[sight._node]
 
 
-def semantic_features(world: World, classes: Sequence[str], room_kinds: Sequence[str]) -> np.ndarray:
+def semantic_features(world: SeenPlace, classes: Sequence[str], room_kinds: Sequence[str]) -> np.ndarray:
     """(nodes, 36, len(classes) + len(room_kinds)) float32 in [0, 1]: an oracle's eyes, for tests and quick studies.
 
     A class has exp(-distance / 4 m) of its nearest visible object in every view that shows the

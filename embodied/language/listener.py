@@ -13,9 +13,9 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from embodied.geometry import wrap
+from embodied.interface import SeenPlace
 from embodied.language.clauses import (
     LEFT,
     REMARKS,
@@ -35,9 +35,6 @@ from embodied.language.clauses import (
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
 from embodied.language.seen import Eyes, Seen, doorway
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 LONGEST = 4
 """Most steps that one clause may stand for."""
@@ -60,7 +57,7 @@ class Heard:
     """Nodes at which it looked around."""
 
 
-def follow(world: World, text: str, start: int, yaw: float) -> Heard:
+def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Heard:
     """Walk as `text` says, from `start`, looking along `yaw` (radians).
 
     Raises:
@@ -216,7 +213,7 @@ def _way(seen: Seen, node: int):
     return next(w for w in seen.ways if w.node == node)
 
 
-def cost(world: World, instruction: RouteInstruction, path: Sequence[int], yaw: float) -> float:
+def cost(world: SeenPlace, instruction: RouteInstruction, path: Sequence[int], yaw: float) -> float:
     """How badly a finished walk carries out an instruction; 0 is perfect, above about 4 something was not done.
 
     The clauses are laid along the walk in the cheapest way, with the same costs that a listener uses.
@@ -228,7 +225,7 @@ def cost(world: World, instruction: RouteInstruction, path: Sequence[int], yaw: 
 class _Led(Eyes):
     """Eyes of somebody who is led along a path: the only way on is the path's own."""
 
-    def __init__(self, world: World, path: Sequence[int]) -> None:
+    def __init__(self, world: SeenPlace, path: Sequence[int]) -> None:
         super().__init__(world)
         self._next = {a: b for a, b in itertools.pairwise(path)}
 

@@ -5,15 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import FindObject
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import FindObject, Place
 
 
 class PlainLanguage:
@@ -24,7 +20,7 @@ class PlainLanguage:
         where = f" in a {goal.room_kind.replace('_', ' ')}" if goal.room_kind else ""
         return f"find {with_article(goal.object_class)}{where}"
 
-    def route(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+    def route(self, world: Place, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """'turn left and go to the hall . go straight . stop .'; `yaw` is the walker's first direction, radians."""
         positions = np.asarray(world.graph.positions)
         parts = []

@@ -6,11 +6,11 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.geometry import wrap
+from embodied.interface import SeenPlace
 from embodied.language.clauses import (
     LEFT,
     RIGHT,
@@ -36,9 +36,6 @@ from embodied.language.listener import BESIDE, NEAR
 from embodied.language.seen import Eyes, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
 from embodied.language.templates import ORDINALS
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""
@@ -79,7 +76,7 @@ class Leg:
     """Whether its last step leads into another room."""
 
 
-def legs_of(world: World, path: Sequence[int], yaw: float) -> list[Leg]:
+def legs_of(world: SeenPlace, path: Sequence[int], yaw: float) -> list[Leg]:
     """The path cut at turns and at doorways."""
     rooms, positions = world.graph.room_of_node, np.asarray(world.graph.positions)
     legs: list[Leg] = []
@@ -104,7 +101,9 @@ def legs_of(world: World, path: Sequence[int], yaw: float) -> list[Leg]:
     return legs
 
 
-def plan(world: World, path: Sequence[int], yaw: float, speaker: Speaker, *, rng: np.random.Generator) -> list[Phrase]:
+def plan(
+    world: SeenPlace, path: Sequence[int], yaw: float, speaker: Speaker, *, rng: np.random.Generator
+) -> list[Phrase]:
     """Clauses for `path`, with the nouns that the speaker chooses."""
     eyes, lexicon, house = Eyes(world), lexicon_of(world.catalogue), world.house
     kind = lambda node: house.room_by_id[world.graph.room_of_node[node]].kind
@@ -338,5 +337,5 @@ def _wrong_room(eyes: Eyes, path: Sequence[int], kind) -> str | None:
     return wrong[0] if wrong else None
 
 
-def _length(world: World, nodes: Sequence[int]) -> float:
+def _length(world: SeenPlace, nodes: Sequence[int]) -> float:
     return float(sum(world.graph.distance[a, b] for a, b in itertools.pairwise(nodes)))

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.interface import SeenPlace
 from embodied.language.clauses import LEFT, RIGHT, Thing
 from embodied.language.lexicon import UNFIT, says
 
 if TYPE_CHECKING:
     from assets.records import Asset
-    from embodied.world import World
 
 SMALLEST = 5
 """Fewest pixels of a sighting (of 24576 around) by which a thing is noticed."""
@@ -80,7 +80,7 @@ class Seen:
 class Eyes:
     """Looks around in a world, remembering every look. The only way a listener learns of the world."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SeenPlace) -> None:
         self._world = world
         self._looks: dict[int, Seen] = {}
 
@@ -96,7 +96,7 @@ class Eyes:
         return self._looks[node]
 
 
-def look(world: World, node: int) -> Seen:
+def look(world: SeenPlace, node: int) -> Seen:
     """What is seen from `node`, the largest things first."""
     graph, house, assets = world.graph, world.house, world.catalogue.assets
     things = tuple(
@@ -132,7 +132,7 @@ def look(world: World, node: int) -> Seen:
     return Seen(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
 
 
-def _doors(world: World, room: str) -> list[tuple[str, str, np.ndarray]]:
+def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:
     """(id, room beyond, middle in x and y) of the doorways of a room that lead to another."""
     return [
         (o.id, o.rooms[0] if o.rooms[1] == room else o.rooms[1], (np.asarray(o.a) + np.asarray(o.b)) / 2)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import FindObject
+from embodied.interface import FindObject, SeenPlace
 from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
@@ -15,9 +14,6 @@ from embodied.language.plain import PlainLanguage
 from embodied.language.route_clauses import plan, shortened
 from embodied.language.seen import Eyes
 from embodied.language.speakers import draw_speaker
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
 """Clauses beyond the speaker's own wish in each try, while an imagined listener gets lost: other words first, then more."""
@@ -41,7 +37,7 @@ class People:
         """'find a mug', 'find a towel in a bathroom'."""
         return self._plain.request(goal, rng=rng)
 
-    def route(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+    def route(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """'Leave the bedroom and turn left at once. Walk past the piano. Stop by the coffee table.'
 
         Args:
@@ -75,7 +71,7 @@ class Describer:
     one is the grammar itself, so what it says is always true of the execution.
     """
 
-    def describe(self, world: World, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+    def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """One description of walking `path` (nodes, repeats allowed) with first direction `yaw`, radians."""
         nodes = [n for i, n in enumerate(path) if i == 0 or n != path[i - 1]]
         speaker = draw_speaker(rng)

@@ -1,59 +1,58 @@
 """Agents that do not learn: baselines, skylines, and the asking rules that go with them.
 
-Those that need privileged information take `situations` in `act` and say so with
-`privileged = True`; the others see Observations only.
+Those that need privileged information are PrivilegedPolicies and are shown the situations; the
+others see Observations only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from embodied.action_spaces import WORDS
 from embodied.interface import (
     Action,
+    Actions,
+    Agent,
     Ask,
     Intention,
     Mode,
     Move,
     Observation,
+    Observations,
     Policy,
+    PrivilegedPolicy,
     Sight,
     Situation,
+    Situations,
     Stop,
     Teacher,
     Thought,
+    act,
 )
 from embodied.language.plain import heard_subgoal
 from embodied.teachers.shortest import ShortestTeacher, shortest_action
 from embodied.teachers.vnla import ask_reason
 
-Observations = Sequence[Observation | None]
-Actions = list[Action | None]
-
 
 class RandomWalk:
     """Uniform over the candidates and stop at every step (originals 3.8); never asks."""
 
-    privileged = False
-
     def act(
-        self, observations: Observations, memory: object | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, object]:
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         return [None if o is None else _random_move(o, rng) for o, rng in zip(observations, rngs)], ()
 
 
 class Forward10:
     """The candidate nearest the middle of the view for ten steps, then stop (originals 3.8)."""
 
-    privileged = False
-
     def act(
-        self, observations: Observations, memory: object | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, object]:
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         return [None if o is None else self._one(o) for o in observations], ()
 
     def _one(self, observation: Observation) -> Action:
@@ -63,20 +62,13 @@ class Forward10:
 class Shortest:
     """The skyline: the navigation teacher acts; never asks."""
 
-    privileged = True
-
     def __init__(self, teacher: Teacher | None = None) -> None:
         """`teacher`: of the action space; the panoramic shortest-path teacher if None."""
         self._label = (teacher or ShortestTeacher()).label
 
-    def act(
-        self,
-        observations: Observations,
-        memory: object | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-        situations: Sequence[Situation | None],
-    ) -> tuple[Actions, object]:
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         return [None if s is None else self._label(s).move for s in situations], ()
 
 
@@ -103,32 +95,42 @@ def ask_every_5(observation: Observation, last_asked: int, *, rng: np.random.Gen
     return observation.time - last_asked >= 5
 
 
-def ask_first(observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
-    """VNLA's 'first': at every step while the budget lasts (originals 4.6)."""
-    return True
-
-
 class Asking:
     """A navigation policy with an asking rule in front of it."""
 
     def __init__(self, navigation: Policy, rule: AskRule) -> None:
-        self.navigation, self.rule = navigation, rule
-        self.privileged = getattr(navigation, "privileged", False)
+        self._navigation, self._rule = navigation, rule
 
     def act(
-        self,
-        observations: Observations,
-        memory: object | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-        **situations: Sequence[Situation | None],
-    ) -> tuple[Actions, object]:
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         last, inner = memory or ([-1] * len(observations), None)
-        actions, inner = self.navigation.act(observations, inner, rngs=rngs, **situations)
-        for i, o in enumerate(observations):
-            if o is not None and o.can_ask and self.rule(o, last[i], rng=rngs[i]):
-                actions[i], last[i] = Ask(o.can_ask[0]), o.time
-        return actions, (last, inner)
+        actions, inner = self._navigation.act(observations, inner, rngs=rngs)
+        return _with_requests(self._rule, observations, actions, last, rngs), (last, inner)
+
+
+class PrivilegedAsking:
+    """A privileged navigation policy with an asking rule in front of it."""
+
+    def __init__(self, navigation: PrivilegedPolicy, rule: AskRule) -> None:
+        self._navigation, self._rule = navigation, rule
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        last, inner = memory or ([-1] * len(observations), None)
+        actions, inner = self._navigation.act_privileged(observations, situations, inner, rngs=rngs)
+        return _with_requests(self._rule, observations, actions, last, rngs), (last, inner)
+
+
+def _with_requests(
+    rule: AskRule, observations: Observations, actions: Actions, last: list[int], rngs: Sequence[np.random.Generator]
+) -> Actions:
+    """`actions` with a request wherever the rule wants one; notes in `last` when each episode asked last."""
+    for i, o in enumerate(observations):
+        if o is not None and o.can_ask and rule(o, last[i], rng=rngs[i]):
+            actions[i], last[i] = Ask(o.can_ask[0]), o.time
+    return actions
 
 
 @dataclass
@@ -148,19 +150,12 @@ class PerfectInterpreter:
     the task demands (it recognises the object). The authors' row has a trained navigator there.
     """
 
-    privileged = True
-
-    def act(
-        self,
-        observations: Observations,
-        memory: object | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-        situations: Sequence[Situation | None],
-    ) -> tuple[Actions, object]:
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         trails = memory or [_Trail() for _ in observations]
         actions = [
-            None if o is None else self._one(o, s, trail, rng)
+            None if o is None or s is None else self._one(o, s, trail, rng)
             for o, s, trail, rng in zip(observations, situations, trails, rngs, strict=True)
         ]
         return actions, trails
@@ -187,11 +182,9 @@ class SubgoalListener:
     The walk never stops by itself and prefers going forward, so what it reaches it owes to help.
     """
 
-    privileged = False
-
     def act(
-        self, observations: Observations, memory: object | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, object]:
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         pending = memory or [("", ()) for _ in observations]
         actions: Actions = []
         for i, o in enumerate(observations):
@@ -224,9 +217,7 @@ def _taken(odds: dict[str, float], o: Observation, rng: np.random.Generator) -> 
 class VnlaAsking:
     """A VNLA navigation policy with one of the program's askers in front of it (originals 4.6)."""
 
-    privileged = True
-
-    def __init__(self, navigation: Policy, ask: str) -> None:
+    def __init__(self, navigation: Agent, ask: str) -> None:
         """`ask`: 'none', 'first', 'random' or 'teacher'.
 
         Raises:
@@ -235,28 +226,24 @@ class VnlaAsking:
         if ask not in ("none", "first", "random", "teacher"):
             raise ValueError(f"unknown asker {ask!r}; use 'none', 'first', 'random' or 'teacher'")
         self._navigation, self._ask = navigation, ask
-        self._inner_privileged = getattr(navigation, "privileged", False)
 
-    def act(
-        self,
-        observations: Observations,
-        memory: object | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-        situations: Sequence[Situation | None],
-    ) -> tuple[Actions, object]:
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
         times, inner = memory or ([self._times(s, rng) for s, rng in zip(situations, rngs, strict=True)], None)
-        more = {"situations": situations} if self._inner_privileged else {}
-        actions, inner = self._navigation.act(observations, inner, rngs=rngs, **more)
-        for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
-            if o is not None and o.can_ask and self._wants(s, actions[i], times[i]):
-                actions[i] = Ask(o.can_ask[0], actions[i].thought)
+        actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
+        for i, (o, s, planned) in enumerate(zip(observations, situations, actions, strict=True)):
+            if o is None or s is None or planned is None:
+                continue
+            if o.can_ask and self._wants(s, planned, times[i]):
+                actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
 
-    def _times(self, s: Situation, rng: np.random.Generator) -> frozenset[int]:
-        left = s.requests_left or 0
-        if self._ask != "random":
+    def _times(self, s: Situation | None, rng: np.random.Generator) -> frozenset[int]:
+        """When the asker 'random' asks, drawn at the beginning of an episode."""
+        if s is None or self._ask != "random":
             return frozenset()
+        left = s.requests_left or 0
         return frozenset(int(t) for t in rng.choice(s.task.horizon, min(left, s.task.horizon), replace=False))
 
     def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
@@ -272,17 +259,12 @@ class HalfwaySkyline:
     Knowing that is privileged; the authors' skyline learns when to ask.
     """
 
-    privileged = True
-
-    def act(
-        self,
-        observations: Observations,
-        memory: object | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-        situations: Sequence[Situation | None],
-    ) -> tuple[Actions, object]:
-        return [None if o is None else self._one(o, s) for o, s in zip(observations, situations, strict=True)], ()
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        return [
+            None if o is None or s is None else self._one(o, s) for o, s in zip(observations, situations, strict=True)
+        ], ()
 
     def _one(self, o: Observation, s: Situation) -> Action:
         if len(s.goals) == 1 and s.pose.node != s.goals[0] and Intention.SUB in o.can_ask:

@@ -11,26 +11,11 @@ import numpy as np
 
 from assets.cache import atomic_path
 from embodied.house.house import House
+from embodied.interface import Sighting
 from embodied.render.panorama import face_rays, ray_stretch
 
 FACE = 64
 """Side in pixels of the cube faces that sightings are counted on; a pixel spans about 1.4 degrees."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """One object as seen from one node."""
-
-    placement: str
-    object_class: str
-    yaw: float
-    """Direction of what is visible of it, radians counter-clockwise from +x."""
-    pitch: float
-    """Radians above the horizon."""
-    distance: float
-    """Mean length of the rays that meet it, metres."""
-    pixels: int
-    """How many pixels of six faces of FACE x FACE show it; all six have 24576."""
 
 
 @dataclass(frozen=True, eq=False)

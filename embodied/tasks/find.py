@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import TURNS, FindObject, Language, Pose, Task
+from embodied.interface import TURNS, FindObject, Language, Place, Pose, Task
 from embodied.seeds import stream
 from embodied.tasks.goals import GoalClass, count_hops, find_instances, goal_classes
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Pool:
         return len(self.pairs)
 
 
-def build_pool(world: World, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str) -> Pool:
+def build_pool(world: Place, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str) -> Pool:
     """Pairs whose shortest path to the nearest goal (in metres) has `fewest`..`most` nodes."""
     graph = world.graph
     hops = count_hops(graph.next_hop) + 1
@@ -60,7 +56,7 @@ def build_pool(world: World, classes: tuple[GoalClass, ...], *, seed: int, fewes
     return Pool(world.house.name, classes, table[order])
 
 
-def find_pool(world: World, *, seed: int, config: FindConfig = FindConfig()) -> Pool:
+def find_pool(world: Place, *, seed: int, config: FindConfig = FindConfig()) -> Pool:
     classes = goal_classes(find_instances(world, config.reach), by_room=False, nearest_only=False)
     return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="find")
 

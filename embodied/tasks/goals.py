@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.house.house import House, Placement
-
-if TYPE_CHECKING:
-    from embodied.world import World
+from embodied.interface import Place
 
 NOT_OBJECTS = frozenset({"person"})
 """Classes that are never looked for."""
@@ -49,7 +46,7 @@ def footprint_distance(placement: Placement, points: np.ndarray) -> np.ndarray:
     return np.hypot(outside[:, 0], outside[:, 1])
 
 
-def find_instances(world: World, reach: float) -> tuple[Instance, ...]:
+def find_instances(world: Place, reach: float) -> tuple[Instance, ...]:
     """Every object that somebody standing in the same room can be within `reach` metres of.
 
     The same room is required because a wall between node and object would make "found" a lie.

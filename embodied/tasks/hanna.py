@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from embodied.interface import FindObject, Language, Task
+from embodied.interface import FindObject, Language, Place, Task
 from embodied.tasks.find import Pool, build_pool, draw
 from embodied.tasks.goals import find_instances, goal_classes
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 @dataclass(frozen=True)
@@ -28,7 +24,7 @@ class HannaConfig:
     """An instance counts when a node of its room is within this many metres; that node is its goal."""
 
 
-def hanna_pool(world: World, *, seed: int, config: HannaConfig = HannaConfig()) -> Pool:
+def hanna_pool(world: Place, *, seed: int, config: HannaConfig = HannaConfig()) -> Pool:
     classes = goal_classes(find_instances(world, config.reach), by_room=False, nearest_only=True)
     return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hanna")
 

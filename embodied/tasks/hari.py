@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from embodied.interface import FindObject, Language, Task
+from embodied.interface import FindObject, Language, Place, Task
 from embodied.tasks.find import Pool, build_pool, draw
 from embodied.tasks.goals import GoalClass, find_instances
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 @dataclass(frozen=True)
@@ -26,7 +22,7 @@ class HariConfig:
 
 
 def hari_pool(
-    world: World, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None
+    world: Place, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None
 ) -> Pool:
     """One request per object instance: the node nearest to it is what the human has in mind.
 

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import TURNS, VIEWS, FindObject, Language, Task
+from embodied.interface import TURNS, VIEWS, FindObject, Language, Place, Task
 from embodied.tasks.find import Pool, build_pool, draw
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class VnlaConfig:
     """Budget 0.4 T / 4 for a time limit of T steps (originals 4.2)."""
 
 
-def vnla_pool(world: World, plan: MonocularPlan, *, seed: int, config: VnlaConfig = VnlaConfig()) -> Pool:
+def vnla_pool(world: Place, plan: MonocularPlan, *, seed: int, config: VnlaConfig = VnlaConfig()) -> Pool:
     """Pairs that the teacher finishes in time, whichever way the agent looks at first."""
     classes = goal_classes(find_instances(world, config.reach), by_room=config.by_room, nearest_only=True)
     pool = build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_actions, kind="vnla")
@@ -68,7 +64,7 @@ def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple
 def vnla_task(
     pool: Pool,
     index: int,
-    world: World,
+    world: Place,
     plan: MonocularPlan,
     *,
     seed: int,
@@ -105,7 +101,7 @@ def vnla_task(
     )
 
 
-def limit_key(world: World, start: int, goal: FindObject) -> tuple[str, str]:
+def limit_key(world: Place, start: int, goal: FindObject) -> tuple[str, str]:
     """(start room kind, goal room kind), or the object class where no room is named."""
     room = world.house.room_by_id[world.graph.room_of_node[start]].kind
     return room, goal.room_kind or goal.object_class

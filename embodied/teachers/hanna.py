@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Situation, Step, Stop
+from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Situation, Step, Stop
 from embodied.teachers.shortest import nearest, shortest_action
-
-if TYPE_CHECKING:
-    from embodied.world import World
 
 GAMMA = 0.25
 """Uncertainty threshold (Table D.1)."""
@@ -66,7 +62,7 @@ class HannaTeacher:
         s = situation
         return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
 
-    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+    def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         graph, steps = world.graph, episode.steps
         lost = [x for segment in segments(steps) for x in self._lost_in(segment, graph)]
         asked_at: set[int] = set()
@@ -98,7 +94,7 @@ class HannaTeacher:
         distances = [float(graph.distance[v, nearest(graph, v, targets)]) for v in nodes]
         return self._lost(distances)[: len(segment)]
 
-    def _uncertain_wrong(self, step: Step, reference: Move | Stop, world: World) -> bool:
+    def _uncertain_wrong(self, step: Step, reference: Move | Stop, world: Place) -> bool:
         thought = step.action.thought
         if thought is None or thought.moves is None:
             return False

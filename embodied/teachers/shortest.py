@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from embodied.interface import Episode, Label, Move, Pose, Situation, Stop
+from embodied.interface import Episode, Label, Move, Place, Pose, Situation, Stop
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-    from embodied.world import World
 
 
 def nearest(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
@@ -41,5 +40,5 @@ class ShortestTeacher:
         s = situation
         return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
 
-    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+    def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         return tuple(Label(shortest_action(world.graph, s.pose, s.targets, s.candidate_nodes)) for s in episode.steps)

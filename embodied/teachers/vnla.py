@@ -13,12 +13,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Pose, Situation, Stop, Thought
+from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Place, Pose, Situation, Stop, Thought
 from embodied.teachers.shortest import nearest
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-    from embodied.world import World
 
 ACTION = 1e-3
 """Metres that one action weighs in planning: the shortest walk first, the fewest actions second."""
@@ -31,7 +30,7 @@ class MonocularPlan:
     shortest way in this action space may be longer than along the graph.
     """
 
-    def __init__(self, world: World, moves: MonocularMoves) -> None:
+    def __init__(self, world: Place, moves: MonocularMoves) -> None:
         nodes = len(world.graph.positions)
         distance = np.asarray(world.graph.distance)
         states = nodes * VIEWS
@@ -191,7 +190,7 @@ class VnlaTeacher:
         self.moves, self.rules = moves or MonocularMoves(), rules
         self._plans: dict[str, MonocularPlan] = {}
 
-    def plan(self, world: World) -> MonocularPlan:
+    def plan(self, world: Place) -> MonocularPlan:
         """The plan of a world, made on first use."""
         name = world.house.name
         if name not in self._plans:
@@ -204,7 +203,7 @@ class VnlaTeacher:
         move = Stop() if action is None else Move(action)
         return Label(move, ask_reason(s, thought, self.rules) is not None)
 
-    def relabel(self, episode: Episode, world: World) -> tuple[Label, ...]:
+    def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         """Labels of a finished episode; the thought at an Ask step is what its policy was about to do."""
         labels, trail, time, requests = [], [], 0, 0
         for step in episode.steps:
