@@ -43,7 +43,7 @@ from embodied.tasks.vnla import VnlaConfig
 from embodied.teachers.vnla import MonocularPlan, VnlaTeacher, state_of
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Dataset, Place
+    from embodied.datasets.store import Dataset, StoredPlace
     from embodied.navigation.graph import NavGraph
 
 SPECIAL = ("<PAD>", "<UNK>", "<EOS>")
@@ -159,7 +159,7 @@ def action_space(data: Dataset) -> dict[str, list[dict[str, object]]]:
     return table
 
 
-def _item(task: Task, number: int, place: Place, goals: Sequence[int] | None = None) -> dict[str, object]:
+def _item(task: Task, number: int, place: StoredPlace, goals: Sequence[int] | None = None) -> dict[str, object]:
     ids, graph = place.graph.ids, place.graph
     goals = task.goal_nodes if goals is None else goals
     return {
@@ -229,13 +229,13 @@ def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeac
 
 
 @functools.lru_cache(maxsize=512)
-def _anywhere(place: Place, config: VnlaConfig) -> Mapping[str, tuple[int, ...]]:
+def _anywhere(place: StoredPlace, config: VnlaConfig) -> Mapping[str, tuple[int, ...]]:
     """Class to the nodes where one of its things is nearest."""
     classes = goal_classes(find_instances(place, config.reach), by_room=False, nearest_only=True)
     return {c.object_class: c.goal_nodes for c in classes}
 
 
-def _vnla_fields(task: Task, goals: Sequence[int], place: Place, plan: MonocularPlan) -> dict[str, object]:
+def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> dict[str, object]:
     room, rooms = place.house.room_by_id, place.graph.room_of_node
     nearest = min(goals, key=lambda g: (place.graph.distance[task.start.node, g], g))
     return {
@@ -258,7 +258,7 @@ def subgoal_words(*, merged: bool) -> list[str]:
     return [*words, "degrees", "steps", *(str(n) for n in range(2, 10)), *(str(30 * n) for n in range(2, TURNS + 1))]
 
 
-def panorama_to_region(place: Place) -> list[str]:
+def panorama_to_region(place: StoredPlace) -> list[str]:
     """Lines of panorama_to_region.txt: number, viewpoint, number of its room, region letter."""
     rooms = place.graph.room_of_node
     order = {r.id: k for k, r in enumerate(place.house.rooms)}

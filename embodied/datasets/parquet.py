@@ -25,7 +25,7 @@ from embodied.interface import Ask, Episode, FindObject, FollowRoute, Move, Rout
 from embodied.records import load_lines, to_json
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Dataset, Place
+    from embodied.datasets.store import Dataset, StoredPlace
 
 TEXT, WHOLE, REAL = pa.string(), pa.int32(), pa.float64()
 NODES = pa.list_(WHOLE)
@@ -135,7 +135,7 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
     return [*files, folder / "README.md"]
 
 
-def house_row(place: Place) -> dict[str, object]:
+def house_row(place: StoredPlace) -> dict[str, object]:
     house, graph = place.house, place.graph
     return {
         "name": house.name,
@@ -152,7 +152,7 @@ def house_row(place: Place) -> dict[str, object]:
     }
 
 
-def task_row(task: Task, place: Place) -> dict[str, object]:
+def task_row(task: Task, place: StoredPlace) -> dict[str, object]:
     goal = task.goal
     sought = (
         {"object_class": goal.object_class, "room_kind": goal.room_kind, "placements": list(goal.placements)}
