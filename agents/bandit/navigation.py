@@ -33,6 +33,7 @@ from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Action, Ask, Episode, Intention, Observation
+from embodied.locks import locked
 from embodied.navigation.graph import NavGraph
 from embodied.seeds import stream
 
@@ -80,7 +81,7 @@ class Watching:
     ) -> tuple[list[Action | None], HannaMemory]:
         actions, memory = self.policy.act(observations, memory, rngs=rngs)
         if memory.positions:
-            running = [(observations[p], actions[p]) for p in memory.positions]
+            running = [(o, a) for o, a in zip(observations, actions, strict=True) if o is not None and a is not None]
             scores = memory.moments[-1].scores
             self.decided.append(
                 Decided(
@@ -172,7 +173,7 @@ def learn_from_stars(
     )
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
-    with stop_signal() as stop:
+    with locked(run.folder), stop_signal() as stop:
         while run.update < config.updates:
             numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, run.update)
             run.update += 1

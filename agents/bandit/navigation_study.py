@@ -13,7 +13,7 @@ import torch
 from agents.bandit.figures import gains_figure
 from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
 from agents.bandit.rating_config import RatingConfig
-from agents.bandit.ratings import CLEAN, Rater
+from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.run import split_of
 from agents.hanna.training import Split
@@ -58,11 +58,7 @@ class NavigationSetting:
 
 def raters() -> dict[str, Rater]:
     """By name: 'clean', and each perturbation at each strength."""
-    swept = {
-        f"{name} {value:g}": Rater(**{name: int(value) if name == "granularity" else value})
-        for name, values in SWEEPS.items()
-        for value in values
-    }
+    swept = {f"{name} {value:g}": rater_of(name, value) for name, values in SWEEPS.items() for value in values}
     return {"clean": CLEAN, **swept}
 
 

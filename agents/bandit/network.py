@@ -7,12 +7,14 @@ number of the equation it computes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from agents.bandit.words import END_NUMBER, PAD_NUMBER
 
+Network = TypeVar("Network", bound=nn.Module)
 SPAN = 0.1
 """Weights begin uniform in [-SPAN, SPAN], as in the authors' program."""
 
@@ -123,7 +125,7 @@ class Critic(nn.Module):
         return self.out(self.body.read(source, target))[..., 0]
 
 
-def begin(network: nn.Module, generator: torch.Generator) -> nn.Module:
+def begin(network: Network, generator: torch.Generator) -> Network:
     """Draw all weights anew, uniform in [-SPAN, SPAN]."""
     with torch.no_grad():
         for parameter in network.parameters():

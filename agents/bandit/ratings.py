@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -37,6 +38,11 @@ class Rater:
 
 
 CLEAN = Rater()
+
+
+def rater_of(perturbation: str, strength: float) -> Rater:
+    """The rater with one of its fields off: 'granularity', 'variance' or 'skew'."""
+    return dataclasses.replace(CLEAN, **{perturbation: type(getattr(CLEAN, perturbation))(strength)})
 
 
 def granular(score: float, steps: int) -> float:

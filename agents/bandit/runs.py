@@ -15,6 +15,7 @@ from agents.bandit.translate import batches
 from agents.imitation.checkpoint import CheckpointError
 from agents.imitation.loop import stop_signal
 from assets.cache import atomic_path, write_json
+from embodied.locks import locked
 from embodied.seeds import stream
 
 FORMAT = "embodied-bandit-run-1"
@@ -132,7 +133,7 @@ def run_passes(
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
     each, order, saved, began = -(-len(lengths) // batch), None, time.monotonic(), time.monotonic() - run.seconds
-    with stop_signal() as stop:
+    with locked(run.folder), stop_signal() as stop:
         while run.update < passes * each:
             turn, place = divmod(run.update, each)
             if order is None or place == 0:

@@ -51,7 +51,7 @@ def load_translator(path: Path) -> tuple[Translator, tuple[Lexicon, Lexicon], Ba
     if about.get("format") != FORMAT:
         raise ValueError(f"{path}: format {about.get('format')!r}, this version reads {FORMAT!r}; train it again")
     config = BanditConfig(**json.loads(about["config"]))
-    lexicons = tuple(lexicon_from_json(body) for body in json.loads(about["lexicons"]))
-    translator = Translator(*map(len, lexicons), config.hidden_size)
+    source, target = (lexicon_from_json(body) for body in json.loads(about["lexicons"]))
+    translator = Translator(len(source), len(target), config.hidden_size)
     translator.load_state_dict(tensors)
-    return translator, lexicons, config
+    return translator, (source, target), config

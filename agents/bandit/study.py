@@ -20,7 +20,7 @@ import torch
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.figures import curves_figure, gains_figure
-from agents.bandit.ratings import CLEAN, Rater
+from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
 from assets.cache import write_bytes, write_json
 from embodied.evaluation.tables import Estimate
@@ -86,9 +86,7 @@ def curve_jobs() -> list[Job]:
 
 
 def sweep_jobs(sweeps: Mapping[str, Sequence[float]] = SWEEPS) -> list[Job]:
-    raters = [
-        Rater(**{name: int(v) if name == "granularity" else v}) for name, values in sweeps.items() for v in values
-    ]
+    raters = [rater_of(name, v) for name, values in sweeps.items() for v in values]
     return [Job("full", "reference"), Job("full", "a2c"), *(Job("full", "a2c", rater) for rater in raters)]
 
 
@@ -137,20 +135,20 @@ def across_seeds(values: Sequence[float]) -> Estimate:
     return Estimate(float(np.mean(values)), half, n)
 
 
-def history(setting: Setting, seed: int, job: Job) -> list[dict[str, float]] | None:
-    """What each finished pass of a run gave; None if it has not all its passes."""
+def history(setting: Setting, seed: int, job: Job) -> list[dict[str, float]]:
+    """What each finished pass of a run gave; nothing if it has not all its passes."""
     path = folder_of(setting, seed, job) / "result.json"
     found = json.loads(path.read_text())["history"] if path.exists() else []
-    return found[: job.passes] if len(found) >= job.passes else None
+    return found[: job.passes] if len(found) >= job.passes else []
 
 
-def gains(setting: Setting, job: Job, column: str, turn: int = 0) -> list[float] | None:
-    """Difference to the reference model per seed, in a pass; None if a seed is missing."""
+def gains(setting: Setting, job: Job, column: str, turn: int = 0) -> list[float]:
+    """Difference to the reference model per seed, in a pass; nothing if a seed is missing."""
     found = []
     for seed in setting.repeats:
         mine, base = history(setting, seed, job), history(setting, seed, Job(job.reference, "reference"))
-        if mine is None or base is None:
-            return None
+        if not mine or not base:
+            return []
         found.append(mine[turn][column] - base[0][column])
     return found
 
@@ -169,7 +167,7 @@ def _prepare(setting: Setting, seed: int, references: Sequence[str], note: Note)
 
 
 def _run(setting: Setting, seed: int, job: Job, note: Note) -> str:
-    if history(setting, seed, job) is None:
+    if not history(setting, seed, job):
         torch.set_num_threads(setting.threads)
         m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
         bandit(
@@ -231,13 +229,14 @@ def _write_curves(setting: Setting) -> Path:
 def _write_sweeps(setting: Setting) -> Path:
     """Every setting that all repeats have; those that are missing are named."""
     clean = {c: across_seeds(gains(setting, Job("full", "a2c"), c)) for c in (SENTENCE, HELD_OUT)}
-    found, missing = {}, []
+    found: dict[str, dict[float, dict[str, Estimate]]] = {}
+    missing = []
     for name, values in SWEEPS.items():
         found[name] = {}
         for value in values:
-            job = Job("full", "a2c", Rater(**{name: int(value) if name == "granularity" else value}))
+            job = Job("full", "a2c", rater_of(name, value))
             each = {c: gains(setting, job, c) for c in (SENTENCE, HELD_OUT)}
-            if each[SENTENCE] is None:
+            if not each[SENTENCE]:
                 missing.append(f"{name} {value:g}")
             else:
                 found[name][value] = {c: across_seeds(v) for c, v in each.items()}

@@ -65,10 +65,13 @@ class Material:
 
     def translator(self) -> Translator:
         """An untrained translator; its weights follow from the seed."""
-        return begin(Translator(*map(len, self.lexicons), self.config.hidden_size), self._generator("translator"))
+        source, target = self.lexicons
+        network = Translator(len(source), len(target), self.config.hidden_size)
+        return begin(network, self._generator("translator"))
 
     def critic(self) -> Critic:
-        return begin(Critic(*map(len, self.lexicons), self.config.hidden_size), self._generator("critic"))
+        source, target = self.lexicons
+        return begin(Critic(len(source), len(target), self.config.hidden_size), self._generator("critic"))
 
     def identity(self, *fields: str, **more: object) -> dict[str, object]:
         """What a stage depends on: settings by name, and the corpus."""
@@ -91,12 +94,12 @@ def material(folder: Path, config: BanditConfig) -> Material:
     names = ("supervised", "dev", "test")
     corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
     build = BUILDERS[config.units]
-    lexicons = (
-        build([a for a, _ in corpus["supervised"]], config.source_words),
-        build([b for _, b in corpus["supervised"]], config.target_words),
+    source = build([a for a, _ in corpus["supervised"]], config.source_words)
+    target = build([b for _, b in corpus["supervised"]], config.target_words)
+    splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
+    return Material(
+        config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,))
     )
-    splits = {name: numbered(pairs, *lexicons) for name, pairs in corpus.items()}
-    return Material(config, splits, lexicons, corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,)))
 
 
 def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
@@ -190,7 +193,8 @@ def bandit(
     config, data = m.config, m.splits[m.config.bandit_set]
     translator, critic = m.translator(), m.critic()
     load_weights(translator, reference)
-    modules, optimizers = {"translator": translator}, {"translator": adam(translator, config.bandit_rate)}
+    modules: dict[str, torch.nn.Module] = {"translator": translator}
+    optimizers = {"translator": adam(translator, config.bandit_rate)}
     if learner == "a2c":
         load_weights(critic, critic_file)
         modules["critic"], optimizers["critic"] = critic, adam(critic, config.bandit_rate)

@@ -49,9 +49,9 @@ def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
 
 def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list[np.ndarray]:
     """A random order of all sentences, in batches of similar length, the shorter last batch included."""
-    order, lengths = rng.permutation(len(lengths)), np.asarray(lengths)
+    order, measured = rng.permutation(len(lengths)), np.asarray(lengths)
     pools = [order[i : i + POOL * size] for i in range(0, len(order), POOL * size)]
-    pools = [pool[np.argsort(lengths[pool], kind="stable")] for pool in pools]
+    pools = [pool[np.argsort(measured[pool], kind="stable")] for pool in pools]
     found = [pool[i : i + size] for pool in pools for i in range(0, len(pool), size)]
     return [found[i] for i in rng.permutation(len(found))]
 

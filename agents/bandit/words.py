@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import collections
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Protocol
+from typing import Any, Protocol
 
 from agents.hanna.vocabulary import END, PAD, UNKNOWN, Vocabulary
 from embodied.errors import UnableError
@@ -27,7 +27,7 @@ class Lexicon(Protocol):
     def decode(self, numbers: Sequence[int]) -> tuple[str, ...]:
         """Words of the numbers before the first END."""
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         """What `lexicon_from_json` reads."""
 
 
@@ -47,7 +47,7 @@ class Words:
     def decode(self, numbers: Sequence[int]) -> tuple[str, ...]:
         return tuple(self.vocabulary.words[n] for n in before_end(numbers))
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         return {"kind": "words", "words": list(self.vocabulary.words)}
 
 
@@ -66,7 +66,7 @@ class Pieces:
     def decode(self, numbers: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._processor.decode(before_end(numbers)).split())
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, Any]:
         return {"kind": "pieces", "model": self.model.hex()}
 
 
@@ -109,10 +109,13 @@ def build_pieces(sentences: Iterable[Sequence[str]], most: int) -> Pieces:
     return Pieces(buffer.getvalue())
 
 
-BUILDERS = {"words": build_words, "pieces": build_pieces}
+BUILDERS: Mapping[str, Callable[[Iterable[Sequence[str]], int], Lexicon]] = {
+    "words": build_words,
+    "pieces": build_pieces,
+}
 
 
-def lexicon_from_json(body: dict[str, object]) -> Lexicon:
+def lexicon_from_json(body: dict[str, Any]) -> Lexicon:
     """What a Lexicon's `to_json` wrote."""
     if body["kind"] == "words":
         return Words(Vocabulary(tuple(body["words"])))

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     sizes = read_options(args, Sizes)
     if args.moses:
         facts = {"source": "own text", "files": [p.name for p in args.moses]}
-        pairs = corpus.read_moses(*args.moses, block=args.block)
+        pairs = corpus.read_moses(args.moses[0], args.moses[1], args.block)
     else:
         folder = args.folder or libreoffice.fetch(args.cache / "libreoffice")
         facts = {"source": "LibreOffice (MPL-2.0)", "packages": libreoffice.versions(folder)}
