@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, Candidates, Place, Pose
+from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, Candidates, Place, Pose
 
 WORDS = ("forward", "left", "right", "up", "down")
 """VNLA's moves, in the order of its candidates; stopping is an action of its own."""
@@ -72,9 +72,8 @@ def directions(graph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     """(n,) int64: the views whose centres are nearest in sqrt(dyaw^2 + dpitch^2) (originals 2.2)."""
-    views = np.arange(VIEWS)
-    d_yaw = wrap(yaw[:, None] - (views % TURNS) * STEP)
-    d_pitch = pitch[:, None] - (views // TURNS - 1) * STEP
+    d_yaw = wrap(yaw[:, None] - VIEW_YAWS)
+    d_pitch = pitch[:, None] - VIEW_PITCHES
     return np.argmin(np.round(d_yaw**2 + d_pitch**2, 9), axis=1)
 
 

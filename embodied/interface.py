@@ -28,6 +28,9 @@ STEP = math.pi / 6
 """The angle of one turn or tilt, radians."""
 TURNS = 12
 VIEWS = 36
+VIEW_YAWS = np.arange(VIEWS) % TURNS * STEP
+VIEW_PITCHES = (np.arange(VIEWS) // TURNS - 1) * STEP
+"""(36,) float64: along which yaw and pitch each view looks, radians."""
 
 
 # Where an agent is and what it can see ----------------------------------------------------------

@@ -78,6 +78,8 @@ def test_feature_files_survive(tmp_path):
     ((key, again),) = read_features(tmp_path / "f.tsv").items()
     assert key == ("test0001", "v000") and (again == features).all()
     assert (in_matterport_order(features)[12] == features[15]).all(), "viewIndex 12 looks along +y, our view 15"
+    assert (in_matterport_order(features)[15] == features[12]).all(), "heading 90 degrees looks along +x"
+    assert (in_matterport_order(features)[0] == features[3]).all(), "below viewIndex 12"
 
 
 def test_tokens_are_lower_case_and_apart():

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from embodied.action_spaces import PanoramicMoves
+from embodied.datasets import matterport
+from embodied.interface import Pose
+from embodied.navigation.graph import graph_of
 from embodied.render.panorama import FACES, Panorama, face_rays, ray_stretch
 from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
 
@@ -80,24 +85,53 @@ def test_depth_joins_across_faces():
     assert np.allclose(row, np.minimum(3.0 / c[0], 2.0 / c[1]), rtol=5e-3)
 
 
-def test_views36_follow_the_matterport_order():
+def colour_along(yaw: float, pitch: float) -> np.ndarray:
+    """The colour of the analytic panorama in one direction."""
+    direction = [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)]
+    return 127 + 100 * np.array(direction)
+
+
+def test_view_k_is_the_view_that_poses_and_candidates_call_k():
+    """Turned, mirrored or shifted, some view would show another direction."""
     views = analytic().views36(32)
     assert views.shape == (36, 32, 32, 3)
-    for i in range(36):
-        heading, elevation = math.radians(30 * (i % 12)), math.radians(30 * (i // 12 - 1))
-        centre = views[i, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
+    for tilt in (-1, 0, 1):
+        for turn in range(12):
+            pose = Pose(0, turn, tilt)
+            centre = views[pose.view, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
+            assert np.abs(centre - colour_along(pose.yaw, pose.pitch)).max() < 3, pose
+    graph = graph_of(
+        np.array([[0, 0, 1.5], [0.2, 2.0, 1.5], [2.0, -0.1, 1.5]]),
+        np.array([[0, 1], [0, 2]]),
+        ("a", "b", "c"),
+        ("r",) * 3,
+    )
+    candidates, _ = PanoramicMoves().at(SimpleNamespace(house=SimpleNamespace(name="h"), graph=graph), Pose(0, 2))
+    assert candidates.view.tolist() == [12 + 3, 12 + 0], "+y, then +x, seen from turn 2"
+    for view in candidates.view:
+        yaw, right = math.radians(30 * (view % 12)), math.atan(0.75 * math.tan(math.radians(30)))
+        seen = views[view, 15:17, 24:].reshape(-1, 3).mean(axis=0)  # from half-way to the right edge on
+        assert np.abs(seen - colour_along(yaw - right, 0)).max() < 4, "to the right the yaw falls: not mirrored"
+
+
+def test_the_matterport_order_is_its_own():
+    """Matterport3DSimulator: heading 30 (k % 12) degrees clockwise from +y, elevation 30 (k // 12 - 1) degrees."""
+    views = matterport.views36(analytic(), 32)
+    for k in range(36):
+        heading, elevation = math.radians(30 * (k % 12)), math.radians(30 * (k // 12 - 1))
+        centre = views[k, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
         direction = [
             math.sin(heading) * math.cos(elevation),
             math.cos(heading) * math.cos(elevation),
             math.sin(elevation),
         ]
-        assert np.abs(centre - (127 + 100 * np.array(direction))).max() < 3, f"view {i}"
+        assert np.abs(centre - (127 + 100 * np.array(direction))).max() < 3, f"viewIndex {k}"
 
 
 def test_a_view_of_view36_equals_the_perspective_view():
     p = analytic()
-    one = p.view_rgb(math.pi / 2 - math.radians(60), 0.0, math.radians(60), (40, 40))
-    assert np.array_equal(p.views36(40)[14], one)
+    one = p.view_rgb(math.radians(60), math.radians(-30), math.radians(60), (40, 40))
+    assert np.array_equal(p.views36(40)[2], one)
 
 
 @pytest.mark.parametrize("size", [(0, 10), (10, -1)])

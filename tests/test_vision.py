@@ -13,7 +13,7 @@ from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
-from agents.vision.features import load_bank, load_features, save_features, to_matterport_order
+from agents.vision.features import load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, read_weights
 from agents.vision.training import train_encoder, turned
@@ -288,14 +288,6 @@ def test_features_of_two_encoders_do_not_mix(tmp_path):
         load_bank({"a": tmp_path / "1.safetensors", "b": tmp_path / "2.safetensors"})
     with pytest.raises(ValueError, match="must all be"):
         FeatureBank({"a": np.zeros((1, 35, 4))}, "digest")
-
-
-def test_matterport_rows_turn_the_other_way_from_north():
-    rows = np.arange(36.0)[:, None]
-    out = to_matterport_order(rows)[:, 0]
-    assert out[12] == 12 + 3  # heading 0 looks along +y, which is turn 3
-    assert out[15] == 12 + 0  # heading 90 degrees looks along +x
-    assert out[0] == 3 and out[24] == 27
 
 
 def test_encoder_moves_between_settings_without_changing_features():

@@ -20,7 +20,7 @@ from agents.vision.encoder import Encoder
 from agents.vision.resnet import read_weights
 from agents.vision.strip import HEIGHT, VFOV
 from assets.cache import atomic_path
-from embodied.interface import STEP, TURNS, VIEWS
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 from embodied.render.panorama import Panorama
 
 FORMAT = "embodied-features-1"
@@ -43,8 +43,9 @@ def margin() -> slice:
 
 def views_of(panorama: Panorama, size: tuple[int, int] = VIEW_SIZE) -> np.ndarray:
     """(36, h, w, 3) uint8: the perspective views, 60 degrees high, in the order of embodied.interface."""
-    angles = [(k % TURNS * STEP, (k // TURNS - 1) * STEP) for k in range(VIEWS)]
-    return np.stack([panorama.view_rgb(yaw, pitch, VFOV, size) for yaw, pitch in angles])
+    return np.stack(
+        [panorama.view_rgb(yaw, pitch, VFOV, size) for yaw, pitch in zip(VIEW_YAWS, VIEW_PITCHES, strict=True)]
+    )
 
 
 def encode_panoramas(encoder: Encoder, panoramas: Iterable[Panorama], batch: int = 8) -> np.ndarray:
@@ -65,14 +66,6 @@ def _groups(pictures: Iterator[np.ndarray], batch: int) -> Iterator[list[np.ndar
             group = []
     if group:
         yield group
-
-
-def to_matterport_order(features: np.ndarray) -> np.ndarray:
-    """(..., 36, D) features with rows by Matterport's viewIndex (headings clockwise from +y) instead."""
-    heading = np.arange(TURNS)
-    turn = (3 - heading) % TURNS  # heading h x 30 degrees clockwise from +y is yaw 90 - 30 h degrees
-    order = np.concatenate([band * TURNS + turn for band in range(3)])
-    return features[..., order, :]
 
 
 def feature_path(folder: Path, digest: str, world: str) -> Path:

@@ -18,7 +18,7 @@ import math
 import cv2
 import numpy as np
 
-from embodied.interface import STEP, TURNS, VIEWS
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 
 HEIGHT, WIDTH = 192, 576
 CELL = 16
@@ -45,7 +45,7 @@ def view_of_strip(strip: np.ndarray, view: int, size: tuple[int, int] = (96, 128
 
     Its corners reach a little beyond the strip; there the strip's border is repeated.
     """
-    yaw, pitch = view % TURNS * STEP, (view // TURNS - 1) * STEP
+    yaw, pitch = VIEW_YAWS[view], VIEW_PITCHES[view]
     x, y = _perspective(yaw, pitch, size)
     wide = np.concatenate([strip, strip[:, :1]], 1)  # the last column's neighbour is the first
     return cv2.remap(wide, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -73,7 +73,7 @@ def seen_by_view(view: int) -> np.ndarray:
     optical axis covers 1 / cos(theta)^3 of the picture plane. Averages with these weights equal
     averages over the perspective picture.
     """
-    yaw, pitch = view % TURNS * STEP, (view // TURNS - 1) * STEP
+    yaw, pitch = VIEW_YAWS[view], VIEW_PITCHES[view]
     forward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
     left = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     up = np.cross(forward, left)

@@ -29,10 +29,11 @@ import numpy as np
 from assets.cache import atomic_path
 from embodied.action_spaces import bearing_order, directions, nearest_views
 from embodied.geometry import heading_of_yaw, wrap
-from embodied.interface import STEP, TURNS, VIEWS, Pose
+from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, VIEWS, Pose
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
+    from embodied.render.panorama import Panorama
 
 REGIONS = {
     "bathroom": "a",
@@ -118,9 +119,22 @@ def view_index(view: int) -> int:
     return TURNS * (view // TURNS) + heading_bin(view % TURNS)
 
 
+VIEW_OF_INDEX = np.array([view_index(v) for v in range(VIEWS)])
+"""(36,) our view of each viewIndex, and the other way round."""
+
+
 def in_matterport_order(features: np.ndarray) -> np.ndarray:
     """(..., 36, D) features with row k for viewIndex k, from rows in our order; its own inverse."""
-    return features[..., [view_index(v) for v in range(VIEWS)], :]
+    return features[..., VIEW_OF_INDEX, :]
+
+
+def views36(panorama: Panorama, size: int = 224) -> np.ndarray:
+    """(36, size, size, 3) uint8: Panorama.views36 with picture k for viewIndex k.
+
+    ViewIndex k looks at heading 30 (k % 12) degrees, clockwise from +y, and at elevation
+    30 (k // 12 - 1) degrees (Matterport3DSimulator).
+    """
+    return panorama.views36(size)[VIEW_OF_INDEX]
 
 
 def heading(pose: Pose) -> float:
@@ -140,7 +154,7 @@ def action_list(graph: NavGraph, node: int, bin_: int) -> list[dict[str, object]
     nodes, yaw, pitch = directions(graph, node)
     views = nearest_views(yaw, pitch)
     relative = wrap(heading_of_yaw(yaw) - bin_ * STEP)
-    offset = np.hypot(wrap(yaw - (views % TURNS) * STEP), pitch - (views // TURNS - 1) * STEP)
+    offset = np.hypot(wrap(yaw - VIEW_YAWS[views]), pitch - VIEW_PITCHES[views])
     actions: list[dict[str, object]] = [{"relViewIndex": -1, "absViewIndex": bin_, "nextViewpointId": graph.ids[node]}]
     for k in bearing_order(relative, nodes):
         index = view_index(int(views[k]))

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, SeenPlace, Sight
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, SeenPlace, Sight
 
 HALF_WIDTH, HALF_HEIGHT = math.radians(37.6), math.radians(30)
 """Half the field of one of the 36 views: 60 degrees high, 4 : 3."""
@@ -50,7 +50,6 @@ def semantic_features(world: SeenPlace, classes: Sequence[str], room_kinds: Sequ
     """
     column = {name: k for k, name in enumerate(classes)}
     rooms = {kind: len(classes) + k for k, kind in enumerate(room_kinds)}
-    turns, tilts = np.arange(VIEWS) % TURNS * STEP, (np.arange(VIEWS) // TURNS - 1) * STEP
     table = np.zeros((len(world.graph.ids), VIEWS, len(classes) + len(room_kinds)), dtype=np.float32)
     for node, room in enumerate(world.graph.room_of_node):
         kind = world.house.room_by_id[room].kind
@@ -60,6 +59,6 @@ def semantic_features(world: SeenPlace, classes: Sequence[str], room_kinds: Sequ
             k = column.get(s.object_class)
             if k is None:
                 continue
-            shown = (np.abs(wrap(turns - s.yaw)) <= HALF_WIDTH) & (np.abs(tilts - s.pitch) <= HALF_HEIGHT)
+            shown = (np.abs(wrap(VIEW_YAWS - s.yaw)) <= HALF_WIDTH) & (np.abs(VIEW_PITCHES - s.pitch) <= HALF_HEIGHT)
             table[node, shown, k] = np.maximum(table[node, shown, k], math.exp(-s.distance / 4.0))
     return table

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.geometry import yaw_of_heading
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 
 FACES = (
     ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -71,17 +71,14 @@ class Panorama:
         return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size)))
 
     def views36(self, size: int = 224) -> np.ndarray:
-        """(36, size, size, 3) uint8: the views of the VLN literature.
+        """(36, size, size, 3) uint8: the views of the VLN literature, in the order of embodied.interface.
 
-        View i looks at heading 30 (i % 12) degrees, clockwise from +y, and at elevation
-        30 (i // 12 - 1) degrees: 0-11 down, 12-23 level, 24-35 up (Matterport3DSimulator).
+        View k looks along yaw 30 (k % 12) degrees, counter-clockwise from +x, and along pitch
+        30 (k // 12 - 1) degrees: 0-11 down, 12-23 level, 24-35 up, as `Candidates.view` and a
+        FeatureSource's rows count them. Matterport's own order is in embodied.datasets.matterport.
         """
         _checked(VFOV36, (size, size))
-        return self._rgb(grid36(self.size, size)).reshape(36, size, size, 3)
-
-    def ids36(self, size: int = 56) -> np.ndarray:
-        """(36, size, size) int32: the ids seen in the views of `views36`."""
-        return self._ids(grid36(self.size, size)).reshape(36, size, size)
+        return self._rgb(grid36(self.size, size)).reshape(VIEWS, size, size, 3)
 
     def equirect(self, height: int = 512) -> np.ndarray:
         """(height, 2 height, 3) uint8: all directions; +x (yaw 0) in the middle column, +y left of it, up on top."""
@@ -94,10 +91,6 @@ class Panorama:
     def equirect_ids(self, height: int = 512) -> np.ndarray:
         """(height, 2 height) int32, in the layout of `equirect`."""
         return self._ids(equirect_grid(self.size, height))
-
-    def ray_lengths(self) -> np.ndarray:
-        """(6, s, s) float32: metres along the ray through every pixel."""
-        return self.depth * ray_stretch(self.size)
 
     @functools.cached_property
     def _padded_rgb(self) -> np.ndarray:
@@ -169,12 +162,7 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
 @functools.lru_cache(maxsize=4)
 def grid36(s: int, size: int) -> Grid:
     """The 36 views of `Panorama.views36`, below each other."""
-    rays = [
-        _pinhole_rays(
-            float(yaw_of_heading(math.radians(30 * (i % 12)))), math.radians(30 * (i // 12 - 1)), VFOV36, size, size
-        )
-        for i in range(36)
-    ]
+    rays = [_pinhole_rays(yaw, pitch, VFOV36, size, size) for yaw, pitch in zip(VIEW_YAWS, VIEW_PITCHES, strict=True)]
     return _grid(s, np.concatenate([r[0] for r in rays]), np.concatenate([r[1] for r in rays]))
 
 
