@@ -28,6 +28,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write the table and the episodes")
+    parser.add_argument(
+        "--as-programs",
+        action="store_true",
+        help="also judge as the authors' program of this kind does, where it judges otherwise (docs/sources.md, S3, S5, S6)",
+    )
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -38,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
     from assets.cache import write_bytes
     from embodied.datasets.store import Dataset
-    from embodied.evaluation import tables
+    from embodied.evaluation import as_programs, tables
     from embodied.evaluation.evaluate import LOOKING, agent, agent_names, evaluate
     from embodied.records import episodes_file, fingerprint, save_lines
 
@@ -50,10 +55,12 @@ def run(args: argparse.Namespace) -> int:
     def watch(agents):
         return bar(agents, "agents", "agent")
 
-    rows = []
+    rows, theirs = [], []
     for split in args.split:
 
         def keep(name, episodes, split=split):
+            if args.as_programs:
+                theirs.append(as_programs.row(name, split, episodes, data.places(split), seed=args.seed))
             if args.out:
                 save_lines(args.out / episodes_file(split, name), episodes)
 
@@ -65,8 +72,15 @@ def run(args: argparse.Namespace) -> int:
         rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
+        if theirs:
+            tables.save(theirs, args.out, "table_as_programs")
         facts = fingerprint(data=data.digest, seed=args.seed, splits=args.split, agents=names, tasks=args.tasks)
         write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))
-    show(args, {"data": data.digest, "rows": json.loads(tables.as_json(rows))}, tables.markdown(rows, columns))
+    facts = {"data": data.digest, "rows": json.loads(tables.as_json(rows))}
+    text = tables.markdown(rows, columns)
+    if theirs:
+        facts["as programs"] = json.loads(tables.as_json(theirs))
+        text += f"\nAs the authors' program judges:\n\n{tables.markdown(theirs)}"
+    show(args, facts, text)
     return 0

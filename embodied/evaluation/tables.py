@@ -20,7 +20,19 @@ from embodied.interface import Episode
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
-PERCENT = ("success", "spl", "oracle success", "room success", "subtask success", "mistake repeat", "request repeat")
+PERCENT = (
+    "success",
+    "spl",
+    "oracle success",
+    "room success",
+    "subtask success",
+    "mistake repeat",
+    "request repeat",
+    "target success (HANNA)",
+    "room success (VNLA)",
+    "success (R2R)",
+    "oracle success (R2R)",
+)
 """Columns shown in per cent."""
 
 
