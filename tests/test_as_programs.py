@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, hand_graph, line_world
 
-from embodied.datasets.store import Place
+from embodied.datasets.store import StoredPlace
 from embodied.evaluation import as_programs, metrics
 from embodied.interface import (
     Ask,
@@ -59,7 +59,7 @@ def test_sub_tasks_are_pooled_over_episodes_not_averaged_within():
     bad = [step(Ask(Intention.HELP), 0, 0, reply=told(far)), step(Stop(), 0, 0, Mode.SUB, far)]
     one, other = episode("hanna", far, *good, *good, *bad), episode("hanna", far, *bad)
     assert as_programs.hanna_targets(one, graph) == (2, 3) and as_programs.hanna_targets(other, graph) == (0, 1)
-    places = {one.task.world: Place(line_world().house, graph)}
+    places = {one.task.world: StoredPlace(line_world().house, graph)}
     pooled = as_programs.row("x", "val", [one, other], places, seed=0).values["target success (HANNA)"]
     assert pooled.mean == pytest.approx(2 / 4) and pooled.n == 4
     assert np.mean([metrics.subtask_success(e, graph) for e in (one, other)]) == pytest.approx(1 / 3)
@@ -84,7 +84,7 @@ def test_another_room_of_the_same_kind_counts_for_vnla():
             dataclasses.replace(r, kind="bathroom" if r.id == "bedroom_1" else r.kind) for r in world.house.rooms
         ),
     )
-    place, rooms = Place(house, world.graph), list(world.graph.room_of_node)
+    place, rooms = StoredPlace(house, world.graph), list(world.graph.room_of_node)
     goal, same, other = (rooms.index(r) for r in ("bathroom_1", "bedroom_1", "kitchen_1"))
     for last, theirs, ours in ((goal, 1, 1), (same, 1, 0), (other, 0, 0)):
         ended = episode("vnla", goal, step(Stop(), last, last), start=last)

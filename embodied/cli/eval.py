@@ -31,7 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as-programs",
         action="store_true",
-        help="also judge as the authors' program of this kind does, where it judges otherwise (docs/sources.md, S3, S5, S6)",
+        help="also judge as the authors' program does where it judges otherwise (docs/sources.md, S3, S5, S6)",
     )
     add_cache(parser)
     add_packs(parser)

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 from embodied.datasets.matterport import REGIONS
 from embodied.evaluation.metrics import navigation_error
 from embodied.evaluation.tables import Estimate, Row, estimate, ratio
-from embodied.interface import Ask, Episode, Mode, Stop
+from embodied.interface import Ask, Episode, Mode, Place, Stop
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Place
     from embodied.navigation.graph import NavGraph
 
 RADIUS = 2.0
