@@ -1,7 +1,8 @@
 """Furnishing: a House with rooms and openings becomes one with objects and lights.
 
-Room by room: groups of furniture claim their place in order of importance (rooms.py), then what
-hangs on walls and ceilings (walls.py), then small things on surfaces (smalls.py), then lights.
+Room by room: groups of furniture claim their place in order of importance (rooms.py, the table of
+what each kind of room gets), then what hangs on ceilings and walls (ceilings.py, hanging.py,
+pictures.py), then small things on surfaces (smalls.py), then lights. docs/houses.md tells more.
 """
 
 from __future__ import annotations
@@ -9,15 +10,16 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 
+from assets.catalogue import Catalogue
 from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.hanging import hang_all
 from embodied.generate.furnish.lights import lights
-from embodied.generate.furnish.rooms import furnish_room, lacks
+from embodied.generate.furnish.rooms import furnish_room, missing
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
-from embodied.generate.furnish.walls import hang_all
 from embodied.geometry import wrap
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.seeds import stream
@@ -25,13 +27,13 @@ from embodied.seeds import stream
 ATTEMPTS = 6
 
 
-def furnish(draft: House, catalogue, *, seed: int) -> House:
+def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
     """Put furniture, wall things, small things and lights into every room.
 
     Args:
       draft: a house whose rooms, openings and stairs are settled; placements and lights it
         already has are replaced.
-      catalogue: assets.catalogue.Catalogue; only its records are used, never a mesh.
+      catalogue: only its records are used, never a mesh.
       seed: the same seed gives the same furniture.
     """
     style = house_style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
@@ -50,17 +52,18 @@ def furnish(draft: House, catalogue, *, seed: int) -> House:
 
 def _arranged(draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], seed: int) -> Context:
     """The room with its furniture: the first of a few attempts that lacks nothing, or the best of them."""
-    best: tuple[int, Context, Counter] | None = None
+    best: tuple[int, Context, Counter[str]] | None = None
     before = stock.used.copy()
     for attempt in range(ATTEMPTS):
         stock.used = before.copy()
         ctx = Context(room_space(draft, room), stock, stream(seed, "furnish", room.id, attempt), kinds, attempt)
         furnish_room(ctx)
-        missing = lacks(ctx)
-        if best is None or missing < best[0]:
-            best = missing, ctx, stock.used
-        if not missing:
+        short = missing(ctx)
+        if best is None or short < best[0]:
+            best = short, ctx, stock.used
+        if not short:
             break
+    assert best is not None  # ATTEMPTS is positive
     stock.used = best[2]
     return best[1]
 

@@ -9,15 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from assets.records import Asset
 from embodied.generate.furnish.space import Box, RoomSpace, Wall, box, overlap
 
+Params = tuple[tuple[str, str | float], ...]
+"""Arguments for a built asset, (name, value)."""
 WALL_GAP = 0.02
 """Free strip between a wall and furniture, for the skirting, metres."""
+RUG_HEIGHT = 0.012
+"""Metres."""
+PATIENCE = 6.0
+"""Poses tried in vain for one more thing of an arrangement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +37,7 @@ class Item:
     z: float = 0.0
     """Height of its base above the floor, or above the surface it is `on`, metres."""
     size: tuple[float, float, float] | None = None
-    params: tuple[tuple[str, str | float], ...] = ()
+    params: Params = ()
     clear: float = 0.0
     """Depth before its front that nothing else may fill, metres; negative: behind its back."""
     optional: bool = False
@@ -74,7 +80,7 @@ class Thing:
     z: float
     yaw: float
     size: tuple[float, float, float]
-    params: tuple[tuple[str, str | float], ...] = ()
+    params: Params = ()
     parent: Thing | None = None
     surface: str | None = None
     group: str | None = None
@@ -143,94 +149,120 @@ def pack(
     return list(fit.things)
 
 
-PATIENCE = 6.0
-
-
 def _fit(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> Fit | None:
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    things: list[Thing | None] = []
-    boxes: list[Box | None] = []
-    zones: list[Box] = []
-    reach: list[tuple[float, float]] = []
+    """The arrangement at a pose; None where something that is not optional finds no room, or it cuts the room apart."""
+    trial = _Trial(space, pose, group)
     for item in items:
-        if item.on is not None:
-            things.append(_rest(space, item, things[item.on], group))
-            boxes.append(None)
-            continue
-        w, d, h = item.extent
-        thing = Thing(
-            item.asset,
-            pose.x + c * item.x - s * item.y,
-            pose.y + s * item.x + c * item.y,
-            space.bottom + item.z,
-            pose.yaw + item.yaw,
-            item.extent,
-            item.params,
-            None,
-            None,
-            group,
-            item.role,
-            pose.wall,
-        )
-        b = thing.box
-        flat = is_flat(item.extent, item.z)
-        allowed = [boxes[i] for i in item.under if boxes[i] is not None]
-        good = (item.needs is None or things[item.needs] is not None) and (
-            _flat_fits(space, b)
-            if flat
-            else space.fits(b, ignore=allowed, passage=item.passage)
-            and not any(q is not None and overlap(b, q) and not any(q is a for a in allowed) for q in boxes)
-            and not any(overlap(b, z) for z in zones)
-        )
-        zone = None
-        if good and item.clear:
-            fx, fy = thing.front
-            if item.clear < 0:
-                fx, fy = -fx, -fy
-            depth = abs(item.clear)
-            away = d / 2 + depth / 2
-            zone = box(
-                thing.x + fx * away,
-                thing.y + fy * away,
-                w * 0.9,
-                depth - 0.01,
-                thing.yaw,
-                thing.z,
-                thing.z + max(h, 0.5),
-            )
-            good = space.inside(zone) and space.is_clear(zone)
-        if not good:
-            if not item.optional:
-                return None
-            things.append(None)
-            boxes.append(None)
-            continue
-        if zone is not None:
-            zones.append(zone)
-            if item.clear >= 0.5:
-                away = d / 2 + space.radius + 0.06
-                reach.append((thing.x + fx * away, thing.y + fy * away))
-        things.append(thing)
-        boxes.append(None if flat else b)
-    solids = [b for b in boxes if b is not None]
-    plan = space.walkable(solids, reach)
+        if not trial.place(item):
+            return None
+    things, solids = trial.things, trial.solids()
+    plan = space.walkable(solids, trial.reach)
     if plan is None:
-        solids, things = _without_optional(items, things, boxes)
-        plan = space.walkable(solids, reach)
+        things = _without_optional(items, things)
+        solids = [b for b, t in zip(trial.boxes, things) if b is not None and t is not None]
+        plan = space.walkable(solids, trial.reach)
         if plan is None:
             return None
     resting, kept = _resting(space, items, things)
-    return Fit(tuple(kept), (*solids, *resting), tuple(zones), plan)
+    return Fit(tuple(kept), (*solids, *resting), tuple(trial.zones), plan)
 
 
-def _resting(space: RoomSpace, items, things) -> tuple[list[Box], list[Thing]]:
+@dataclass
+class _Trial:
+    """An arrangement that is being put at a pose, item by item."""
+
+    space: RoomSpace
+    pose: Pose
+    group: str
+    things: list[Thing | None] = field(default_factory=list)
+    """One for each item so far; None where an optional one was left out."""
+    boxes: list[Box | None] = field(default_factory=list)
+    """Of what stands; None for rugs, for what rests on something and for what was left out."""
+    zones: list[Box] = field(default_factory=list)
+    """What must stay clear before the fronts."""
+    reach: list[tuple[float, float]] = field(default_factory=list)
+    """Where somebody must be able to stand."""
+
+    def solids(self) -> list[Box]:
+        return [b for b in self.boxes if b is not None]
+
+    def place(self, item: Item) -> bool:
+        """Add the next item; False where it finds no room and is not optional."""
+        if item.on is not None:
+            self._keep(_rest(self.space, item, self.things[item.on], self.group), None)
+            return True
+        thing = self._thing(item)
+        b, flat = thing.box, is_flat(item.extent, item.z)
+        zone = _clear_zone(item, thing) if item.clear else None
+        if not self._stands(item, b, flat) or not (
+            zone is None or (self.space.inside(zone) and self.space.is_clear(zone))
+        ):
+            self._keep(None, None)
+            return item.optional
+        if zone is not None:
+            self.zones.append(zone)
+            if item.clear >= 0.5:
+                away = item.extent[1] / 2 + self.space.radius + 0.06
+                fx, fy = thing.front
+                self.reach.append((thing.x + fx * away, thing.y + fy * away))
+        self._keep(thing, None if flat else b)
+        return True
+
+    def _keep(self, thing: Thing | None, b: Box | None) -> None:
+        self.things.append(thing)
+        self.boxes.append(b)
+
+    def _thing(self, item: Item) -> Thing:
+        pose, c, s = self.pose, math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        return Thing(
+            asset=item.asset,
+            x=pose.x + c * item.x - s * item.y,
+            y=pose.y + s * item.x + c * item.y,
+            z=self.space.bottom + item.z,
+            yaw=pose.yaw + item.yaw,
+            size=item.extent,
+            params=item.params,
+            group=self.group,
+            role=item.role,
+            wall=pose.wall,
+        )
+
+    def _stands(self, item: Item, b: Box, flat: bool) -> bool:
+        """Whether an item finds room among what stands in the room and in the arrangement."""
+        if item.needs is not None and self.things[item.needs] is None:
+            return False
+        if flat:
+            return _flat_fits(self.space, b)
+        allowed = [q for i in item.under if (q := self.boxes[i]) is not None]
+        return (
+            self.space.fits(b, ignore=allowed, passage=item.passage)
+            and not any(overlap(b, q) and not any(q is a for a in allowed) for q in self.solids())
+            and not any(overlap(b, z) for z in self.zones)
+        )
+
+
+def _clear_zone(item: Item, thing: Thing) -> Box:
+    """What must stay clear before an item's front, or behind its back."""
+    w, d, h = item.extent
+    fx, fy = thing.front
+    if item.clear < 0:
+        fx, fy = -fx, -fy
+    depth = abs(item.clear)
+    away = d / 2 + depth / 2
+    return box(
+        thing.x + fx * away, thing.y + fy * away, w * 0.9, depth - 0.01, thing.yaw, thing.z, thing.z + max(h, 0.5)
+    )
+
+
+def _resting(space: RoomSpace, items: Sequence[Item], things: Sequence[Thing | None]) -> tuple[list[Box], list[Thing]]:
     """Boxes of what rests on surfaces, and all things less those that would touch more than what carries them."""
-    kept, boxes = [], []
+    kept: list[Thing] = []
+    boxes: list[Box] = []
     own = [t.box for i, t in zip(items, things) if t is not None and i.on is None and not is_flat(i.extent, i.z)]
-    for item, thing in zip(items, things):
+    for thing in things:
         if thing is None:
             continue
-        if item.on is not None:
+        if thing.parent is not None:
             b, carrier = thing.box, thing.parent.box
             others = (*space.solids, *own, *boxes)
             if any(overlap(b, q) and not same_box(q, carrier) for q in others) or not space.inside(b):
@@ -240,7 +272,7 @@ def _resting(space: RoomSpace, items, things) -> tuple[list[Box], list[Thing]]:
     return boxes, kept
 
 
-def _without_optional(items, things, boxes):
+def _without_optional(items: Sequence[Item], things: Sequence[Thing | None]) -> list[Thing | None]:
     """The arrangement stripped of its optional standing things, and of what rests on them."""
     kept: list[Thing | None] = []
     for item, thing in zip(items, things):
@@ -250,8 +282,7 @@ def _without_optional(items, things, boxes):
             or (item.needs is not None and kept[item.needs] is None)
         )
         kept.append(None if gone else thing)
-    solids = [b for b, t in zip(boxes, kept) if b is not None and t is not None]
-    return solids, kept
+    return kept
 
 
 def _flat_fits(space: RoomSpace, b: Box) -> bool:
@@ -278,18 +309,18 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
     v = min(max(item.y, y0 + d / 2), y1 - d / 2) if d < y1 - y0 else (y0 + y1) / 2
     x, y = parent.local(u, v)
     return Thing(
-        item.asset,
-        x,
-        y,
-        parent.z + surface.z * scale[2] + item.z,
-        parent.yaw + item.yaw,
-        item.extent,
-        item.params,
-        parent,
-        surface.name,
-        group,
-        item.role,
-        parent.wall,
+        asset=item.asset,
+        x=x,
+        y=y,
+        z=parent.z + surface.z * scale[2] + item.z,
+        yaw=parent.yaw + item.yaw,
+        size=item.extent,
+        params=item.params,
+        parent=parent,
+        surface=surface.name,
+        group=group,
+        role=item.role,
+        wall=parent.wall,
     )
 
 
@@ -307,7 +338,7 @@ def wall_poses(
     Tried along each wall are both ends, the middle, the middles of its free stretches, before
     its windows, and every `step` metres.
     """
-    poses = []
+    poses: list[Pose] = []
     for wall in space.walls if walls is None else walls:
         half = width / 2 + 0.01
         doors = [(s0 - 0.1, s1 + 0.1) for s0, s1, o in wall.openings if o.kind != "window"]
@@ -343,7 +374,7 @@ def floor_poses(
     nx = max(int((x1 - x0 - 2 * margin) / step), 1) + 1
     ny = max(int((y1 - y0 - 2 * margin) / step), 1) + 1
     centre = ((x0 + x1) / 2, (y0 + y1) / 2)
-    poses = []
+    poses: list[Pose] = []
     for i in range(nx):
         for j in range(ny):
             x = centre[0] + (i - (nx - 1) / 2) * step

@@ -5,13 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Unpack
 
 import numpy as np
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import WALL_GAP, Item, Pose, Thing, pack, wall_poses
 from embodied.generate.furnish.space import RoomSpace, Wall
-from embodied.generate.furnish.stock import Stock
+from embodied.generate.furnish.stock import Limits, Stock
+
+
+@dataclass(frozen=True)
+class Liking:
+    """Where along the walls a piece likes to stand."""
+
+    corner: float = 0.5
+    """For standing in a corner."""
+    centre: float = 0.0
+    """For the middle of a free stretch."""
+    window: float = -1.0
+    """For standing under a window."""
+    more: Callable[[Wall, float], float] | None = None
+    """What else counts, of a wall and a position on it."""
+    gap: float = WALL_GAP
+    """Free strip behind it, metres."""
 
 
 @dataclass
@@ -35,7 +52,7 @@ class Context:
     def chance(self, probability: float) -> bool:
         return bool(self.rng.random() < probability)
 
-    def pick(self, role: str, **limits) -> Asset | None:
+    def pick(self, role: str, **limits: Unpack[Limits]) -> Asset | None:
         """An asset for `role` that is not in the room yet, if there is one (see Stock.pick)."""
         limits.setdefault("avoid", tuple(t.asset.key for t in self.things))
         return self.stock.pick(role, rng=self.rng, kind=self.kind, **limits)
@@ -60,35 +77,29 @@ class Context:
         asset: Asset | None,
         group: str,
         *,
+        liking: Liking,
         clear: float = 0.6,
-        corner: float = 0.5,
-        centre: float = 0.0,
-        window: float = -1.0,
-        score: Callable[[Wall, float], float] | None = None,
         role: str = "",
         extra: Callable[[Asset], Sequence[Item]] = lambda asset: (),
-        gap: float = WALL_GAP,
         tries: int = 30,
-        size: tuple[float, float, float] | None = None,
-        params: tuple = (),
     ) -> list[Thing] | None:
-        """One piece with its back to a wall, where the weighted preferences like it best.
+        """One piece with its back to a wall, where it likes it best.
 
         Args:
-          corner, centre, window: liking for corners, for the middle of a free stretch, for
-            standing under a window.
+          clear: depth before it that nothing else may fill, metres.
           extra: further items of the arrangement, on it or beside it.
         """
         if asset is None:
             return None
-        width, depth, _ = size or asset.size
+        width, depth, _ = asset.size
 
-        def total(wall: Wall, s: float) -> float:
-            value = corner * at_corner(wall, s, width) + centre * centred(wall, s) + window * at_window(wall, s, width)
-            return value + (score(wall, s) if score else 0.0) + 0.35 * self.rng.random()
+        def score(wall: Wall, s: float) -> float:
+            value = liking.corner * at_corner(wall, s, width) + liking.centre * centred(wall, s)
+            value += liking.window * at_window(wall, s, width)
+            return value + (liking.more(wall, s) if liking.more else 0.0) + 0.35 * self.rng.random()
 
-        poses = wall_poses(self.space, width, score=total, gap=gap)
-        item = Item(asset, 0.0, -depth / 2, clear=clear, role=role or group, size=size, params=params)
+        poses = wall_poses(self.space, width, score=score, gap=liking.gap)
+        item = Item(asset, 0.0, -depth / 2, clear=clear, role=role or group)
         return self.put([item, *extra(asset)], poses, group, tries)
 
 

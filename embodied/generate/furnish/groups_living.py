@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Item, Pose, Thing, facing_point, floor_poses, wall_poses
+from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, Thing, facing_point, floor_poses, wall_poses
 from embodied.generate.furnish.context import (
     Context,
+    Liking,
     at_window,
     centred,
     depth_before,
@@ -19,7 +22,24 @@ from embodied.generate.furnish.context import (
 )
 from embodied.generate.furnish.space import Wall
 
-RUG_HEIGHT = 0.012
+
+@dataclass(frozen=True)
+class Suite:
+    """What a seating group is made of."""
+
+    stand: Asset
+    """A bench for the screen, or a fireplace."""
+    screen: Asset | None
+    sofa: Asset
+    table: Asset | None
+    chair: Asset | None
+    lamp: Asset | None
+    side: Asset | None
+    """A side table."""
+
+    @property
+    def has_fire(self) -> bool:
+        return self.stand.object_class in ("fireplace", "wood stove")
 
 
 def seating(ctx: Context) -> list[Thing] | None:
@@ -38,18 +58,22 @@ def seating(ctx: Context) -> list[Thing] | None:
         for sofa in (ctx.pick("sofa", least=(1.5, 0, 0)), ctx.pick("sofa", most=(1.95, 1.0, 1.2))):
             if sofa is None:
                 continue
-            table = ctx.pick("coffee table", most=(1.6, 1.0, 0.6))
-            chair = ctx.pick("easy chair", most=(1.1, 1.1, 1.2))
-            lamp = ctx.pick("floor lamp") if ctx.chance(0.6) else None
-            side = ctx.pick("side table")
+            suite = Suite(
+                stand,
+                screen,
+                sofa,
+                table=ctx.pick("coffee table", most=(1.6, 1.0, 0.6)),
+                chair=ctx.pick("easy chair", most=(1.1, 1.1, 1.2)),
+                lamp=ctx.pick("floor lamp") if ctx.chance(0.6) else None,
+                side=ctx.pick("side table"),
+            )
             for distance, shift in _distances(ctx, stand, sofa):
-                items = _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich)
-                poses = wall_poses(
-                    ctx.space,
-                    stand.size[0],
-                    score=lambda w, s, far=distance: _screen_score(ctx, w, s, far, stand.size[0]),
-                )
-                found = ctx.put(items, poses, "seating", tries=14)
+                items = _seating_items(ctx, suite, distance, shift, rich)
+
+                def score(wall: Wall, s: float, distance: float = distance) -> float:
+                    return _screen_score(ctx, wall, s, distance, stand.size[0])
+
+                found = ctx.put(items, wall_poses(ctx.space, stand.size[0], score=score), "seating", tries=14)
                 if found:
                     return found
     return None
@@ -76,47 +100,57 @@ def _screen_score(ctx: Context, wall: Wall, s: float, distance: float, width: fl
     return value + 1.5 * back_to_wall - (3.0 if depth < distance - 0.02 else 0.0) + 0.3 * ctx.rng.random()
 
 
-def _seating_items(ctx, stand, screen, sofa, table, chair, lamp, side, distance, shift, rich) -> list[Item]:
-    """The arrangement in the frame of the screen's wall; the sofa's back is `distance` away, its middle `shift` aside."""
-    rng = ctx.rng
+def _seating_items(ctx: Context, suite: Suite, distance: float, shift: float, rich: int) -> list[Item]:
+    """The arrangement in the frame of the screen's wall.
+
+    Args:
+      distance: of the sofa's back from the wall, metres.
+      shift: of the sofa and what goes with it aside, metres.
+      rich: 0 for what must be, 1 with a chair and side tables, 2 with two chairs.
+    """
+    stand, sofa, side, lamp = suite.stand, suite.sofa, suite.side, suite.lamp
     width, depth = sofa.size[:2]
     front = -(distance - depth)
-    role = "fireplace" if stand.object_class in ("fireplace", "wood stove") else "tv stand"
-    items = [
-        Item(stand, 0.0, -stand.size[1] / 2, role=role),
-        Item(sofa, 0.0, -(distance - depth / 2), math.pi, role="sofa"),
-    ]
-    if screen is not None:
-        items.append(Item(screen, 0.0, 0.0, on=0, role="television"))
-    if table is not None:
-        gap = 0.4
-        y = front + gap + table.size[1] / 2
-        if -y - table.size[1] / 2 - stand.size[1] > 0.7:
-            items.append(Item(table, 0.0, y, math.pi + wobble(rng, 2), role="coffee table", optional=rich < 1))
-            rug = ctx.pick("carpet")
-            if rug is not None and ctx.chance(0.85):
-                room = -front - stand.size[1] - 0.3
-                size = (min(width + rng.uniform(0.1, 0.5), 3.2), min(rng.uniform(1.7, 2.1), room), RUG_HEIGHT)
-                items.append(Item(rug, 0.0, front - 0.25 + size[1] / 2, 0.0, size=size, optional=True, role="rug"))
-            if chair is not None and rich >= 1:
-                count = 2 if rich == 2 and ctx.chance(0.6) else 1
-                reach = max(table.size[0] / 2 + 0.45, width / 2 - 0.25) + chair.size[1] / 2
-                sides = [1, -1] if ctx.chance(0.5) else [-1, 1]
-                for sign in sides[:count]:
-                    cx, cy = sign * reach, y + 0.25 + rng.uniform(-0.1, 0.15)
-                    yaw = facing_point(cx, cy, 0.0, y - 0.1) + wobble(rng, 8)
-                    items.append(Item(chair, cx, cy, yaw, optional=True, role="armchair"))
+    fixed = [Item(stand, 0.0, -stand.size[1] / 2, role="fireplace" if suite.has_fire else "tv stand")]
+    items = [Item(sofa, 0.0, -(distance - depth / 2), math.pi, role="sofa")]
+    if suite.screen is not None:
+        items.append(Item(suite.screen, 0.0, 0.0, on=0, role="television"))
+    if suite.table is not None:
+        items += _before_the_sofa(ctx, suite, suite.table, front, rich)
     sign = 1 if ctx.chance(0.5) else -1
     if side is not None and rich >= 1:
         x = sign * (width / 2 + 0.06 + side.size[0] / 2)
-        items.append(Item(side, x, front - 0.35 + 0.0, math.pi, optional=True, role="side table"))
+        items.append(Item(side, x, front - 0.35, math.pi, optional=True, role="side table"))
         table_lamp = ctx.pick("table lamp", most=(0.5, 0.5, 0.9))
         if table_lamp is not None and ctx.chance(0.7):
-            items.append(Item(table_lamp, 0.0, 0.0, on=len(items) - 1, role="table lamp"))
+            items.append(Item(table_lamp, 0.0, 0.0, on=len(items), role="table lamp"))
     if lamp is not None:
         x = -sign * (width / 2 + 0.08 + lamp.size[0] / 2)
         items.append(Item(lamp, x, front - depth + lamp.size[1] / 2 + 0.05, math.pi, optional=True, role="floor lamp"))
-    return [i if i.on is not None or i.role in (role, "television") else replace(i, x=i.x + shift) for i in items]
+    return [*fixed, *(i if i.on is not None else replace(i, x=i.x + shift) for i in items)]
+
+
+def _before_the_sofa(ctx: Context, suite: Suite, table: Asset, front: float, rich: int) -> list[Item]:
+    """The coffee table on its rug and a chair or two at its sides, where there is depth enough for them."""
+    rng, width, chair = ctx.rng, suite.sofa.size[0], suite.chair
+    y = front + 0.4 + table.size[1] / 2
+    if -y - table.size[1] / 2 - suite.stand.size[1] <= 0.7:
+        return []
+    items = [Item(table, 0.0, y, math.pi + wobble(rng, 2), role="coffee table", optional=rich < 1)]
+    rug = ctx.pick("carpet")
+    if rug is not None and ctx.chance(0.85):
+        room = -front - suite.stand.size[1] - 0.3
+        size = (min(width + rng.uniform(0.1, 0.5), 3.2), min(rng.uniform(1.7, 2.1), room), RUG_HEIGHT)
+        items.append(Item(rug, 0.0, front - 0.25 + size[1] / 2, 0.0, size=size, optional=True, role="rug"))
+    if chair is not None and rich >= 1:
+        count = 2 if rich == 2 and ctx.chance(0.6) else 1
+        reach = max(table.size[0] / 2 + 0.45, width / 2 - 0.25) + chair.size[1] / 2
+        sides = [1, -1] if ctx.chance(0.5) else [-1, 1]
+        for sign in sides[:count]:
+            cx, cy = sign * reach, y + 0.25 + rng.uniform(-0.1, 0.15)
+            yaw = facing_point(cx, cy, 0.0, y - 0.1) + wobble(rng, 8)
+            items.append(Item(chair, cx, cy, yaw, optional=True, role="armchair"))
+    return items
 
 
 def sofa_group(ctx: Context) -> list[Thing] | None:
@@ -125,42 +159,35 @@ def sofa_group(ctx: Context) -> list[Thing] | None:
         sofa, table = ctx.pick(role, most=(longest, 1.9, 1.2)), ctx.pick("coffee table", most=(1.3, 0.8, 0.6))
         if sofa is None or table is None or (role == "corner sofa" and ctx.space.area < 20):
             continue
-        chair, rug = ctx.pick("easy chair", most=(1.0, 1.0, 1.2)), ctx.pick("carpet")
-        w, d = sofa.size[:2]
-        y = -d - 0.4 - table.size[1] / 2
-        items = [
-            Item(sofa, 0.0, -d / 2, role="sofa"),
-            Item(table, 0.0, y, wobble(ctx.rng, 2), optional=True, role="coffee table"),
-        ]
-        if rug is not None:
-            items.append(Item(rug, 0.0, y + 0.15, size=(w + 0.3, 1.6, RUG_HEIGHT), optional=True, role="rug"))
-        for sign in (-1, 1):
-            x = sign * (table.size[0] / 2 + 0.45 + chair.size[1] / 2)
-            items.append(
-                Item(
-                    chair,
-                    x,
-                    y - 0.1,
-                    facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10),
-                    optional=True,
-                    role="armchair",
-                )
-            )
-        found = ctx.put(
-            items,
-            wall_poses(
-                ctx.space,
-                w,
-                score=lambda wall, s, w=w: (
-                    1.2 * centred(wall, s) + 0.4 * ctx.rng.random() - 0.5 * at_window(wall, s, w)
-                ),
-            ),
-            "seating",
-            tries=40,
-        )
+        items = _sofa_items(ctx, sofa, table)
+
+        def score(wall: Wall, s: float, w: float = sofa.size[0]) -> float:
+            return 1.2 * centred(wall, s) + 0.4 * ctx.rng.random() - 0.5 * at_window(wall, s, w)
+
+        found = ctx.put(items, wall_poses(ctx.space, sofa.size[0], score=score), "seating", tries=40)
         if found:
             return found
     return None
+
+
+def _sofa_items(ctx: Context, sofa: Asset, table: Asset) -> list[Item]:
+    """A sofa with its back at the wall, a table on a rug before it and chairs at the table's sides."""
+    chair, rug = ctx.pick("easy chair", most=(1.0, 1.0, 1.2)), ctx.pick("carpet")
+    w, d = sofa.size[:2]
+    y = -d - 0.4 - table.size[1] / 2
+    items = [
+        Item(sofa, 0.0, -d / 2, role="sofa"),
+        Item(table, 0.0, y, wobble(ctx.rng, 2), optional=True, role="coffee table"),
+    ]
+    if rug is not None:
+        items.append(Item(rug, 0.0, y + 0.15, size=(w + 0.3, 1.6, RUG_HEIGHT), optional=True, role="rug"))
+    if chair is None:
+        return items
+    for sign in (-1, 1):
+        x = sign * (table.size[0] / 2 + 0.45 + chair.size[1] / 2)
+        yaw = facing_point(x, y - 0.1, 0.0, y) + wobble(ctx.rng, 10)
+        items.append(Item(chair, x, y - 0.1, yaw, optional=True, role="armchair"))
+    return items
 
 
 def lone_sofa(ctx: Context) -> list[Thing] | None:
@@ -177,9 +204,8 @@ def lone_sofa(ctx: Context) -> list[Thing] | None:
             if found:
                 return found
     for longest in (2.3, 1.9, 1.75):
-        found = ctx.against_wall(
-            ctx.pick("sofa", most=(longest, 1.0, 1.2)), "seating", clear=0.5, window=-0.3, centre=0.5, role="sofa"
-        )
+        sofa = ctx.pick("sofa", most=(longest, 1.0, 1.2))
+        found = ctx.against_wall(sofa, "seating", liking=Liking(centre=0.5, window=-0.3), clear=0.5, role="sofa")
         if found:
             return found
     x0, y0, x1, y1 = ctx.space.polygon.bounds
@@ -315,73 +341,61 @@ def table_items(ctx: Context, table: Asset, chair: Asset, *, wall: bool = False,
     Args:
       pairs: whether it must have chairs on both of its free sides.
     """
-    rng = ctx.rng
     w, d = table.size[:2]
-    y0 = -d / 2 if wall else 0.0
-    items = [Item(table, 0.0, y0, role="dining table")]
-    cw, cd = chair.size[:2]
-    tuck = 0.0 if "arms" in chair.tags or cw > 0.495 else min(0.18, cd * 0.3)  # wide chairs have arms
+    items = [Item(table, 0.0, -d / 2 if wall else 0.0, role="dining table")]
     rug = ctx.pick("carpet")
     if rug is not None and not wall and ctx.kind in ("dining_room", "living_room") and ctx.chance(0.55):
         items.append(Item(rug, 0.0, 0.0, size=(w + 1.3, d + 1.3, RUG_HEIGHT), optional=True, role="rug"))
-    round_table = "round" in table.tags or abs(w - d) < 0.08
-    if round_table and not wall:
-        count = 4 if w > 0.75 else 2
-        start = rng.uniform(0, math.pi) if "round" in table.tags else 0.0
-        for k in range(count):
-            angle = start + 2 * math.pi * k / count
-            r = w / 2 + cd / 2 - tuck * (0.8 if "round" in table.tags else 1.0) + _pulled(rng)
-            x, y = r * math.cos(angle), r * math.sin(angle)
-            items.append(
-                Item(
-                    chair,
-                    x,
-                    y,
-                    facing_point(x, y, 0, 0) + wobble(rng, 9),
-                    under=(0,),
-                    optional=k > 1,
-                    role="dining chair",
-                )
-            )
-        return items
-    per_side = max(1, int((w - 0.06) / max(cw + 0.12, 0.6)))
-    pitch = w / per_side
-    for sign in (-1,) if wall else (-1, 1):
-        for k in range(per_side):
-            x = (k + 0.5) * pitch - w / 2
-            y = y0 + sign * (d / 2 + cd / 2 - tuck + _pulled(rng))
-            yaw = (0.0 if sign > 0 else math.pi) + wobble(rng, 7)
-            items.append(
-                Item(
-                    chair,
-                    x,
-                    y,
-                    yaw,
-                    under=(0,),
-                    clear=-0.3,
-                    optional=k > 0 or (sign > 0 and not pairs),
-                    role="dining chair",
-                )
-            )
-    if d > 0.7 and (wall or w > 1.35) and ctx.chance(0.6):
-        for sign in (-1, 1):
-            x = sign * (w / 2 + cd / 2 - tuck + _pulled(rng))
-            items.append(
-                Item(
-                    chair,
-                    x,
-                    y0,
-                    -sign * math.pi / 2 + wobble(rng, 7),
-                    under=(0,),
-                    clear=-0.25,
-                    optional=True,
-                    role="dining chair",
-                )
-            )
+    if ("round" in table.tags or abs(w - d) < 0.08) and not wall:
+        return items + _chairs_around(ctx, table, chair)
+    return items + _chairs_along(ctx, table, chair, wall=wall, pairs=pairs)
+
+
+def _tuck(chair: Asset) -> float:
+    """How far a chair goes under its table, metres."""
+    width, depth = chair.size[:2]
+    return 0.0 if "arms" in chair.tags or width > 0.495 else min(0.18, depth * 0.3)  # wide chairs have arms
+
+
+def _chairs_around(ctx: Context, table: Asset, chair: Asset) -> list[Item]:
+    """Chairs about a round or square table, on a circle."""
+    rng, is_round = ctx.rng, "round" in table.tags
+    w, tuck = table.size[0], _tuck(chair)
+    count = 4 if w > 0.75 else 2
+    start = rng.uniform(0, math.pi) if is_round else 0.0
+    items = []
+    for k in range(count):
+        angle = start + 2 * math.pi * k / count
+        r = w / 2 + chair.size[1] / 2 - tuck * (0.8 if is_round else 1.0) + _pulled(rng)
+        x, y = r * math.cos(angle), r * math.sin(angle)
+        yaw = facing_point(x, y, 0, 0) + wobble(rng, 9)
+        items.append(Item(chair, x, y, yaw, under=(0,), optional=k > 1, role="dining chair"))
     return items
 
 
-def _pulled(rng) -> float:
+def _chairs_along(ctx: Context, table: Asset, chair: Asset, *, wall: bool, pairs: bool) -> list[Item]:
+    """Chairs along the sides of a table, and now and then at its ends."""
+    rng, tuck = ctx.rng, _tuck(chair)
+    (w, d), (cw, cd) = table.size[:2], chair.size[:2]
+    y0 = -d / 2 if wall else 0.0
+    items = []
+    per_side = max(1, int((w - 0.06) / max(cw + 0.12, 0.6)))
+    for sign in (-1,) if wall else (-1, 1):
+        for k in range(per_side):
+            x = (k + 0.5) * (w / per_side) - w / 2
+            y = y0 + sign * (d / 2 + cd / 2 - tuck + _pulled(rng))
+            yaw = (0.0 if sign > 0 else math.pi) + wobble(rng, 7)
+            spare = k > 0 or (sign > 0 and not pairs)
+            items.append(Item(chair, x, y, yaw, under=(0,), clear=-0.3, optional=spare, role="dining chair"))
+    if d > 0.7 and (wall or w > 1.35) and ctx.chance(0.6):
+        for sign in (-1, 1):
+            x = sign * (w / 2 + cd / 2 - tuck + _pulled(rng))
+            yaw = -sign * math.pi / 2 + wobble(rng, 7)
+            items.append(Item(chair, x, y0, yaw, under=(0,), clear=-0.25, optional=True, role="dining chair"))
+    return items
+
+
+def _pulled(rng: np.random.Generator) -> float:
     """How far a chair was left pulled out, metres: mostly not at all."""
     return float(rng.uniform(0.12, 0.3)) if rng.random() < 0.12 else float(rng.uniform(0.0, 0.06))
 
@@ -410,9 +424,3 @@ def low_table_seat(ctx: Context) -> list[Thing] | None:
         "seating",
         tries=30,
     )
-
-
-def middle_of_room(ctx: Context) -> Pose:
-    """The pose at the middle of the floor."""
-    c = ctx.space.polygon.representative_point()
-    return Pose(0.0, c.x, c.y, 0.0)

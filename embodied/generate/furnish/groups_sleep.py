@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Item, Thing, wall_poses
-from embodied.generate.furnish.context import Context, at_corner, at_window, centred, depth_before, has_window, wobble
-from embodied.generate.furnish.groups_living import RUG_HEIGHT
+from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, Thing, wall_poses
+from embodied.generate.furnish.context import (
+    Context,
+    Liking,
+    at_corner,
+    at_window,
+    centred,
+    depth_before,
+    has_window,
+    wobble,
+)
 from embodied.generate.furnish.space import Wall
+from embodied.house.house import Opening
 
 
 def double_bed(ctx: Context) -> list[Thing] | None:
@@ -89,7 +99,7 @@ def _bed(ctx: Context, bed: Asset, flank: int, corner: float = -0.6) -> list[Thi
     return ctx.put(items, poses, "sleeping", tries=40)
 
 
-def _facing_doors(ctx: Context, wall: Wall):
+def _facing_doors(ctx: Context, wall: Wall) -> Iterator[tuple[float, float, Opening]]:
     """Doors on the opposite wall, as (from, to, opening) measured along `wall`."""
     for other in ctx.space.walls:
         if other.inward[0] * wall.inward[0] + other.inward[1] * wall.inward[1] > -0.9:
@@ -108,12 +118,17 @@ def wardrobe(ctx: Context) -> list[Thing] | None:
     """A wardrobe in a corner of an inner wall, away from the window."""
     for limit in (9.0, 1.8, 1.2):
         asset = ctx.pick("wardrobe", most=(limit, 0.75, ctx.space.height - 0.05), avoid=())
-        found = ctx.against_wall(
-            asset, "wardrobe", clear=0.65, corner=0.8, window=-3.0, score=lambda w, s: -0.7 * has_window(w), tries=36
-        )
+        liking = Liking(corner=0.8, window=-3.0, more=lambda w, s: -0.7 * has_window(w))
+        found = ctx.against_wall(asset, "wardrobe", liking=liking, clear=0.65, tries=36)
         if found:
             return found
     return None
+
+
+def wardrobe_unless_closet(ctx: Context) -> list[Thing] | None:
+    """A wardrobe; every other main bedroom of a house with a closet does without, if all else finds its place."""
+    does_without = not ctx.attempt and "closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)
+    return None if does_without else wardrobe(ctx)
 
 
 def dresser(ctx: Context) -> list[Thing] | None:
@@ -139,7 +154,7 @@ def dresser(ctx: Context) -> list[Thing] | None:
             )
         ]
 
-    return ctx.against_wall(asset, "dressing", clear=0.6, corner=0.1, centre=0.5, window=-0.4, extra=extra)
+    return ctx.against_wall(asset, "dressing", liking=Liking(corner=0.1, centre=0.5, window=-0.4), extra=extra)
 
 
 def bedroom_chair(ctx: Context) -> list[Thing] | None:
@@ -168,7 +183,8 @@ def clothes(ctx: Context) -> list[Thing] | None:
     for k in ctx.rng.permutation(len(roles)):
         for widest in (2.2, 1.05):
             asset = ctx.pick(roles[int(k)], most=(widest, 0.7, ctx.space.height - 0.05), avoid=())
-            found = ctx.against_wall(asset, "clothes", clear=0.45, corner=0.6, window=-2.0, role="storage", tries=36)
+            liking = Liking(corner=0.6, window=-2.0)
+            found = ctx.against_wall(asset, "clothes", liking=liking, clear=0.45, role="storage", tries=36)
             if found:
                 return found
     return None
@@ -176,7 +192,7 @@ def clothes(ctx: Context) -> list[Thing] | None:
 
 def cot(ctx: Context) -> list[Thing] | None:
     """A crib or cradle."""
-    return ctx.against_wall(ctx.pick("baby bed"), "sleeping", clear=0.5, corner=0.8, window=-1.0, role="bed")
+    return ctx.against_wall(ctx.pick("baby bed"), "sleeping", liking=Liking(corner=0.8), clear=0.5, role="bed")
 
 
 def toys(ctx: Context) -> list[Thing] | None:

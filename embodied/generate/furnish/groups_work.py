@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Unpack
 
-from embodied.generate.furnish.arrange import Item, Pose, Thing, floor_poses, wall_poses
-from embodied.generate.furnish.context import Context, at_corner, at_window, centred, door_distance, wobble
+from assets.records import Asset
+from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, Pose, Thing, floor_poses, wall_poses
+from embodied.generate.furnish.context import Context, Liking, at_corner, at_window, centred, door_distance, wobble
 from embodied.generate.furnish.space import Wall
+from embodied.generate.furnish.stock import Limits, Size
 
 
 def desk(ctx: Context) -> list[Thing] | None:
@@ -23,54 +26,43 @@ def desk(ctx: Context) -> list[Thing] | None:
         chair = ctx.pick("office chair", where=lambda a: ("child" in a.tags) == kid) or ctx.pick("dining chair")
         if asset is None or chair is None:
             continue
-        w, d = asset.size[:2]
-        items = [
-            Item(asset, 0.0, -d / 2, role="desk"),
-            Item(
-                chair,
-                wobble(ctx.rng, 5),
-                -d - chair.size[1] / 2 - 0.03,
-                math.pi + wobble(ctx.rng, 20),
-                under=(0,),
-                clear=-0.2,
-                role="desk chair",
-            ),
-        ]
-        computer = ctx.pick("laptop") if ctx.chance(0.75) else ctx.pick("computer", most=(0.6, 0.5, 0.6))
-        if computer is not None:
-            back = min(d / 2 - computer.size[1] / 2 - 0.04, 0.08)
-            items.append(
-                Item(
-                    computer,
-                    0.0,
-                    max(back, computer.size[1] / 2 + 0.13 - d / 2),
-                    wobble(ctx.rng, 5),
-                    on=0,
-                    role="computer",
-                )
-            )
-        lamp = ctx.pick("desk lamp")
-        if lamp is not None:
-            sign = 1 if ctx.chance(0.5) else -1
-            items.append(Item(lamp, sign * w * 0.36, d * 0.2, wobble(ctx.rng, 20), on=0, role="desk lamp"))
-        found = ctx.put(
-            items,
-            wall_poses(
-                ctx.space,
-                w,
-                score=lambda wall, s, w=w: (
-                    0.9 * at_window(wall, s, w)
-                    + 0.4 * at_corner(wall, s, w)
-                    + 0.3 * centred(wall, s)
-                    + 0.5 * ctx.rng.random()
-                ),
-            ),
-            "desk",
-            tries=36,
-        )
+        items, w = _desk_items(ctx, asset, chair), asset.size[0]
+
+        def score(wall: Wall, s: float, w: float = w) -> float:
+            liking = 0.9 * at_window(wall, s, w) + 0.4 * at_corner(wall, s, w) + 0.3 * centred(wall, s)
+            return liking + 0.5 * ctx.rng.random()
+
+        found = ctx.put(items, wall_poses(ctx.space, w, score=score), "desk", tries=36)
         if found:
             return found
     return None
+
+
+def _desk_items(ctx: Context, asset: Asset, chair: Asset) -> list[Item]:
+    """The desk with its back at the wall, the chair before it, computer and lamp on it."""
+    w, d = asset.size[:2]
+    items = [
+        Item(asset, 0.0, -d / 2, role="desk"),
+        Item(
+            chair,
+            wobble(ctx.rng, 5),
+            -d - chair.size[1] / 2 - 0.03,
+            math.pi + wobble(ctx.rng, 20),
+            under=(0,),
+            clear=-0.2,
+            role="desk chair",
+        ),
+    ]
+    computer = ctx.pick("laptop") if ctx.chance(0.75) else ctx.pick("computer", most=(0.6, 0.5, 0.6))
+    if computer is not None:
+        back = min(d / 2 - computer.size[1] / 2 - 0.04, 0.08)
+        y = max(back, computer.size[1] / 2 + 0.13 - d / 2)
+        items.append(Item(computer, 0.0, y, wobble(ctx.rng, 5), on=0, role="computer"))
+    lamp = ctx.pick("desk lamp")
+    if lamp is not None:
+        sign = 1 if ctx.chance(0.5) else -1
+        items.append(Item(lamp, sign * w * 0.36, d * 0.2, wobble(ctx.rng, 20), on=0, role="desk lamp"))
+    return items
 
 
 def bookshelf(ctx: Context) -> list[Thing] | None:
@@ -90,21 +82,20 @@ def bookshelf(ctx: Context) -> list[Thing] | None:
         near = min(math.hypot(x - t.x, y - t.y) - t.size[0] / 2 for t in before)
         return 1.2 if near < (asset.size[0] / 2 + 0.1 if asset else 0.0) else 0.0
 
-    return ctx.against_wall(asset, "bookcase", clear=0.5, corner=0.5, window=-3.0, score=beside, tries=36)
+    liking = Liking(corner=0.5, window=-3.0, more=beside)
+    return ctx.against_wall(asset, "bookcase", liking=liking, clear=0.5, tries=36)
 
 
-def storage(ctx: Context, role: str, *, clear: float = 0.6, group: str = "storage", **limits) -> list[Thing] | None:
+def storage(ctx: Context, role: str, *, clear: float = 0.6, **limits: Unpack[Limits]) -> list[Thing] | None:
     """One piece of storage or a machine at a wall."""
     limits.setdefault("most", (2.6, 0.8, ctx.space.height - 0.03))
     asset = ctx.pick(role, **limits)
     low = asset is not None and asset.size[2] < 0.95
     return ctx.against_wall(
         asset,
-        group,
+        "storage",
+        liking=Liking(corner=0.4, centre=0.3, window=-0.3 if low else -3.0),
         clear=clear,
-        corner=0.4,
-        centre=0.3,
-        window=-0.3 if low else -3.0,
         role=asset.object_class if asset else "",
         tries=30,
     )
@@ -137,15 +128,16 @@ def _window_points(ctx: Context) -> list[tuple[float, float]]:
     ]
 
 
-def corner_thing(ctx: Context, role: str, group: str = "corner", **limits) -> list[Thing] | None:
+def corner_thing(ctx: Context, role: str, **limits: Unpack[Limits]) -> list[Thing] | None:
     """A small thing that stands in a corner or at a wall: bin, basket, ladder, broom."""
     asset = ctx.pick(role, **limits)
     if asset is None:
         return None
-    return ctx.against_wall(asset, group, clear=0.0, corner=1.0, window=-0.2, role=asset.object_class, tries=24)
+    liking = Liking(corner=1.0, window=-0.2)
+    return ctx.against_wall(asset, "corner", liking=liking, clear=0.0, role=asset.object_class, tries=24)
 
 
-def beside(ctx: Context, role: str, anchors: tuple[str, ...], **limits) -> list[Thing] | None:
+def beside(ctx: Context, role: str, anchors: tuple[str, ...], **limits: Unpack[Limits]) -> list[Thing] | None:
     """A small thing on the floor close to one that stands already: a bin beside the desk."""
     asset = ctx.pick(role, **limits)
     targets = ctx.roles(*anchors)
@@ -161,9 +153,9 @@ def beside(ctx: Context, role: str, anchors: tuple[str, ...], **limits) -> list[
     return ctx.put([Item(asset, 0.0, -d / 2, role=asset.object_class)], poses, "beside", tries=16)
 
 
-def in_the_open(ctx: Context, role: str, *, clear: float = 0.5, group: str = "machine", **limits) -> list[Thing] | None:
+def in_the_open(ctx: Context, role: str, *, clear: float = 0.5, group: str = "machine") -> list[Thing] | None:
     """A machine or game table that stands free or at a wall."""
-    asset = ctx.pick(role, most=limits.get("most", (3.0, 3.0, 2.3)))
+    asset = ctx.pick(role, most=(3.0, 3.0, 2.3))
     if asset is None:
         return None
     w, d = asset.size[:2]
@@ -179,9 +171,8 @@ def in_the_open(ctx: Context, role: str, *, clear: float = 0.5, group: str = "ma
             group,
             tries=50,
         )
-    return ctx.against_wall(
-        asset, group, clear=clear, corner=0.1, centre=0.2, window=0.1, role=asset.object_class, gap=0.06, tries=36
-    )
+    liking = Liking(corner=0.1, centre=0.2, window=0.1, gap=0.06)
+    return ctx.against_wall(asset, group, liking=liking, clear=clear, role=asset.object_class, tries=36)
 
 
 def machines(ctx: Context) -> list[Thing] | None:
@@ -209,14 +200,14 @@ def machines(ctx: Context) -> list[Thing] | None:
 
 def workbench(ctx: Context) -> list[Thing] | None:
     """A bench to work at, with its tools near it."""
-    return ctx.against_wall(ctx.pick("workbench"), "workbench", clear=0.8, centre=0.6, window=0.4, role="workbench")
+    return ctx.against_wall(ctx.pick("workbench"), "workbench", liking=Liking(centre=0.6, window=0.4), clear=0.8)
 
 
 def console(ctx: Context) -> list[Thing] | None:
     """A narrow table on the wall of a hall."""
     deep = 0.62 if ctx.space.area > 6 else 0.42
     asset = ctx.pick("console table", most=(1.6, deep, 1.1)) or ctx.pick("display storage", most=(1.7, deep, 1.3))
-    return ctx.against_wall(asset, "console", clear=0.6, centre=0.6, corner=0.0, window=-1.0, role="console")
+    return ctx.against_wall(asset, "console", liking=Liking(corner=0.0, centre=0.6))
 
 
 def hall_bench(ctx: Context) -> list[Thing] | None:
@@ -227,7 +218,8 @@ def hall_bench(ctx: Context) -> list[Thing] | None:
         x, y = wall.point(s)
         return -0.5 * door_distance(ctx.space, x, y)
 
-    return ctx.against_wall(asset, "entry", clear=0.4, centre=0.3, window=-0.5, score=near_door, role="bench")
+    liking = Liking(centre=0.3, window=-0.5, more=near_door)
+    return ctx.against_wall(asset, "entry", liking=liking, clear=0.4, role="bench")
 
 
 def doormat(ctx: Context) -> list[Thing] | None:
@@ -251,18 +243,11 @@ def runner(ctx: Context) -> list[Thing] | None:
     rug = ctx.pick("carpet")
     if rug is None:
         return None
-    x0, y0, x1, y1 = ctx.space.polygon.bounds
-    long_x = x1 - x0 >= y1 - y0
-    length, width = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
-    size = (min(length - 0.8, 4.0), min(max(width - 0.4, 0.5), 0.9), 0.012)
+    length, width, _ = _sides(ctx)
+    size = (min(length - 0.8, 4.0), min(max(width - 0.4, 0.5), 0.9), RUG_HEIGHT)
     if size[0] < 0.9 or size[1] > width - 0.1:
         return None
-    c = ctx.space.polygon.centroid
-    return ctx.put(
-        [Item(rug, size=size, passage=True, role="rug")],
-        [Pose(0.0, c.x, c.y, 0.0 if long_x else math.pi / 2)],
-        "runner",
-    )
+    return _in_the_middle(ctx, rug, size, "runner")
 
 
 def middle_rug(ctx: Context) -> list[Thing] | None:
@@ -270,11 +255,18 @@ def middle_rug(ctx: Context) -> list[Thing] | None:
     rug = ctx.pick("carpet")
     if rug is None or ctx.roles("rug"):
         return None
+    long, short, _ = _sides(ctx)
+    return _in_the_middle(ctx, rug, (min(0.55 * long, 2.6), min(0.5 * short, 1.8), RUG_HEIGHT), "rug")
+
+
+def _sides(ctx: Context) -> tuple[float, float, bool]:
+    """Longer and shorter side of the floor, metres, and whether the longer one runs along x."""
     x0, y0, x1, y1 = ctx.space.polygon.bounds
-    wide = x1 - x0 >= y1 - y0
-    long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
-    size = (min(0.55 * long, 2.6), min(0.5 * short, 1.8), 0.012)
+    return max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0), x1 - x0 >= y1 - y0
+
+
+def _in_the_middle(ctx: Context, rug: Asset, size: Size, group: str) -> list[Thing] | None:
+    """A rug in the middle of the floor, its width along the longer side."""
     c = ctx.space.polygon.centroid
-    return ctx.put(
-        [Item(rug, size=size, passage=True, role="rug")], [Pose(0.0, c.x, c.y, 0.0 if wide else math.pi / 2)], "rug"
-    )
+    pose = Pose(0.0, c.x, c.y, 0.0 if _sides(ctx)[2] else math.pi / 2)
+    return ctx.put([Item(rug, size=size, passage=True, role="rug")], [pose], group)

@@ -32,9 +32,9 @@ WARM, NEUTRAL = (1.0, 0.72, 0.44), (1.0, 0.9, 0.78)
 
 def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Generator) -> tuple[Light, ...]:
     """One light per lamp, at its bulb; some table lamps are off."""
-    found = []
+    found: list[Light] = []
     share = 0.35 * (1 - style.warmth)
-    color = tuple(round((1 - share) * w + share * n, 3) for w, n in zip(WARM, NEUTRAL))
+    red, green, blue = (round((1 - share) * w + share * n, 3) for w, n in zip(WARM, NEUTRAL))
     for p in placements:
         lumens = LUMENS.get(p.object_class)
         if lumens is None:
@@ -51,7 +51,7 @@ def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Gene
                 p.room,
                 p.id,
                 rounded((x, y, bulb)),
-                NEUTRAL if cool else color,
+                NEUTRAL if cool else (red, green, blue),
                 round(lumens * scale, 0),
                 on,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from assets.records import Asset
+from embodied.generate.furnish.arrange import Params
 from embodied.generate.furnish.context import Context
 
 VARIED = ("cushion", "blanket", "curtain", "vase", "books", "towel")
@@ -11,7 +12,7 @@ SEEDS = 3
 """Few, because equal arguments share one mesh."""
 
 
-def looks(ctx: Context, asset: Asset) -> tuple[tuple[str, str | float], ...]:
+def looks(ctx: Context, asset: Asset) -> Params:
     """Parameters for the maker of `asset`; empty for models of the packs."""
     if not asset.key.startswith("built/") or asset.object_class not in VARIED:
         return ()

@@ -1,490 +1,306 @@
-"""Which groups each kind of room gets, in the order in which they claim their place."""
+"""The table of rooms: which groups of furniture each kind gets, and in which order they claim their place.
+
+To add a kind of room, add an entry to PROGRAMMES; docs/houses.md says what else it wants.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from typing import Unpack
 
+from embodied.generate.furnish import groups_kitchen as kitchen
 from embodied.generate.furnish import groups_living as living
 from embodied.generate.furnish import groups_sleep as sleep
 from embodied.generate.furnish import groups_wet as wet
 from embodied.generate.furnish import groups_work as work
 from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.programme import (
+    Group,
+    Need,
+    Programme,
+    Step,
+    between,
+    carry_out,
+    each_of,
+    either,
+    first_of,
+    has,
+    house_has,
+    house_lacks,
+    in_rooms_above,
+    lacks,
+    per_area,
+    room_is,
+    shortage,
+    tried_before,
+    wider_than,
+)
+from embodied.generate.furnish.stock import Limits
+
+BEDS = ("bed", "child bed", "bunk bed", "loft bed", "day bed", "sofa bed", "crib", "cradle")
+"""Object classes that one can sleep in."""
 
 
 def furnish_room(ctx: Context) -> None:
-    """Put the furniture of its kind into the room, and more where it would look bare."""
-    PROGRAMMES[ctx.kind](ctx)
-    if ctx.kind in FILLERS:
-        target, fillers = FILLERS[ctx.kind]
-        for _ in range(8):
-            if coverage(ctx) >= target:
-                return
-            fillers[int(ctx.rng.integers(len(fillers)))](ctx)
+    """Put the furniture of its kind into the room."""
+    carry_out(PROGRAMMES[ctx.kind], ctx)
 
 
-def coverage(ctx: Context) -> float:
-    """Share of the floor that furniture stands on."""
-    standing = (t for t in ctx.things if t.parent is None and t.z < ctx.space.bottom + 0.1 and t.size[2] > 0.05)
-    return sum(t.size[0] * t.size[1] for t in standing) / ctx.space.area
+def missing(ctx: Context) -> int:
+    """How much the room lacks of what makes it what it is, 0 for nothing."""
+    return shortage(PROGRAMMES[ctx.kind].needs, ctx)
 
 
-def lacks(ctx: Context) -> int:
-    """What is missing of the pieces that make the room what it is; each counts more than all that follow it."""
-    needs = NEEDS.get(ctx.kind, ())
-    return sum(2 ** (len(needs) - 1 - k) for k, roles in enumerate(needs) if not ctx.roles(*roles))
+# Single pieces, by role --------------------------------------------------------------------------
 
 
-def living_room(ctx: Context) -> None:
-    area = ctx.space.area
-    seated = living.seating(ctx) or living.sofa_group(ctx) or living.lone_sofa(ctx) or living.conversation(ctx)
-    if "dining_room" not in ctx.kinds and area > 20 and ctx.kind == "living_room":
-        living.dining(ctx)
-    for _ in range(1 + (area > 22) + (area > 32)):
-        role = "book storage" if ctx.chance(0.55) else "living storage"
-        work.bookshelf(ctx) if role == "book storage" else work.storage(ctx, role)
-    if area > 18 and ctx.chance(0.75):
-        living.reading_corner(ctx)
-    if area > 26:
-        living.sofa_group(ctx) if area > 34 else living.conversation(ctx)
-    if area > 24 and ctx.chance(0.35):
-        work.storage(ctx, "upright piano", clear=0.8)
-    if not seated:
-        living.reading_corner(ctx)
-    for _ in range(1 + (area > 18) + (area > 30)):
-        work.corner_plant(ctx)
-    if ctx.roles("fireplace"):
-        work.beside(ctx, "firewood", ("fireplace",))
-    if ctx.chance(0.3):
-        work.corner_thing(ctx, "bean bag")
-    if ctx.chance(0.25):
-        work.corner_thing(ctx, "floor vase")
-    if ctx.chance(0.12):
-        work.corner_thing(ctx, "pet", most=(0.5, 1.0, 0.9))
-    if ctx.chance(0.35):
-        work.beside(ctx, "basket", ("sofa", "fireplace", "armchair"), most=(0.6, 0.6, 0.7))
-    if area > 30 and ctx.chance(0.3):
-        work.in_the_open(ctx, "grand piano")
+def piece(role: str, clear: float = 0.6, **limits: Unpack[Limits]) -> Group:
+    """One piece of storage or a machine at a wall, with `clear` metres free before it."""
+    return lambda ctx: work.storage(ctx, role, clear=clear, **limits)
 
 
-def dining_room(ctx: Context) -> None:
-    living.dining(ctx)
-    for _ in range(1 + (ctx.space.area > 14)):
-        work.storage(ctx, "display storage")
-    if ctx.space.area > 15 and ctx.chance(0.4):
-        work.storage(ctx, "cupboard")
-    work.corner_plant(ctx)
-    if ctx.space.area > 13:
-        work.corner_plant(ctx)
-    if ctx.space.area > 18 and ctx.chance(0.4):
-        living.reading_corner(ctx)
-
-
-def kitchen(ctx: Context) -> None:
-    area = ctx.space.area
-    first = ctx.attempt in (1, 2, 4)
-    if first:
-        wet.lone_fridge(ctx)
-    wet.kitchen_line(ctx, fridge=not first)
-    if not ctx.roles("fridge"):
-        wet.lone_fridge(ctx)
-    if area > 13 and ctx.chance(0.6):
-        wet.island(ctx)
-    if area > 5.5 and (area > 11 or "dining_room" not in ctx.kinds or ctx.chance(0.6)):
-        most = 1.9 if area > 14 else 1.3 if area > 8.5 else 0.85
-        living.dining(ctx, "small table" if area < 14 else "dining table", "kitchen chair", most)
-    if area > 11 and ctx.chance(0.4):
-        work.storage(ctx, "cupboard")
-    work.corner_thing(ctx, "kitchen bin", most=(0.5, 0.5, 0.9)) or work.corner_thing(
-        ctx, "kitchen bin", most=(0.35, 0.35, 0.7)
-    )
-    if ctx.chance(0.4):
-        work.corner_thing(ctx, "high chair" if "kids_room" in ctx.kinds else "plant", most=(0.7, 0.7, 1.3))
-    if ctx.chance(0.3):
-        work.corner_thing(ctx, "broom")
-    if ctx.chance(0.3):
-        work.corner_plant(ctx)
-
-
-def bedroom(ctx: Context) -> None:
-    area = ctx.space.area
-    if ctx.attempt >= 2:
-        sleep.wardrobe(ctx)
-    if ctx.kind == "main_bedroom" or (area > 10.5 and ctx.chance(0.6)):
-        sleep.double_bed(ctx) or sleep.single_bed(ctx)
-    elif ctx.kind == "guest_room" and ctx.chance(0.35):
-        sleep.single_bed(ctx, "sofa to sleep on") or sleep.single_bed(ctx)
-    else:
-        sleep.single_bed(ctx) or sleep.double_bed(ctx)
-    if not ctx.roles("bed"):
-        sleep.single_bed(ctx, "child bed")
-    if not ctx.roles("wardrobe") and not (
-        not ctx.attempt and "closet" in ctx.kinds and ctx.kind == "main_bedroom" and ctx.chance(0.5)
-    ):
-        sleep.wardrobe(ctx)
-    if area > 17 and ctx.chance(0.5):
-        sleep.wardrobe(ctx)
-    if ctx.kind != "main_bedroom" and area > 9 and ctx.chance(0.75):
-        work.desk(ctx)
-    sleep.dresser(ctx)
-    if area > 12:
-        sleep.bedroom_chair(ctx) if ctx.chance(0.7) else living.reading_corner(ctx)
-    if area > 14 and ctx.chance(0.3):
-        work.desk(ctx)
-    if ctx.chance(0.35):
-        work.bookshelf(ctx)
-    if area > 18 and ctx.chance(0.6):
-        living.conversation(ctx)
-    if ctx.chance(0.75):
-        work.corner_plant(ctx)
-    if ctx.roles("desk"):
-        work.beside(ctx, "bin", ("desk",), most=(0.35, 0.35, 0.45))
-    if ctx.chance(0.3):
-        work.corner_thing(ctx, "laundry basket")
-    if ctx.chance(0.5):
-        work.beside(ctx, "slippers", ("bed",))
-    if area > 16 and ctx.chance(0.15):
-        work.storage(ctx, "folding screen", clear=0.0)
-    if ctx.kind == "guest_room" and ctx.chance(0.5):
-        work.corner_thing(ctx, "suitcase")
-    if ctx.kind == "bedroom" and ctx.chance(0.2):
-        work.corner_thing(ctx, "electric guitar")
-    if area > 16 and ctx.chance(0.4):
-        work.storage(ctx, "trunk", clear=0.4)
-
-
-def kids_room(ctx: Context) -> None:
-    area = ctx.space.area
-    sleep.single_bed(ctx, "kid bed") or sleep.single_bed(ctx)
-    if area > 12 and ctx.chance(0.25):
-        sleep.cot(ctx)
-        work.storage(ctx, "changing table")
-    work.desk(ctx) if ctx.chance(0.7) else sleep.child_table(ctx)
-    sleep.wardrobe(ctx) if ctx.chance(0.7) else sleep.dresser(ctx)
-    if ctx.chance(0.8):
-        work.storage(ctx, "shelving unit", where=lambda a: "child" in a.tags or a.size[2] < 1.9)
-    sleep.toys(ctx)
-    if area > 11:
-        sleep.child_table(ctx)
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "bean bag", most=(1.0, 1.0, 0.9))
-    if ctx.chance(0.6):
-        work.in_the_open(ctx, "big toy", clear=0.0, group="toy")
-    if ctx.chance(0.4):
-        work.corner_thing(ctx, "backpack")
-    work.beside(ctx, "bin", ("desk",), most=(0.35, 0.35, 0.45))
-    if ctx.chance(0.35):
-        work.corner_plant(ctx)
-
-
-def bathroom(ctx: Context) -> None:
-    area = ctx.space.area
-    first = "bathtub" if area > 4.6 and ctx.chance(0.7 - 0.25 * ctx.attempt) else "shower"
-    vanity = "double vanity" if area > 9 and ctx.chance(0.5) else "wash place" if ctx.attempt < 2 else "small basin"
-    done = None
-    if ctx.attempt < 2:
-        done = wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
-    wet.toilet(ctx)
-    wet.basin(ctx, vanity)
-    done = done or wet.bathing(ctx, first) or wet.bathing(ctx, "shower") or wet.bathing(ctx, "bathtub")
-    if done and area > 6.5 and first == "bathtub":
-        wet.bathing(ctx, "shower")
-    if area > 5.5 and ctx.chance(0.3):
-        work.storage(ctx, "bidet", clear=0.45)
-    if area > 5 and "laundry_room" not in ctx.kinds and ctx.chance(0.7):
-        work.machines(ctx)
-    work.corner_thing(ctx, "laundry basket", most=(0.6, 0.6, 0.8))
-    if ctx.chance(0.6):
-        work.beside(ctx, "bin", ("basin", "toilet"), most=(0.32, 0.32, 0.4))
-    if ctx.chance(0.4) and area > 6:
-        work.corner_plant(ctx)
-    if ctx.chance(0.25):
-        work.corner_thing(ctx, "stool", most=(0.45, 0.45, 0.6))
-
-
-def toilet_room(ctx: Context) -> None:
-    wet.toilet(ctx)
-    wet.basin(ctx, "wall washbasin")
-    if ctx.chance(0.5):
-        work.beside(ctx, "bin", ("toilet", "basin"), most=(0.3, 0.3, 0.4))
-
-
-def hall(ctx: Context) -> None:
-    work.doormat(ctx)
-    area = ctx.space.area
-    if ctx.chance(0.85):
-        work.console(ctx)
-    if ctx.chance(0.8):
-        work.hall_bench(ctx)
-    if area > 7 and ctx.chance(0.6):
-        work.storage(ctx, "wardrobe" if ctx.chance(0.5) else "cupboard", most=(1.3, 0.65, 2.4))
-    if ctx.chance(0.6):
-        work.corner_thing(ctx, "umbrella stand")
-    for _ in range(int(ctx.rng.integers(0, 3))):
-        work.beside(ctx, "shoes", ("bench", "console", "doormat"))
-    if area > 5 and ctx.chance(0.6):
-        work.corner_plant(ctx)
-    if area > 9:
-        work.middle_rug(ctx)
-        if ctx.chance(0.5):
-            living.conversation(ctx)
-    elif ctx.chance(0.4):
-        work.runner(ctx)
-    if "kids_room" in ctx.kinds and ctx.chance(0.25):
-        work.corner_thing(ctx, "kick scooter" if ctx.chance(0.5) else "stroller")
-
-
-def corridor(ctx: Context) -> None:
-    if ctx.chance(0.75):
-        work.runner(ctx)
-    x0, y0, x1, y1 = ctx.space.polygon.bounds
-    if min(x1 - x0, y1 - y0) > 1.25 and ctx.chance(0.8):
-        work.console(ctx)
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "floor decoration", most=(0.5, 0.5, 1.3))
-
-
-def study(ctx: Context) -> None:
-    area = ctx.space.area
-    work.desk(ctx)
-    for _ in range(1 + (area > 8) + (area > 12)):
-        work.bookshelf(ctx)
-    work.storage(ctx, "office storage", most=(3.1, 0.7, 2.2))
-    if area > 9 and ctx.chance(0.5):
-        work.corner_thing(ctx, "side chair", most=(0.7, 0.7, 1.2))
-    if area > 8:
-        living.reading_corner(ctx)
-    if area > 10 and ctx.chance(0.4):
-        work.in_the_open(ctx, "drafting table")
-    work.beside(ctx, "bin", ("desk",), most=(0.35, 0.35, 0.45))
-    work.corner_plant(ctx)
-    if ctx.chance(0.6):
-        work.middle_rug(ctx)
-    if ctx.chance(0.3):
-        work.corner_thing(ctx, "safe", most=(0.6, 0.6, 0.7))
-    if ctx.chance(0.3):
-        work.beside(ctx, "briefcase", ("desk",))
-
-
-def laundry_room(ctx: Context) -> None:
-    work.machines(ctx)
-    work.storage(ctx, "rough storage", clear=0.5)
-    if ctx.space.area > 4.5:
-        wet.basin(ctx, "small basin")
-        work.storage(ctx, "tall cabinet" if ctx.chance(0.5) else "cupboard", clear=0.5)
-    if ctx.space.area > 5:
-        work.in_the_open(ctx, "clothes horse", clear=0.0)
-    work.corner_thing(ctx, "laundry basket", most=(0.6, 0.6, 0.8))
-    if ctx.chance(0.7):
-        work.in_the_open(ctx, "ironing board", clear=0.0)
-    if ctx.chance(0.7):
-        work.corner_thing(ctx, "broom")
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "basin", most=(0.8, 0.7, 0.4))
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "step ladder", where=lambda a: a.size[2] < 1.2)
-    if ctx.chance(0.4):
-        work.corner_thing(ctx, "dustpan")
-
-
-def pantry(ctx: Context) -> None:
-    for _ in range(2 + (ctx.space.area > 2.5)):
-        work.storage(ctx, "shelving unit", clear=0.45, avoid=())
-    if ctx.chance(0.5):
-        work.storage(ctx, "chest freezer", clear=0.5)
-    for _ in range(int(ctx.rng.integers(1, 4))):
-        work.corner_thing(ctx, "box", most=(0.62, 0.62, 0.7))
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "shopping trolley")
-    if ctx.chance(0.5):
-        work.corner_thing(ctx, "broom")
-
-
-def closet(ctx: Context) -> None:
-    for _ in range(3 + int(ctx.space.area > 4) + int(ctx.space.area > 6)):
-        sleep.clothes(ctx)
-    if ctx.space.area > 4 and ctx.chance(0.6):
-        work.in_the_open(ctx, "bench", clear=0.3)
-    for _ in range(int(ctx.rng.integers(2, 5))):
-        work.corner_thing(ctx, "shoes")
-    if ctx.chance(0.6):
-        work.corner_thing(ctx, "suitcase")
-    if ctx.chance(0.4):
-        work.corner_thing(ctx, "laundry basket")
-    if ctx.chance(0.5):
-        work.middle_rug(ctx)
-
-
-def library(ctx: Context) -> None:
-    area = ctx.space.area
-    if area > 16 and ctx.chance(0.6):
-        living.seating(ctx)
-    else:
-        living.conversation(ctx, "reading chair")
-    for _ in range(3 + int(area / 5)):
-        work.bookshelf(ctx)
-    if area > 12:
-        work.desk(ctx)
-    living.reading_corner(ctx)
-    work.corner_plant(ctx)
-    if not ctx.roles("rug"):
-        work.middle_rug(ctx)
-    if ctx.chance(0.3):
-        work.storage(ctx, "chest", clear=0.4)
-
-
-def playroom(ctx: Context) -> None:
-    if ctx.space.area > 15 and ctx.chance(0.7):
-        work.in_the_open(ctx, "game table")
-    else:
-        work.in_the_open(ctx, "foosball table")
-    sleep.toys(ctx)
-    sleep.child_table(ctx)
-    for _ in range(2):
-        work.storage(ctx, "shelving unit", clear=0.5, where=lambda a: a.size[2] < 1.95)
-    work.in_the_open(ctx, "big toy", clear=0.0, group="toy")
-    if ctx.chance(0.5):
-        work.in_the_open(ctx, "pinball machine")
-    for _ in range(2):
-        work.corner_thing(ctx, "bean bag")
-    if ctx.chance(0.5):
-        sleep.toys(ctx)
-    if ctx.chance(0.6):
-        work.storage(ctx, "whiteboard", clear=0.4)
-    work.corner_plant(ctx)
-    if ctx.space.area > 13:
-        living.conversation(ctx)
-
-
-def gym(ctx: Context) -> None:
-    for role in ("treadmill", "exercise bike", "abdominal bench", "punching bag"):
-        work.in_the_open(ctx, role, clear=0.3)
-    if ctx.space.area > 16:
-        work.in_the_open(ctx, "multi-gym", clear=0.5)
-    work.storage(ctx, "bench", clear=0.4, most=(1.5, 0.6, 0.6))
-    if ctx.chance(0.6):
-        work.storage(ctx, "locker" if ctx.chance(0.5) else "shelving unit", clear=0.4)
-    if ctx.chance(0.6):
-        work.storage(ctx, "water cooler", clear=0.4)
-    for role in ("sneakers", "basketball", "laundry basket"):
-        if ctx.chance(0.6):
-            work.corner_thing(ctx, role)
-    work.corner_plant(ctx)
-
-
-def garage(ctx: Context) -> None:
-    work.workbench(ctx)
-    for _ in range(2 + (ctx.space.area > 18)):
-        work.storage(ctx, "rough storage", clear=0.5, avoid=())
-    for _ in range(1 + (ctx.space.area > 16)):
-        work.in_the_open(ctx, "bicycle", clear=0.2)
-    if ctx.chance(0.6):
-        work.in_the_open(ctx, "lawn mower", clear=0.0)
-    for role in (
-        "step ladder",
-        "kitchen bin",
-        "wheelbarrow",
-        "chest freezer",
-        "kick scooter",
-        "tricycle",
-        "fire extinguisher",
-        "broom",
-        "shovel",
-        "traffic cone",
-        "furnace",
-    ):
-        if ctx.chance(0.5):
-            work.corner_thing(ctx, role, most=(1.7, 1.2, 2.2))
-    for _ in range(int(ctx.rng.integers(2, 6))):
-        work.corner_thing(ctx, "box", avoid=())
-    if ctx.chance(0.4):
-        work.corner_thing(ctx, "barrel")
-
-
-def workshop(ctx: Context) -> None:
-    work.workbench(ctx)
-    if ctx.space.area > 11 and ctx.chance(0.5):
-        work.workbench(ctx)
-    for _ in range(2 + (ctx.space.area > 12)):
-        work.storage(ctx, "rough storage", clear=0.5, avoid=())
-    if ctx.chance(0.5):
-        work.in_the_open(ctx, "drafting table")
-    work.storage(ctx, "folding table", clear=0.5)
-    for role in ("step ladder", "stool", "fire extinguisher", "broom", "kitchen bin", "shovel", "barrel"):
-        if ctx.chance(0.6):
-            work.corner_thing(ctx, role, most=(1.0, 1.0, 2.2))
-    for _ in range(int(ctx.rng.integers(2, 5))):
-        work.corner_thing(ctx, "box", avoid=())
-
-
-def sun_room(ctx: Context) -> None:
-    living.low_table_seat(ctx) or living.conversation(ctx, "sun seat")
-    if ctx.space.area > 12:
-        if ctx.chance(0.6):
-            living.dining(ctx, "bistro table", "bistro chair", 1.0)
-        living.reading_corner(ctx)
-    for _ in range(3 + int(ctx.space.area / 5)):
-        work.corner_plant(ctx)
-    if ctx.chance(0.4):
-        work.in_the_open(ctx, "sun lounger", clear=0.0)
-    work.middle_rug(ctx)
-
-
-def stairwell(ctx: Context) -> None:
-    if ctx.chance(0.6):
-        work.corner_plant(ctx)
-    if ctx.chance(0.4):
-        work.console(ctx)
-
-
-NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "kitchen": (("kitchen sink",), ("cooker",), ("fridge",), ("counter",)),
-    "bathroom": (("toilet",), ("basin",), ("bathtub", "corner bathtub", "shower")),
-    "toilet": (("toilet",), ("basin",)),
-    "main_bedroom": (("bed",), ("wardrobe",)),
-    "bedroom": (("bed",), ("wardrobe",)),
-    "guest_room": (("bed",),),
-    "kids_room": (("bed",),),
-    "living_room": (("sofa",),),
-    "family_room": (("sofa",),),
-    "dining_room": (("dining table",),),
-    "study": (("desk",),),
-    "laundry_room": (("washing machine",),),
-}
-"""Room kind to the roles it should not lack, most important first; any one of a tuple will do.
-
-This orders the attempts at one room; generate/lacking.py says over which of them a finished house is drawn anew.
-"""
-
-
-def _piece(role: str, **limits) -> Callable[[Context], object]:
-    """A filler that puts one piece of storage at a wall."""
-    return lambda ctx: work.storage(ctx, role, **limits)
-
-
-def _corner(role: str, **limits) -> Callable[[Context], object]:
-    """A filler that puts one thing in a corner or at a wall."""
+def corner(role: str, **limits: Unpack[Limits]) -> Group:
+    """One thing in a corner or at a wall."""
     return lambda ctx: work.corner_thing(ctx, role, **limits)
 
 
-def _table_for_two(ctx: Context) -> object:
-    """A small table with its chairs, where the kitchen has none yet."""
-    return (
-        None if ctx.roles("dining table", "dining chair") else living.dining(ctx, "small table", "kitchen chair", 1.15)
-    )
+def beside(role: str, *anchors: str, **limits: Unpack[Limits]) -> Group:
+    """One thing on the floor close to something of the roles `anchors`."""
+    return lambda ctx: work.beside(ctx, role, anchors, **limits)
 
 
+def open_floor(role: str, clear: float = 0.5, group: str = "machine") -> Group:
+    """One machine, toy or game table that stands free or at a wall."""
+    return lambda ctx: work.in_the_open(ctx, role, clear=clear, group=group)
+
+
+def table(role: str, chairs: str, longest: float) -> Group:
+    """A table of at most `longest` metres with its chairs."""
+    return lambda ctx: living.dining(ctx, role, chairs, longest)
+
+
+def two_chairs(role: str) -> Group:
+    """Two chairs of this role turned to one another over a small table."""
+    return lambda ctx: living.conversation(ctx, role)
+
+
+def narrow_bed(role: str) -> Group:
+    """A narrow bed of this role."""
+    return lambda ctx: sleep.single_bed(ctx, role)
+
+
+def basin(role: str) -> Group:
+    """A basin of this role."""
+    return lambda ctx: wet.basin(ctx, role)
+
+
+# Living ------------------------------------------------------------------------------------------
+
+SHELVES = either(0.55, work.bookshelf, piece("living storage"))
 SITTING = (
     living.conversation,
     living.reading_corner,
     work.bookshelf,
-    _piece("living storage"),
+    piece("living storage"),
     work.corner_plant,
-    _piece("display storage"),
+    piece("display storage"),
     work.console,
     work.corner_plant,
     living.sofa_group,
-    _corner("floor vase"),
+    corner("floor vase"),
 )
+LIVING = (
+    Step(first_of(living.seating, living.sofa_group, living.lone_sofa, living.conversation), name="seats"),
+    Step(living.dining, above=20, when=(house_lacks("dining_room"), room_is("living_room"))),
+    Step(SHELVES),
+    Step(SHELVES, above=22),
+    Step(SHELVES, above=32),
+    Step(living.reading_corner, 0.75, above=18),
+    Step(living.conversation, above=26, upto=34),
+    Step(living.sofa_group, above=34),
+    Step(piece("upright piano", clear=0.8), 0.35, above=24),
+    Step(living.reading_corner, unless="seats"),
+    Step(work.corner_plant),
+    Step(work.corner_plant, above=18),
+    Step(work.corner_plant, above=30),
+    Step(beside("firewood", "fireplace"), when=(has("fireplace"),)),
+    Step(corner("bean bag"), 0.3),
+    Step(corner("floor vase"), 0.25),
+    Step(corner("pet", most=(0.5, 1.0, 0.9)), 0.12),
+    Step(beside("basket", "sofa", "fireplace", "armchair", most=(0.6, 0.6, 0.7)), 0.35),
+    Step(open_floor("grand piano"), 0.3, above=30),
+)
+LIVING_ROOM = Programme(
+    LIVING,
+    needs=(Need(("sofa",), ("sofa", "sofa bed", "corner sofa", "armchair", "lounge chair")),),
+    fill=0.26,
+    fillers=SITTING,
+)
+FAMILY_ROOM = Programme(LIVING, needs=(Need(("sofa",)),), fill=0.26, fillers=SITTING)
+DINING_ROOM = Programme(
+    (
+        Step(living.dining),
+        Step(piece("display storage")),
+        Step(piece("display storage"), above=14),
+        Step(piece("cupboard"), 0.4, above=15),
+        Step(work.corner_plant),
+        Step(work.corner_plant, above=13),
+        Step(living.reading_corner, 0.4, above=18),
+    ),
+    needs=(Need(("dining table",)),),
+    fill=0.26,
+    fillers=(
+        piece("display storage"),
+        work.corner_plant,
+        living.reading_corner,
+        work.console,
+        work.corner_plant,
+        piece("cupboard"),
+        work.bookshelf,
+    ),
+)
+LIBRARY = Programme(
+    (
+        Step(either(0.6, living.seating, two_chairs("reading chair")), above=16),
+        Step(two_chairs("reading chair"), upto=16),
+        Step(work.bookshelf, times=per_area(3, 5)),
+        Step(work.desk, above=12),
+        Step(living.reading_corner),
+        Step(work.corner_plant),
+        Step(work.middle_rug, when=(lacks("rug"),)),
+        Step(piece("chest", clear=0.4), 0.3),
+    ),
+    fill=0.26,
+    fillers=SITTING,
+)
+SUN_ROOM = Programme(
+    (
+        Step(first_of(living.low_table_seat, two_chairs("sun seat"))),
+        Step(table("bistro table", "bistro chair", 1.0), 0.6, above=12),
+        Step(living.reading_corner, above=12),
+        Step(work.corner_plant, times=per_area(3, 5)),
+        Step(open_floor("sun lounger", clear=0.0), 0.4),
+        Step(work.middle_rug),
+    ),
+    fill=0.24,
+    fillers=SITTING,
+)
+STUDY = Programme(
+    (
+        Step(work.desk),
+        Step(work.bookshelf),
+        Step(work.bookshelf, above=8),
+        Step(work.bookshelf, above=12),
+        Step(piece("office storage", most=(3.1, 0.7, 2.2))),
+        Step(corner("side chair", most=(0.7, 0.7, 1.2)), 0.5, above=9),
+        Step(living.reading_corner, above=8),
+        Step(open_floor("drafting table"), 0.4, above=10),
+        Step(beside("bin", "desk", most=(0.35, 0.35, 0.45))),
+        Step(work.corner_plant),
+        Step(work.middle_rug, 0.6),
+        Step(corner("safe", most=(0.6, 0.6, 0.7)), 0.3),
+        Step(beside("briefcase", "desk"), 0.3),
+    ),
+    needs=(Need(("desk",)),),
+    fill=0.3,
+    fillers=(work.bookshelf, work.corner_plant, living.reading_corner, piece("office storage"), work.console),
+)
+
+# Kitchen and wet rooms ---------------------------------------------------------------------------
+
+KITCHEN_TABLE = in_rooms_above(
+    14,
+    table("dining table", "kitchen chair", 1.9),
+    in_rooms_above(8.5, table("small table", "kitchen chair", 1.3), table("small table", "kitchen chair", 0.85)),
+)
+
+
+def table_for_two(ctx: Context) -> object:
+    """A small table with its chairs, where the kitchen has none yet."""
+    seated = ctx.roles("dining table", "dining chair")
+    return None if seated else living.dining(ctx, "small table", "kitchen chair", 1.15)
+
+
+KITCHEN = Programme(
+    (
+        Step(kitchen.kitchen_units),
+        Step(kitchen.island, 0.6, above=13),
+        Step(KITCHEN_TABLE, above=11),
+        Step(KITCHEN_TABLE, above=5.5, upto=11, when=(house_lacks("dining_room"),)),
+        Step(KITCHEN_TABLE, 0.6, above=5.5, upto=11, when=(house_has("dining_room"),)),
+        Step(piece("cupboard"), 0.4, above=11),
+        Step(first_of(corner("kitchen bin", most=(0.5, 0.5, 0.9)), corner("kitchen bin", most=(0.35, 0.35, 0.7)))),
+        Step(corner("high chair", most=(0.7, 0.7, 1.3)), 0.4, when=(house_has("kids_room"),)),
+        Step(corner("plant", most=(0.7, 0.7, 1.3)), 0.4, when=(house_lacks("kids_room"),)),
+        Step(corner("broom"), 0.3),
+        Step(work.corner_plant, 0.3),
+    ),
+    needs=(
+        Need(("kitchen sink",), ("kitchen sink",)),
+        Need(("cooker",), ("cooker", "cooktop")),
+        Need(("fridge",), ("fridge",)),
+        Need(("counter",)),
+    ),
+    fill=0.27,
+    fillers=(
+        piece("cupboard", clear=0.5),
+        work.corner_plant,
+        table_for_two,
+        piece("shelving unit", clear=0.4),
+        corner("basket", most=(0.5, 0.5, 0.6)),
+        piece("display storage", clear=0.5),
+        work.corner_plant,
+    ),
+)
+BATHROOM = Programme(
+    (
+        Step(wet.bathroom_fixtures),
+        Step(piece("bidet", clear=0.45), 0.3, above=5.5),
+        Step(work.machines, 0.7, above=5, when=(house_lacks("laundry_room"),)),
+        Step(corner("laundry basket", most=(0.6, 0.6, 0.8))),
+        Step(beside("bin", "basin", "toilet", most=(0.32, 0.32, 0.4)), 0.6),
+        Step(in_rooms_above(6, work.corner_plant), 0.4),
+        Step(corner("stool", most=(0.45, 0.45, 0.6)), 0.25),
+    ),
+    needs=(
+        Need(("toilet",), ("toilet",)),
+        Need(("basin",), ("washbasin", "wall washbasin", "basin", "bathroom vanity", "double vanity")),
+        Need(("bathtub", "corner bathtub", "shower"), ("bathtub", "corner bathtub", "shower")),
+    ),
+)
+TOILET = Programme(
+    (
+        Step(wet.toilet),
+        Step(basin("wall washbasin")),
+        Step(beside("bin", "toilet", "basin", most=(0.3, 0.3, 0.4)), 0.5),
+    ),
+    needs=(Need(("toilet",), ("toilet",)), Need(("basin",))),
+)
+LAUNDRY_ROOM = Programme(
+    (
+        Step(work.machines),
+        Step(piece("rough storage", clear=0.5)),
+        Step(basin("small basin"), above=4.5),
+        Step(either(0.5, piece("tall cabinet", clear=0.5), piece("cupboard", clear=0.5)), above=4.5),
+        Step(open_floor("clothes horse", clear=0.0), above=5),
+        Step(corner("laundry basket", most=(0.6, 0.6, 0.8))),
+        Step(open_floor("ironing board", clear=0.0), 0.7),
+        Step(corner("broom"), 0.7),
+        Step(corner("basin", most=(0.8, 0.7, 0.4)), 0.5),
+        Step(corner("step ladder", where=lambda a: a.size[2] < 1.2), 0.5),
+        Step(corner("dustpan"), 0.4),
+    ),
+    needs=(Need(("washing machine",)),),
+    fill=0.34,
+    fillers=(piece("rough storage", clear=0.4), corner("laundry basket"), corner("box"), piece("cupboard", clear=0.4)),
+)
+
+# Sleeping ----------------------------------------------------------------------------------------
+
+WIDE_BED = first_of(sleep.double_bed, sleep.single_bed)
+SOME_BED = first_of(sleep.single_bed, sleep.double_bed)
+GUEST_BED = either(0.35, first_of(narrow_bed("sofa to sleep on"), sleep.single_bed), SOME_BED)
+BED = Need(("bed",), BEDS)
 RESTING = (
     sleep.dresser,
     sleep.bedroom_chair,
@@ -493,122 +309,246 @@ RESTING = (
     living.reading_corner,
     sleep.wardrobe,
     work.desk,
-    _piece("bench", clear=0.3),
-    _corner("basket", most=(0.6, 0.6, 0.7)),
+    piece("bench", clear=0.3),
+    corner("basket", most=(0.6, 0.6, 0.7)),
 )
-ROUGH = (
-    _piece("rough storage", clear=0.5, avoid=()),
-    _corner("box", avoid=()),
-    _corner("box", avoid=()),
-    _piece("shelving unit", clear=0.5, avoid=()),
-    _corner("step ladder"),
-    _corner("trash can"),
+SLEEPING = (
+    Step(sleep.wardrobe, when=(tried_before(2),)),
+    Step(WIDE_BED, when=(room_is("main_bedroom"),)),
+    Step(either(0.6, WIDE_BED, SOME_BED), above=10.5, when=(room_is("bedroom"),)),
+    Step(SOME_BED, upto=10.5, when=(room_is("bedroom"),)),
+    Step(either(0.6, WIDE_BED, GUEST_BED), above=10.5, when=(room_is("guest_room"),)),
+    Step(GUEST_BED, upto=10.5, when=(room_is("guest_room"),)),
+    Step(narrow_bed("child bed"), when=(lacks("bed"),)),
+    Step(sleep.wardrobe_unless_closet, when=(lacks("wardrobe"),)),
+    Step(sleep.wardrobe, 0.5, above=17),
+    Step(work.desk, 0.75, above=9, when=(room_is("bedroom", "guest_room"),)),
+    Step(sleep.dresser),
+    Step(either(0.7, sleep.bedroom_chair, living.reading_corner), above=12),
+    Step(work.desk, 0.3, above=14),
+    Step(work.bookshelf, 0.35),
+    Step(living.conversation, 0.6, above=18),
+    Step(work.corner_plant, 0.75),
+    Step(beside("bin", "desk", most=(0.35, 0.35, 0.45)), when=(has("desk"),)),
+    Step(corner("laundry basket"), 0.3),
+    Step(beside("slippers", "bed"), 0.5),
+    Step(piece("folding screen", clear=0.0), 0.15, above=16),
+    Step(corner("suitcase"), 0.5, when=(room_is("guest_room"),)),
+    Step(corner("electric guitar"), 0.2, when=(room_is("bedroom"),)),
+    Step(piece("trunk", clear=0.4), 0.4, above=16),
 )
-FILLERS: dict[str, tuple[float, tuple[Callable[[Context], object], ...]]] = {
-    "living_room": (0.26, SITTING),
-    "family_room": (0.26, SITTING),
-    "library": (0.26, SITTING),
-    "sun_room": (0.24, SITTING),
-    "dining_room": (
-        0.26,
-        (
-            _piece("display storage"),
-            work.corner_plant,
-            living.reading_corner,
-            work.console,
-            work.corner_plant,
-            _piece("cupboard"),
-            work.bookshelf,
-        ),
+MAIN_BEDROOM = Programme(SLEEPING, needs=(BED, Need(("wardrobe",))), fill=0.34, fillers=RESTING)
+BEDROOM = Programme(SLEEPING, needs=(BED, Need(("wardrobe",))), fill=0.36, fillers=RESTING)
+GUEST_ROOM = Programme(SLEEPING, needs=(BED,), fill=0.34, fillers=RESTING)
+KIDS_ROOM = Programme(
+    (
+        Step(first_of(narrow_bed("kid bed"), sleep.single_bed)),
+        Step(each_of(sleep.cot, piece("changing table")), 0.25, above=12),
+        Step(either(0.7, work.desk, sleep.child_table)),
+        Step(either(0.7, sleep.wardrobe, sleep.dresser)),
+        Step(piece("shelving unit", where=lambda a: "child" in a.tags or a.size[2] < 1.9), 0.8),
+        Step(sleep.toys),
+        Step(sleep.child_table, above=11),
+        Step(corner("bean bag", most=(1.0, 1.0, 0.9)), 0.5),
+        Step(open_floor("big toy", clear=0.0, group="toy"), 0.6),
+        Step(corner("backpack"), 0.4),
+        Step(beside("bin", "desk", most=(0.35, 0.35, 0.45))),
+        Step(work.corner_plant, 0.35),
     ),
-    "kitchen": (
-        0.27,
-        (
-            _piece("cupboard", clear=0.5),
-            work.corner_plant,
-            _table_for_two,
-            _piece("shelving unit", clear=0.4),
-            _corner("basket", most=(0.5, 0.5, 0.6)),
-            _piece("display storage", clear=0.5),
-            work.corner_plant,
-        ),
+    needs=(BED,),
+    fill=0.34,
+    fillers=(
+        sleep.toys,
+        sleep.child_table,
+        work.bookshelf,
+        corner("big toy"),
+        piece("shelving unit", clear=0.4),
+        corner("bean bag"),
+        sleep.dresser,
     ),
-    "main_bedroom": (0.34, RESTING),
-    "bedroom": (0.36, RESTING),
-    "guest_room": (0.34, RESTING),
-    "kids_room": (
-        0.34,
-        (
-            sleep.toys,
-            sleep.child_table,
-            work.bookshelf,
-            _corner("big toy"),
-            _piece("shelving unit", clear=0.4),
-            _corner("bean bag"),
-            sleep.dresser,
-        ),
-    ),
-    "study": (0.3, (work.bookshelf, work.corner_plant, living.reading_corner, _piece("office storage"), work.console)),
-    "hall": (0.14, (work.console, work.corner_plant, work.hall_bench, _piece("cupboard"), living.reading_corner)),
-    "playroom": (
-        0.26,
-        (
-            sleep.toys,
-            _corner("bean bag"),
-            _piece("shelving unit", clear=0.4),
-            _corner("big toy"),
-            living.reading_corner,
-            sleep.child_table,
-        ),
-    ),
-    "gym": (
-        0.26,
-        (_piece("bench", clear=0.3), work.corner_plant, _piece("shelving unit", clear=0.4), _corner("basketball")),
-    ),
-    "garage": (0.24, ROUGH),
-    "workshop": (0.28, ROUGH),
-    "pantry": (
-        0.36,
-        (
-            _piece("shelving unit", clear=0.4, avoid=()),
-            _corner("box", avoid=()),
-            _piece("cupboard", clear=0.4),
-            _corner("basket", most=(0.6, 0.6, 0.7)),
-        ),
-    ),
-    "closet": (
-        0.36,
-        (sleep.clothes, sleep.clothes, _corner("shoes"), _corner("box", most=(0.6, 0.6, 0.5)), _corner("basket")),
-    ),
-    "laundry_room": (
-        0.34,
-        (_piece("rough storage", clear=0.4), _corner("laundry basket"), _corner("box"), _piece("cupboard", clear=0.4)),
-    ),
-}
-"""Room kind to the share of floor that should be stood on, and what fills it up."""
+)
 
-PROGRAMMES: dict[str, Callable[[Context], None]] = {
-    "living_room": living_room,
-    "family_room": living_room,
-    "dining_room": dining_room,
-    "kitchen": kitchen,
-    "main_bedroom": bedroom,
-    "bedroom": bedroom,
-    "guest_room": bedroom,
-    "kids_room": kids_room,
-    "bathroom": bathroom,
-    "toilet": toilet_room,
-    "hall": hall,
-    "corridor": corridor,
-    "study": study,
-    "laundry_room": laundry_room,
-    "pantry": pantry,
-    "closet": closet,
-    "library": library,
-    "playroom": playroom,
-    "gym": gym,
-    "garage": garage,
-    "workshop": workshop,
-    "sun_room": sun_room,
-    "stairwell": stairwell,
+# Ways through ------------------------------------------------------------------------------------
+
+HALL = Programme(
+    (
+        Step(work.doormat),
+        Step(work.console, 0.85),
+        Step(work.hall_bench, 0.8),
+        Step(
+            either(0.5, piece("wardrobe", most=(1.3, 0.65, 2.4)), piece("cupboard", most=(1.3, 0.65, 2.4))),
+            0.6,
+            above=7,
+        ),
+        Step(corner("umbrella stand"), 0.6),
+        Step(beside("shoes", "bench", "console", "doormat"), times=between(0, 2)),
+        Step(work.corner_plant, 0.6, above=5),
+        Step(work.middle_rug, above=9),
+        Step(living.conversation, 0.5, above=9),
+        Step(work.runner, 0.4, upto=9),
+        Step(either(0.5, corner("kick scooter"), corner("stroller")), 0.25, when=(house_has("kids_room"),)),
+    ),
+    fill=0.14,
+    fillers=(work.console, work.corner_plant, work.hall_bench, piece("cupboard"), living.reading_corner),
+)
+CORRIDOR = Programme(
+    (
+        Step(work.runner, 0.75),
+        Step(work.console, 0.8, when=(wider_than(1.25),)),
+        Step(corner("floor decoration", most=(0.5, 0.5, 1.3)), 0.5),
+    )
+)
+STAIRWELL = Programme((Step(work.corner_plant, 0.6), Step(work.console, 0.4)))
+
+# Storing, working, playing -----------------------------------------------------------------------
+
+ROUGH = (
+    piece("rough storage", clear=0.5, avoid=()),
+    corner("box", avoid=()),
+    corner("box", avoid=()),
+    piece("shelving unit", clear=0.5, avoid=()),
+    corner("step ladder"),
+    corner("trash can"),
+)
+GARAGE_THINGS = (
+    "step ladder",
+    "kitchen bin",
+    "wheelbarrow",
+    "chest freezer",
+    "kick scooter",
+    "tricycle",
+    "fire extinguisher",
+    "broom",
+    "shovel",
+    "traffic cone",
+    "furnace",
+)
+WORKSHOP_THINGS = ("step ladder", "stool", "fire extinguisher", "broom", "kitchen bin", "shovel", "barrel")
+PANTRY = Programme(
+    (
+        Step(piece("shelving unit", clear=0.45, avoid=()), times=2),
+        Step(piece("shelving unit", clear=0.45, avoid=()), above=2.5),
+        Step(piece("chest freezer", clear=0.5), 0.5),
+        Step(corner("box", most=(0.62, 0.62, 0.7)), times=between(1, 3)),
+        Step(corner("shopping trolley"), 0.5),
+        Step(corner("broom"), 0.5),
+    ),
+    fill=0.36,
+    fillers=(
+        piece("shelving unit", clear=0.4, avoid=()),
+        corner("box", avoid=()),
+        piece("cupboard", clear=0.4),
+        corner("basket", most=(0.6, 0.6, 0.7)),
+    ),
+)
+CLOSET = Programme(
+    (
+        Step(sleep.clothes, times=3),
+        Step(sleep.clothes, above=4),
+        Step(sleep.clothes, above=6),
+        Step(open_floor("bench", clear=0.3), 0.6, above=4),
+        Step(corner("shoes"), times=between(2, 4)),
+        Step(corner("suitcase"), 0.6),
+        Step(corner("laundry basket"), 0.4),
+        Step(work.middle_rug, 0.5),
+    ),
+    fill=0.36,
+    fillers=(sleep.clothes, sleep.clothes, corner("shoes"), corner("box", most=(0.6, 0.6, 0.5)), corner("basket")),
+)
+GARAGE = Programme(
+    (
+        Step(work.workbench),
+        Step(piece("rough storage", clear=0.5, avoid=()), times=2),
+        Step(piece("rough storage", clear=0.5, avoid=()), above=18),
+        Step(open_floor("bicycle", clear=0.2)),
+        Step(open_floor("bicycle", clear=0.2), above=16),
+        Step(open_floor("lawn mower", clear=0.0), 0.6),
+        *(Step(corner(role, most=(1.7, 1.2, 2.2)), 0.5) for role in GARAGE_THINGS),
+        Step(corner("box", avoid=()), times=between(2, 5)),
+        Step(corner("barrel"), 0.4),
+    ),
+    fill=0.24,
+    fillers=ROUGH,
+)
+WORKSHOP = Programme(
+    (
+        Step(work.workbench),
+        Step(work.workbench, 0.5, above=11),
+        Step(piece("rough storage", clear=0.5, avoid=()), times=2),
+        Step(piece("rough storage", clear=0.5, avoid=()), above=12),
+        Step(open_floor("drafting table"), 0.5),
+        Step(piece("folding table", clear=0.5)),
+        *(Step(corner(role, most=(1.0, 1.0, 2.2)), 0.6) for role in WORKSHOP_THINGS),
+        Step(corner("box", avoid=()), times=between(2, 4)),
+    ),
+    fill=0.28,
+    fillers=ROUGH,
+)
+PLAYROOM = Programme(
+    (
+        Step(either(0.7, open_floor("game table"), open_floor("foosball table")), above=15),
+        Step(open_floor("foosball table"), upto=15),
+        Step(sleep.toys),
+        Step(sleep.child_table),
+        Step(piece("shelving unit", clear=0.5, where=lambda a: a.size[2] < 1.95), times=2),
+        Step(open_floor("big toy", clear=0.0, group="toy")),
+        Step(open_floor("pinball machine"), 0.5),
+        Step(corner("bean bag"), times=2),
+        Step(sleep.toys, 0.5),
+        Step(piece("whiteboard", clear=0.4), 0.6),
+        Step(work.corner_plant),
+        Step(living.conversation, above=13),
+    ),
+    fill=0.26,
+    fillers=(
+        sleep.toys,
+        corner("bean bag"),
+        piece("shelving unit", clear=0.4),
+        corner("big toy"),
+        living.reading_corner,
+        sleep.child_table,
+    ),
+)
+GYM = Programme(
+    (
+        *(
+            Step(open_floor(role, clear=0.3))
+            for role in ("treadmill", "exercise bike", "abdominal bench", "punching bag")
+        ),
+        Step(open_floor("multi-gym", clear=0.5), above=16),
+        Step(piece("bench", clear=0.4, most=(1.5, 0.6, 0.6))),
+        Step(either(0.5, piece("locker", clear=0.4), piece("shelving unit", clear=0.4)), 0.6),
+        Step(piece("water cooler", clear=0.4), 0.6),
+        *(Step(corner(role), 0.6) for role in ("sneakers", "basketball", "laundry basket")),
+        Step(work.corner_plant),
+    ),
+    fill=0.26,
+    fillers=(piece("bench", clear=0.3), work.corner_plant, piece("shelving unit", clear=0.4), corner("basketball")),
+)
+
+PROGRAMMES: Mapping[str, Programme] = {
+    "living_room": LIVING_ROOM,
+    "family_room": FAMILY_ROOM,
+    "dining_room": DINING_ROOM,
+    "kitchen": KITCHEN,
+    "main_bedroom": MAIN_BEDROOM,
+    "bedroom": BEDROOM,
+    "guest_room": GUEST_ROOM,
+    "kids_room": KIDS_ROOM,
+    "bathroom": BATHROOM,
+    "toilet": TOILET,
+    "hall": HALL,
+    "corridor": CORRIDOR,
+    "study": STUDY,
+    "laundry_room": LAUNDRY_ROOM,
+    "pantry": PANTRY,
+    "closet": CLOSET,
+    "library": LIBRARY,
+    "playroom": PLAYROOM,
+    "gym": GYM,
+    "garage": GARAGE,
+    "workshop": WORKSHOP,
+    "sun_room": SUN_ROOM,
+    "stairwell": STAIRWELL,
 }
+"""Room kind (one of assets.records.ROOM_KINDS) to its furniture."""

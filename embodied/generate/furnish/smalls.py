@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import Counter
 from dataclasses import dataclass, field
@@ -13,10 +14,11 @@ from embodied.generate.furnish.arrange import Thing, same_box
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.looks import looks
 from embodied.generate.furnish.recipes import CLUTTER, MOST_ALIKE, RECIPES
-from embodied.generate.furnish.space import box, overlap
+from embodied.generate.furnish.space import Box, box, overlap
+from embodied.generate.furnish.stock import Size
 
-EDGE = 0.012
-"""Free strip at the edge of a surface, metres."""
+EDGE, APART = 0.012, 0.008
+"""Free strip at the edge of a surface, and between two things on it, metres."""
 SEATS = {
     "sofa": (0.16, 0.36),
     "corner sofa": (0.3, 0.3),
@@ -32,6 +34,70 @@ SEATS = {
 """Object class to the width of its arms in metres and the share of its depth that back or pillows take."""
 BOWLS = ("bathtub", "corner bathtub", "washbasin", "wall washbasin", "shower", "kitchen sink")
 """Object classes whose middle is hollow: only their rims carry things."""
+SHELVES = (
+    "bookcase",
+    "shelving unit",
+    "wall unit",
+    "storage shelf",
+    "open wall shelf",
+    "clothes rack",
+    "cupboard",
+    "media cabinet",
+    "workbench",
+)
+STORING = ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
+"""Room kinds whose shelves hold what is kept there instead of books."""
+CENTREPIECES = (
+    "fruit bowl",
+    "vase",
+    "bouquet",
+    "tulips",
+    "candlestick",
+    "bowl of apples",
+    "lilies",
+    "salad bowl",
+    "orchid",
+)
+"""Roles of what stands in the middle of dining tables."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """One surface of a thing that stands in the room, in the thing's own frame, metres."""
+
+    carrier: Thing
+    surface: SupportSurface
+
+    @property
+    def scale(self) -> Size:
+        """By how much the carrier is larger than its asset, along each axis."""
+        kx, ky, kz = (a / b for a, b in zip(self.carrier.size, self.carrier.asset.size))
+        return kx, ky, kz
+
+    @property
+    def area(self) -> tuple[float, float, float, float]:
+        """x0, x1, y0, y1 of what things may lie on: off the arms, backs and pillows of seats."""
+        s, (kx, ky, _), parent = self.surface, self.scale, self.carrier
+        x0, x1, y0, y1 = s.x0 * kx, s.x1 * kx, s.y0 * ky, s.y1 * ky
+        if parent.asset.object_class in SEATS:
+            arm, back = SEATS[parent.asset.object_class]
+            x0, x1 = max(x0, arm - parent.size[0] / 2), min(x1, parent.size[0] / 2 - arm)
+            y1 = min(y1, (0.5 - back) * parent.size[1])
+        return x0, x1, y0, y1
+
+    @property
+    def top(self) -> float:
+        """World z, metres."""
+        return self.carrier.z + self.surface.z * self.scale[2]
+
+    @property
+    def headroom(self) -> float:
+        """Metres."""
+        return self.surface.headroom * self.scale[2]
+
+    @property
+    def key(self) -> tuple[int, str]:
+        return id(self.carrier), self.surface.name
 
 
 @dataclass
@@ -40,17 +106,17 @@ class Tops:
 
     ctx: Context
     taken: dict[tuple[int, str], list[tuple[float, float, float, float]]] = field(default_factory=dict)
-    alike: Counter = field(default_factory=Counter)
+    """For each Board.key, x0, y0, x1, y1 of what lies there, in the carrier's frame."""
+    alike: Counter[str] = field(default_factory=Counter)
 
     def start(self) -> None:
         """Take note of what the groups have put on surfaces."""
         for thing in self.ctx.things:
             self.alike[thing.asset.object_class] += 1
             if thing.parent is not None:
-                self._occupy(thing)
+                self._occupy(thing, thing.parent)
 
-    def _occupy(self, thing: Thing) -> None:
-        parent = thing.parent
+    def _occupy(self, thing: Thing, parent: Thing) -> None:
         dx, dy = thing.x - parent.x, thing.y - parent.y
         c, s = math.cos(parent.yaw), math.sin(parent.yaw)
         u, v = c * dx + s * dy, -s * dx + c * dy
@@ -61,30 +127,24 @@ class Tops:
     def put(
         self,
         asset: Asset | None,
-        parent: Thing,
-        surface: SupportSurface,
+        board: Board,
         spot: str = "any",
         turn: float = 0.2,
-        size: tuple[float, float, float] | None = None,
+        size: Size | None = None,
         tries: int = 7,
     ) -> Thing | None:
-        """Rest `asset` on a surface of `parent`, near `spot`; None where there is no free place."""
+        """Rest `asset` on a board, near `spot`; None where there is no free place.
+
+        Args:
+          turn: how far it may be turned either way, radians; 3 or more for any way.
+        """
         if asset is None:
             return None
         ctx, rng = self.ctx, self.ctx.rng
-        kx, ky, kz = (a / b for a, b in zip(parent.size, parent.asset.size))
-        x0, x1, y0, y1 = surface.x0 * kx, surface.x1 * kx, surface.y0 * ky, surface.y1 * ky
-        if parent.asset.object_class in SEATS:  # keep off arms, back and pillows
-            arm, back = SEATS[parent.asset.object_class]
-            x0, x1 = max(x0, arm - parent.size[0] / 2), min(x1, parent.size[0] / 2 - arm)
-            y1 = min(y1, (0.5 - back) * parent.size[1])
         w, d, h = size or asset.size
-        if h > surface.headroom * kz - 0.01:
-            return None
-        key = (id(parent), surface.name)
-        taken = self.taken.setdefault(key, [])
-        z = parent.z + surface.z * kz
-        if z + h > ctx.space.bottom + ctx.space.height:
+        x0, x1, y0, y1 = board.area
+        z = board.top
+        if h > board.headroom - 0.01 or z + h > ctx.space.bottom + ctx.space.height:
             return None
         for _ in range(tries):
             yaw = float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi))
@@ -95,37 +155,68 @@ class Tops:
                 if 2 * a > x1 - x0 or 2 * b > y1 - y0:
                     return None
             u, v = _spot(spot, x0 + a + EDGE, x1 - a - EDGE, y0 + b + EDGE, y1 - b - EDGE, rng)
-            if any(
-                u - a < t[2] + 0.008 and u + a > t[0] - 0.008 and v - b < t[3] + 0.008 and v + b > t[1] - 0.008
-                for t in taken
-            ):
+            taken = (u - a, v - b, u + a, v + b)
+            if self._is_taken(board, taken, APART):
                 continue
-            x, y = parent.local(u, v)
-            own = box(x, y, w, d, parent.yaw + yaw, z, z + h)
-            support = parent.box
-            if not ctx.space.inside(own) or any(overlap(own, q) and not same_box(q, support) for q in ctx.space.solids):
+            x, y = board.carrier.local(u, v)
+            own = box(x, y, w, d, board.carrier.yaw + yaw, z, z + h)
+            if not ctx.space.inside(own) or self._meets_others(own, board.carrier):
                 continue
-            thing = Thing(
-                asset,
-                x,
-                y,
-                z,
-                parent.yaw + yaw,
-                (w, d, h),
-                looks(ctx, asset),
-                parent,
-                surface.name,
-                parent.group,
-                "small",
-                None,
-            )
-            taken.append((u - a, v - b, u + a, v + b))
             self.alike[asset.object_class] += 1
-            ctx.space.add([own])
-            ctx.things.append(thing)
             ctx.stock.note([asset])
-            return thing
+            return self._lay(asset, board, taken, yaw, own, (w, d, h))
         return None
+
+    def put_exactly(self, asset: Asset, board: Board, at: tuple[float, float], turn: float) -> None:
+        """Rest `asset` at a point of a board, moved inwards where it would stick out, if the place is free."""
+        x0, x1, y0, y1 = board.surface.x0, board.surface.x1, board.surface.y0, board.surface.y1
+        (u, v), (a, b) = at, _reach(asset.size, turn)
+        u0, v0 = min(max(u - a, x0), x1 - 2 * a), min(max(v - b, y0), y1 - 2 * b)
+        if u0 < x0 - 1e-6 or v0 < y0 - 1e-6:
+            return
+        u, v = u0 + a, v0 + b
+        taken = (u - a, v - b, u + a, v + b)
+        if self._is_taken(board, taken, 0.0):
+            return
+        (x, y), (w, d, h), z = board.carrier.local(u, v), asset.size, board.top
+        own = box(x, y, w, d, board.carrier.yaw + turn, z, z + h)
+        if self._meets_others(own, board.carrier):
+            return
+        self._lay(asset, board, taken, turn, own, asset.size)
+
+    def _is_taken(self, board: Board, place: tuple[float, float, float, float], apart: float) -> bool:
+        """Whether something lies closer than `apart` to a rectangle of a board."""
+        x0, y0, x1, y1 = place
+        return any(
+            x0 < t[2] + apart and x1 > t[0] - apart and y0 < t[3] + apart and y1 > t[1] - apart
+            for t in self.taken.setdefault(board.key, [])
+        )
+
+    def _meets_others(self, own: Box, carrier: Thing) -> bool:
+        support = carrier.box
+        return any(overlap(own, q) and not same_box(q, support) for q in self.ctx.space.solids)
+
+    def _lay(
+        self, asset: Asset, board: Board, taken: tuple[float, float, float, float], turn: float, own: Box, size: Size
+    ) -> Thing:
+        carrier = board.carrier
+        thing = Thing(
+            asset,
+            own.x,
+            own.y,
+            own.bottom,
+            carrier.yaw + turn,
+            size,
+            looks(self.ctx, asset),
+            parent=carrier,
+            surface=board.surface.name,
+            group=carrier.group,
+            role="small",
+        )
+        self.taken[board.key].append(taken)
+        self.ctx.space.add([own])
+        self.ctx.things.append(thing)
+        return thing
 
     def allows(self, asset: Asset, most: int = 2) -> bool:
         """Whether the room may hold one more of its class, of which `most` are few."""
@@ -174,7 +265,7 @@ def clutter(ctx: Context) -> None:
                 if asset is None or not tops.allows(asset):
                     continue
                 places = [group[k]] if repeats > 1 else [group[int(i)] for i in ctx.rng.permutation(len(group))[:3]]
-                any(tops.put(asset, thing, _main(thing), spot, turn) for thing in places)
+                any(tops.put(asset, _main(thing), spot, turn) for thing in places)
     for thing in carriers:
         _shelves(tops, thing, density)
     for thing in carriers:
@@ -189,30 +280,20 @@ def _hollow(asset: Asset) -> bool:
     )
 
 
-def _main(thing: Thing) -> SupportSurface:
+def _main(thing: Thing) -> Board:
     """The surface that one puts things on first: large and open to above."""
-    return max(thing.asset.surfaces, key=lambda s: (min(s.headroom, 0.6), (s.x1 - s.x0) * (s.y1 - s.y0)))
+    surfaces = thing.asset.surfaces
+    return Board(thing, max(surfaces, key=lambda s: (min(s.headroom, 0.6), (s.x1 - s.x0) * (s.y1 - s.y0))))
 
 
 def _set_table(tops: Tops, table: Thing) -> None:
     """Something in the middle, and now and then places laid before the chairs."""
     ctx = tops.ctx
     top = _main(table)
-    roles = (
-        "fruit bowl",
-        "vase",
-        "bouquet",
-        "tulips",
-        "candlestick",
-        "bowl of apples",
-        "lilies",
-        "salad bowl",
-        "orchid",
-    )
-    for role in ctx.rng.permutation(len(roles))[: 1 + int(ctx.chance(0.3))]:
-        asset = ctx.pick(roles[int(role)], most=(0.5, 0.5, 0.6))
+    for role in ctx.rng.permutation(len(CENTREPIECES))[: 1 + int(ctx.chance(0.3))]:
+        asset = ctx.pick(CENTREPIECES[int(role)], most=(0.5, 0.5, 0.6))
         if asset is not None and ctx.chance(0.85):
-            tops.put(asset, table, top, "centre", 3.2)
+            tops.put(asset, top, "centre", 3.2)
     laid = ctx.chance(0.3)
     cup = ctx.pick("mug") if ctx.chance(0.5) else ctx.pick("glass")
     plate = ctx.pick("place setting") if laid else None
@@ -228,141 +309,92 @@ def _set_table(tops: Tops, table: Thing) -> None:
             place, turn = (math.copysign(w / 2 - 0.24, u), v), -math.copysign(math.pi / 2, u)
         else:
             place, turn = (u, math.copysign(d / 2 - 0.24, v)), (0.0 if v < 0 else math.pi)
-        fixed = SupportSurface(
-            top.name, top.z, place[0] - 0.26, place[1] - 0.26, place[0] + 0.26, place[1] + 0.26, top.headroom
-        )
-        _put_exactly(tops, asset, table, top, fixed, turn)
-
-
-def _put_exactly(tops: Tops, asset: Asset, parent: Thing, top: SupportSurface, at: SupportSurface, turn: float) -> None:
-    """Like Tops.put, with the middle of `at` and the turn given."""
-    u, v = (at.x0 + at.x1) / 2, (at.y0 + at.y1) / 2
-    a, b = _reach(asset.size, turn)
-    x0, y0 = min(max(u - a, top.x0), top.x1 - 2 * a), min(max(v - b, top.y0), top.y1 - 2 * b)
-    if x0 < top.x0 - 1e-6 or y0 < top.y0 - 1e-6:
-        return
-    u, v = x0 + a, y0 + b
-    taken = tops.taken.setdefault((id(parent), top.name), [])
-    if any(u - a < t[2] and u + a > t[0] and v - b < t[3] and v + b > t[1] for t in taken):
-        return
-    x, y = parent.local(u, v)
-    z = parent.z + top.z * parent.size[2] / parent.asset.size[2]
-    thing = Thing(
-        asset,
-        x,
-        y,
-        z,
-        parent.yaw + turn,
-        asset.size,
-        looks(tops.ctx, asset),
-        parent,
-        top.name,
-        parent.group,
-        "small",
-        None,
-    )
-    if any(overlap(thing.box, q) and not same_box(q, parent.box) for q in tops.ctx.space.solids):
-        return
-    taken.append((u - a, v - b, u + a, v + b))
-    tops.ctx.space.add([thing.box])
-    tops.ctx.things.append(thing)
+        tops.put_exactly(asset, top, place, turn)
 
 
 def _shelves(tops: Tops, thing: Thing, density: float) -> None:
     """Fill the boards of a shelf: rows of books, or what one keeps in that room."""
     ctx = tops.ctx
-    boards = [s for s in thing.asset.surfaces if 0.1 < s.headroom < 1.2] or (
-        list(thing.asset.surfaces) if thing.asset.object_class in ("shelving unit",) else []
+    surfaces = [s for s in thing.asset.surfaces if 0.1 < s.headroom < 1.2] or (
+        list(thing.asset.surfaces) if thing.asset.object_class == "shelving unit" else []
     )
-    if not boards or thing.asset.object_class not in SHELVES:
+    if not surfaces or thing.asset.object_class not in SHELVES:
         return
     books = ctx.pick("row of books", avoid=())
-    bookish = ctx.kind not in ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
-    kx, ky, kz = (a / b for a, b in zip(thing.size, thing.asset.size))
-    for board in boards:
-        if books is not None and bookish and board.headroom < 0.45 and ctx.chance(0.8):
-            _book_row(tops, thing, board, ctx.pick("row of books", avoid=()), (kx, ky, kz))
+    bookish = ctx.kind not in STORING
+    for board in (Board(thing, s) for s in surfaces):
+        if books is not None and bookish and board.surface.headroom < 0.45 and ctx.chance(0.8):
+            _book_row(tops, board, ctx.pick("row of books", avoid=()) or books)
         if bookish:
             count, share = int(ctx.rng.integers(1, 4)), 0.75 * density
         else:  # storage is there to be filled
-            count, share = 3 + int(ctx.rng.integers(3) + 3 * (board.x1 - board.x0)), 0.95
+            count, share = 3 + int(ctx.rng.integers(3) + 3 * (board.surface.x1 - board.surface.x0)), 0.95
         for _ in range(count):
             if not ctx.chance(share):
                 continue
             asset, size = None, None
             if not bookish and ctx.chance(0.4):
-                asset, size = _box_for(ctx, board, (kx, ky, kz))
+                asset, size = _box_for(ctx, board)
             if asset is None:
-                asset = _resident(tops, thing, board, 2 if bookish else 5)
-            tops.put(asset, thing, board, "any", 0.2, size=size, tries=5)
+                asset = _resident(tops, board, 2 if bookish else 5)
+            tops.put(asset, board, "any", 0.2, size=size, tries=5)
 
 
-SHELVES = (
-    "bookcase",
-    "shelving unit",
-    "wall unit",
-    "storage shelf",
-    "open wall shelf",
-    "clothes rack",
-    "cupboard",
-    "media cabinet",
-    "workbench",
-)
-
-
-def _book_row(tops: Tops, thing: Thing, board: SupportSurface, books: Asset, scale) -> None:
+def _book_row(tops: Tops, board: Board, books: Asset) -> None:
     """A row of books on one board, from one end, rarely full."""
-    ctx = tops.ctx
-    width = (board.x1 - board.x0) * scale[0]
-    depth = (board.y1 - board.y0) * scale[1]
-    free = board.headroom * scale[2]
+    ctx, s, (kx, ky, kz) = tops.ctx, board.surface, board.scale
+    width, depth, free = (s.x1 - s.x0) * kx, (s.y1 - s.y0) * ky, s.headroom * kz
     h = min(0.3, free - 0.03) * float(ctx.rng.uniform(0.85, 1.0))
     w = width * float(ctx.rng.uniform(0.35, 0.95)) - 2 * EDGE
     d = min(0.22, depth - 0.03)
     if h < 0.14 or w < 0.12 or d < 0.1:
         return
     side = 1 if ctx.chance(0.5) else -1
-    middle = (board.x0 + board.x1) / 2 * scale[0] + side * (width / 2 - w / 2 - EDGE)
-    back = board.y1 * scale[1] - d - 0.02
-    at = SupportSurface(
-        board.name,
-        board.z,
-        (middle - w / 2) / scale[0] - 2 * EDGE,
-        back / scale[1] - 2 * EDGE,
-        (middle + w / 2) / scale[0] + 2 * EDGE,
-        (back + d) / scale[1] + 2 * EDGE,
-        board.headroom,
+    middle = (s.x0 + s.x1) / 2 * kx + side * (width / 2 - w / 2 - EDGE)
+    back = s.y1 * ky - d - 0.02
+    at = dataclasses.replace(
+        s,
+        x0=(middle - w / 2) / kx - 2 * EDGE,
+        y0=back / ky - 2 * EDGE,
+        x1=(middle + w / 2) / kx + 2 * EDGE,
+        y1=(back + d) / ky + 2 * EDGE,
     )
-    tops.put(books, thing, at, "centre", 0.0, size=(w, d, h), tries=2)
+    tops.put(books, Board(board.carrier, at), "centre", 0.0, size=(w, d, h), tries=2)
 
 
-def _box_for(ctx: Context, board: SupportSurface, scale) -> tuple[Asset | None, tuple[float, float, float] | None]:
+def _box_for(ctx: Context, board: Board) -> tuple[Asset | None, Size | None]:
     """A box or basket for a board of a storage shelf, somewhat smaller than its model where it must be."""
     asset = ctx.pick("storage box" if ctx.chance(0.5) else "box", avoid=())
     if asset is None:
         return None, None
-    room = ((board.x1 - board.x0) * scale[0], (board.y1 - board.y0) * scale[1], board.headroom * scale[2])
-    shrink = min(1.0, *(0.92 * r / s for r, s in zip(room, asset.size)))
-    return (asset, tuple(shrink * s for s in asset.size)) if shrink > 0.55 else (None, None)
+    s, (kx, ky, kz) = board.surface, board.scale
+    room = ((s.x1 - s.x0) * kx, (s.y1 - s.y0) * ky, s.headroom * kz)
+    shrink = min(1.0, *(0.92 * r / side for r, side in zip(room, asset.size)))
+    w, d, h = asset.size
+    return (asset, (shrink * w, shrink * d, shrink * h)) if shrink > 0.55 else (None, None)
 
 
-def _resident(tops: Tops, thing: Thing, board: SupportSurface, most_alike: int) -> Asset | None:
+def _resident(tops: Tops, board: Board, most_alike: int) -> Asset | None:
     """Something that is kept on such a board in such a room, of which there are fewer than `most_alike`."""
-    ctx = tops.ctx
-    most = ((board.x1 - board.x0) * 0.8, board.y1 - board.y0, board.headroom - 0.01)
+    ctx, s = tops.ctx, board.surface
+    most = ((s.x1 - s.x0) * 0.8, s.y1 - s.y0, s.headroom - 0.01)
     fitting = [
         (a, w)
-        for a, w in resting_on(ctx, thing.asset.object_class)
-        if a.object_class != "row of books" and all(s <= m for s, m in zip(a.size, most))
+        for a, w in resting_on(ctx, board.carrier.asset.object_class)
+        if a.object_class != "row of books" and all(side <= m for side, m in zip(a.size, most))
     ]
     if fitting and ctx.chance(0.45):
-        weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in fitting])
-        asset = fitting[int(ctx.rng.choice(len(fitting), p=weights / weights.sum()))][0]
-        return asset if tops.allows(asset, most_alike) else None
-    roles = CLUTTER.get(ctx.kind) or CLUTTER["any"]
-    role = roles[int(ctx.rng.integers(len(roles)))]
-    asset = ctx.pick(role, most=most)
+        asset: Asset | None = _weighted(ctx, fitting)
+    else:
+        roles = CLUTTER.get(ctx.kind) or CLUTTER["any"]
+        asset = ctx.pick(roles[int(ctx.rng.integers(len(roles)))], most=most)
     return asset if asset is not None and tops.allows(asset, most_alike) else None
+
+
+def _weighted(ctx: Context, options: list[tuple[Asset, float]]) -> Asset:
+    """One of the (asset, weight), what the house has already the less likely."""
+    weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in options])
+    return options[int(ctx.rng.choice(len(options), p=weights / weights.sum()))][0]
 
 
 def _more(tops: Tops, thing: Thing, density: float) -> None:
@@ -371,7 +403,7 @@ def _more(tops: Tops, thing: Thing, density: float) -> None:
     if thing.asset.object_class in SHELVES or thing.role in ("bed", "dining chair", "bedside table", "bench"):
         return
     top = _main(thing)
-    area = (top.x1 - top.x0) * (top.y1 - top.y0)
+    area = (top.surface.x1 - top.surface.x0) * (top.surface.y1 - top.surface.y0)
     count = int(ctx.rng.poisson(min(area * 1.6, 2.0) * density))
     if not count:
         return
@@ -380,9 +412,8 @@ def _more(tops: Tops, thing: Thing, density: float) -> None:
         options = [(a, w) for a, w in fitting if tops.allows(a)]
         if not options:
             return
-        weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in options])
-        asset = options[int(ctx.rng.choice(len(options), p=weights / weights.sum()))][0]
-        tops.put(asset, thing, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2, tries=5)
+        asset = _weighted(ctx, options)
+        tops.put(asset, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2, tries=5)
 
 
 def resting_on(ctx: Context, object_class: str) -> list[tuple[Asset, float]]:

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.house.house import DOORS, House, Opening, Room
+from embodied.house.house import DOORS, House, Opening, Room, Stair
 
 CELL = 0.05
 """Side of a cell of the walking plan, metres."""
@@ -366,7 +366,7 @@ def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
     return box(x + dx * width / 2, y + dy * width / 2, width, 0.05, math.atan2(dy, dx), 0.0, 2.0)
 
 
-def _stair_keepouts(stair, z: float, height: float) -> list[Box]:
+def _stair_keepouts(stair: Stair, z: float, height: float) -> list[Box]:
     boxes = []
     path = stair.path
     foot, head = path[0], path[-1]

@@ -5,29 +5,48 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypedDict, Unpack
 
 import numpy as np
 
+from assets.catalogue import Catalogue
 from assets.records import Asset
 from embodied.generate.furnish.roles import ROLES
 from embodied.generate.furnish.style import Style, liking
 
+SMALLEST, LARGEST = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
+"""Bounds where no others are asked for, metres."""
 CHILDREN = ("kids_room", "playroom", None)
 """Room kinds where anything made for children may stand."""
 CHILDISH = ("high chair", "stroller", "kick scooter", "tricycle", "bicycle")
 """Things for children that are kept elsewhere too."""
 
 
+Size = tuple[float, float, float]
+"""Width, depth and height, metres."""
+
+
+class Limits(TypedDict, total=False):
+    """What may be asked of an asset besides its role."""
+
+    most: Size
+    least: Size
+    where: Callable[[Asset], bool] | None
+    """A further condition."""
+    avoid: Sequence[str]
+    """Keys not to take unless nothing else is left."""
+
+
 @dataclass
 class Stock:
     """The catalogue through the eyes of one house: remembers what has been used how often."""
 
-    catalogue: object
+    catalogue: Catalogue
     style: Style
-    used: Counter = field(default_factory=Counter)
+    used: Counter[str] = field(default_factory=Counter)
     _by_role: dict[str, tuple[Asset, ...]] = field(default_factory=dict)
     _liking: dict[str, float] = field(default_factory=dict)
-    resting: dict = field(default_factory=dict)
+    resting: dict[tuple[str, str], list[tuple[Asset, float]]] = field(default_factory=dict)
     """(object class, room kind) to the small things that lie there, filled on first use."""
 
     def of_role(self, role: str) -> tuple[Asset, ...]:
@@ -40,24 +59,15 @@ class Stock:
         return self._by_role[role]
 
     def pick(
-        self,
-        role: str,
-        *,
-        rng: np.random.Generator,
-        kind: str | None = None,
-        most: tuple[float, float, float] = (99.0, 99.0, 99.0),
-        least: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        where: Callable[[Asset], bool] | None = None,
-        avoid: Sequence[str] = (),
+        self, role: str, *, rng: np.random.Generator, kind: str | None = None, **limits: Unpack[Limits]
     ) -> Asset | None:
         """An asset for `role` within the size limits, or None.
 
         Args:
           kind: room kind; assets that are rare there are rarely taken.
-          most, least: bounds on (width, depth, height), metres.
-          where: a further condition.
-          avoid: keys not to take unless nothing else is left.
         """
+        most, least = limits.get("most", LARGEST), limits.get("least", SMALLEST)
+        where, avoid = limits.get("where"), limits.get("avoid", ())
         fit = [
             a
             for a in self.of_role(role)

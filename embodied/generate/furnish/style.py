@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,14 +16,10 @@ class Style:
     name: str
     favours: tuple[str, ...]
     shuns: tuple[str, ...]
-    fabric: tuple[str, ...]
-    """Material keys' families for rugs, curtains and cushions: patterns of words."""
     tidiness: float = 0.6
     """0 is lived in, 1 is a show flat; scales how many small things lie about."""
     warmth: float = 0.5
     """Colour of its lamps: 0 neutral white, 1 warm white."""
-    seed: int = 0
-    """For the looks of built things that should agree through the house."""
 
 
 STYLES = (
@@ -31,31 +27,26 @@ STYLES = (
         "light",
         ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
         ("black", "dark", "antique", "red", "gothic", "ornate"),
-        ("beige", "grey", "white", "blue"),
     ),
     Style(
         "warm",
         ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
         ("black", "metal", "glass", "plastic", "purple"),
-        ("beige", "terracotta", "green", "brown"),
     ),
     Style(
         "dark",
         ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
         ("pine", "pink", "rustic", "beige"),
-        ("grey", "black", "blue", "white"),
     ),
     Style(
         "classic",
         ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
         ("plastic", "modern", "white", "glass", "metal"),
-        ("red", "brown", "green", "beige"),
     ),
     Style(
         "colourful",
         ("blue", "green", "red", "yellow", "orange", "white", "modern"),
         ("brown", "dark", "antique", "black"),
-        ("blue", "green", "yellow", "terracotta"),
     ),
 )
 
@@ -63,15 +54,7 @@ STYLES = (
 def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Style:
     """The taste called `name` (House.style), drawn up for one house of that disorder."""
     base = next((s for s in STYLES if s.name == name), STYLES[0])
-    return Style(
-        base.name,
-        base.favours,
-        base.shuns,
-        base.fabric,
-        1.0 - disorder,
-        float(rng.uniform(0.2, 1.0)),
-        int(rng.integers(1 << 30)),
-    )
+    return replace(base, tidiness=1.0 - disorder, warmth=float(rng.uniform(0.2, 1.0)))
 
 
 def liking(style: Style, asset: Asset) -> float:

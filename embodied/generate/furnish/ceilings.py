@@ -1,0 +1,112 @@
+"""What hangs from ceilings: lamps, smoke detectors, fans."""
+
+from __future__ import annotations
+
+import math
+
+from assets.records import Asset
+from embodied.generate.furnish.arrange import Thing
+from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.looks import looks
+from embodied.generate.furnish.space import box, overlap
+
+BRIGHT = ("garage", "workshop")
+"""Room kinds under fluorescent tubes."""
+TRACKS = ("living_room", "study", "kitchen", "gym")
+"""Room kinds that may have track lights."""
+LOW = ("bathroom", "toilet", "corridor", "pantry", "closet", "laundry_room", "gym", "stairwell")
+"""Room kinds whose lamps are flat, because people walk close beneath."""
+FANS = ("living_room", "sun_room", "main_bedroom", "family_room")
+DETECTORS = ("hall", "corridor", "main_bedroom", "kids_room")
+
+
+def ceiling_lamps(ctx: Context) -> None:
+    """A lamp over the table or the middle of the room, several in large rooms, rows in long ones."""
+    space = ctx.space
+    lamp = _ceiling_lamp(ctx)
+    if lamp is None:
+        return
+    tables = ctx.roles("dining table", "kitchen island")
+    x0, y0, x1, y1 = space.polygon.bounds
+    wx, wy = x1 - x0, y1 - y0
+    nx = max(1, round(wx / 3.6)) if wx > 4.6 else 1
+    ny = max(1, round(wy / 3.6)) if wy > 4.6 else 1
+    if ctx.kind in ("corridor", "hall"):
+        nx, ny = max(1, round(wx / 3.0)), max(1, round(wy / 3.0))
+    spots = []
+    for table in tables:
+        pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
+        if _ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
+            spots.append((table.x, table.y))
+    centre = (
+        space.polygon.representative_point()
+        if not space.polygon.contains(space.polygon.centroid)
+        else space.polygon.centroid
+    )
+    for i in range(nx):
+        for j in range(ny):
+            x, y = x0 + (i + 0.5) * wx / nx, y0 + (j + 0.5) * wy / ny
+            if nx * ny == 1:
+                x, y = centre.x, centre.y
+            if any(math.hypot(x - a, y - b) < 1.5 for a, b in spots):
+                continue
+            if _ceiling(ctx, lamp, x, y, None):
+                spots.append((x, y))
+    if not spots:
+        for lamp in sorted(ctx.stock.of_role("ceiling lamp"), key=lambda a: a.size[2]):
+            if _ceiling(ctx, lamp, centre.x, centre.y, None):
+                return
+
+
+def detectors(ctx: Context) -> None:
+    """A smoke detector on the ceiling of halls, corridors and bedrooms; now and then a fan between the lamps."""
+    if ctx.kind in FANS and ctx.chance(0.12):
+        fan = ctx.pick("ceiling fan")
+        if fan is not None:
+            _ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y, None)
+    if ctx.kind not in DETECTORS or not ctx.chance(0.6):
+        return
+    asset = ctx.pick("smoke detector")
+    c = ctx.space.polygon.representative_point()
+    if asset is not None:
+        for dx, dy in ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0)):
+            if _ceiling(ctx, asset, c.x + dx, c.y + dy, None):
+                return
+
+
+def _ceiling_lamp(ctx: Context) -> Asset | None:
+    """One model for the whole room; flat ones where people walk close beneath."""
+    height = ctx.space.height
+    if ctx.kind in BRIGHT:
+        found = ctx.pick("fluorescent lamp", avoid=())
+        if found is not None:
+            return found
+    if ctx.kind in TRACKS and ctx.chance(0.12):
+        found = ctx.pick("track light", most=(1.3, 1.3, 0.45), avoid=())
+        if found is not None:
+            return found
+    if ctx.kind in LOW or ctx.chance(0.45):
+        return ctx.pick("ceiling lamp", most=(0.9, 0.9, 0.35), avoid=())
+    return ctx.pick("ceiling light", most=(0.9, 0.9, height - 2.0), avoid=()) or ctx.pick("ceiling lamp", avoid=())
+
+
+def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | None) -> bool:
+    """Hang `lamp` from the ceiling over (x, y); `underside` is the z its lowest point should have."""
+    w, d, h = lamp.size
+    top = ctx.space.bottom + ctx.space.height
+    scale = 1.0
+    if underside is not None and lamp.object_class != "ceiling lamp":
+        scale = min(max((top - underside) / h, 0.6), 1.35)
+        if scale < 1 or lamp.object_class != "chandelier":
+            h = h * scale
+            if scale < 1:
+                w, d = w * scale, d * scale
+    b = box(x, y, w, d, 0.0, top - h, top)
+    low = underside is not None and any(overlap(b, k) for k in ctx.space.keepouts)  # before a window or in a doorway
+    if low or not ctx.space.fits(b, passage=True):
+        return False
+    ctx.space.add([b])
+    ctx.things.append(
+        Thing(lamp, x, y, top - h, 0.0, (w, d, h), looks(ctx, lamp), group="ceiling", role="ceiling lamp")
+    )
+    return True

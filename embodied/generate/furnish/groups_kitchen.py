@@ -1,0 +1,427 @@
+"""Kitchens: lines of units with sink, cooker and fridge, cabinets above them, islands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from assets.records import Asset
+from embodied.generate.furnish.arrange import Item, Pose, Thing, floor_poses
+from embodied.generate.furnish.context import Context, Liking
+from embodied.generate.furnish.space import RoomSpace, Wall, box
+
+UPPER = 1.45
+"""Height of the underside of wall cabinets, metres: 0.5 above the worktop."""
+
+
+@dataclass(frozen=True)
+class KitchenSet:
+    """Units that belong together; widths are multiples of `unit`, stretched a little to fill a wall."""
+
+    unit: float
+    base: tuple[Asset, ...]
+    sink: Asset
+    cooker: Asset
+    hob: Asset | None
+    """Lies on `cooker` where that is only a cabinet."""
+    upper: tuple[Asset, ...]
+    hood: Asset | None
+    depth: float
+
+    def units(self, asset: Asset) -> int:
+        return max(1, round(asset.size[0] / self.unit))
+
+
+def kitchen_sets(ctx: Context) -> list[KitchenSet]:
+    """The matching sets of kitchen units in the catalogue, in random order."""
+    tags = [t for a in ctx.stock.of_role("kitchen sink") for t in a.tags if t.startswith("line_")]
+    tags = list(dict.fromkeys(tags)) or [""]
+    sets = [_kitchen_set(ctx, tags[int(k)]) for k in ctx.rng.permutation(len(tags))]
+    return [s for s in sets if s is not None]
+
+
+def _kitchen_set(ctx: Context, tag: str) -> KitchenSet | None:
+    def of(*classes: str) -> tuple[Asset, ...]:
+        return tuple(a for c in classes for a in ctx.stock.of_role(c) if not tag or tag in a.tags)
+
+    base, sinks = of("base cabinet", "drawer cabinet"), of("kitchen sink")
+    upper = tuple(a for a in of("wall cabinet", "glass-door cabinet") if "over_hood" not in a.tags)
+    if not base or not sinks:
+        return None
+    cookers = list(of("cooker")) or [a for a in ctx.stock.of_role("cooker") if a.size[0] < 0.7]
+    cooker = cookers[int(ctx.rng.integers(len(cookers)))] if cookers else None
+    hob = None
+    unit = 0.6 if min(a.size[0] for a in base) > 0.5 else 0.488
+    if cooker is None:
+        hob = ctx.pick("cooktop", most=(0.6, 0.56, 0.1), avoid=())
+        cooker = next((a for a in base if a.object_class == "base cabinet" and a.size[0] > 0.55), base[0])
+    hood = ctx.pick("range hood", where=lambda a: tag in a.tags, avoid=()) or ctx.pick("range hood", avoid=())
+    return KitchenSet(unit, base, sinks[0], cooker, hob, upper, hood, max(a.size[1] for a in (*base, sinks[0])))
+
+
+def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list[tuple[float, float]]:
+    """Stretches of a wall along which a thing `depth` deep and `height` tall may stand, metres."""
+    step = 0.05
+    runs: list[tuple[float, float]] = []
+    start = None
+    count = int(wall.length / step)
+    for i in range(count + 1):
+        free = False
+        if i < count:
+            x, y = wall.point((i + 0.5) * step, depth / 2 + 0.005)
+            probe = box(x, y, step, depth, wall.yaw, space.bottom, space.bottom + height)
+            free = space.fits(probe)
+        if free and start is None:
+            start = i * step
+        if not free and start is not None:
+            runs.append((_edge(space, wall, start, -1, depth, height), _edge(space, wall, i * step, 1, depth, height)))
+            start = None
+    return runs
+
+
+def _edge(space: RoomSpace, wall: Wall, s: float, sign: int, depth: float, height: float) -> float:
+    """The end of a free run, moved outwards by centimetres as far as it stays free."""
+    for _ in range(5):
+        x, y = wall.point(s + sign * 0.005, depth / 2 + 0.005)
+        if not space.fits(box(x, y, 0.0098, depth, wall.yaw, space.bottom, space.bottom + height)):
+            break
+        s += sign * 0.01
+    return min(max(s, 0.0), wall.length)
+
+
+def kitchen_units(ctx: Context) -> None:
+    """The line of units and the fridge; in some later attempts the fridge chooses its place first."""
+    first = ctx.attempt in (1, 2, 4)
+    if first:
+        lone_fridge(ctx)
+    kitchen_line(ctx, fridge=not first)
+    if not ctx.roles("fridge"):
+        lone_fridge(ctx)
+
+
+def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
+    """One run of units with sink, cooker and fridge, wall cabinets above; a second run in large kitchens.
+
+    Args:
+      fridge: whether the kitchen still needs one.
+    """
+    kits = kitchen_sets(ctx)
+    for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
+        for with_fridge in (True, False) if fridge else (False,):
+            found = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
+            if found is None:
+                continue
+            kit, things = found
+            if fridge and not with_fridge:
+                lone_fridge(ctx)
+            _more_runs(ctx, kit, things)
+            return things
+    return None
+
+
+def _line_at_a_wall(
+    ctx: Context, kits: list[KitchenSet], with_fridge: bool, clear: float, spare: int, aside: float
+) -> tuple[KitchenSet, list[Thing]] | None:
+    """The first kit that finds a wall; `aside` metres of it stay free at one end or both, for a door beside it."""
+    ends = ((aside, 0.0), (0.0, aside), (aside, aside)) if aside else ((0.0, 0.0),)
+    for kit in kits:
+        for wall, a, b in _best_runs(ctx, kit):
+            for left, right in ends:
+                things = _run(ctx, kit, wall, a + left, b - right, with_fridge, clear, spare)
+                if things is not None:
+                    return kit, things
+    return None
+
+
+def _best_runs(ctx: Context, kit: KitchenSet) -> list[tuple[Wall, float, float]]:
+    runs = []
+    for wall in ctx.space.walls:
+        for a, b in free_runs(ctx.space, wall, kit.depth, 0.9):
+            if b - a > 1.15:
+                windows = sum(min(b, s1) - max(a, s0) > 0.5 for s0, s1, o in wall.openings if o.kind == "window")
+                runs.append((min(b - a, 4.4) + 0.7 * windows + 0.4 * ctx.rng.random(), a, b, wall))
+    return [(wall, a, b) for _, a, b, wall in sorted(runs, key=lambda r: -r[0])]
+
+
+def lone_fridge(ctx: Context) -> list[Thing] | None:
+    """A fridge that found no place in the line."""
+    for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.2)):
+        fridge = ctx.pick("fridge", most=(width, 1.0, 2.1), avoid=())
+        liking = Liking(corner=0.8, window=-3.0)
+        found = ctx.against_wall(fridge, "kitchen", liking=liking, clear=clear, role="fridge")
+        if found:
+            return found
+    return None
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One module of a run of units."""
+
+    kind: str
+    """'sink', 'cooker' or 'base'."""
+    units: int
+    s: float
+    """Of its middle along the wall, metres."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A run of units along a wall, before it is known what stands in it."""
+
+    kit: KitchenSet
+    wall: Wall
+    width: float
+    """Of one unit, metres."""
+    free: float
+    """Depth that stays free before the units, metres."""
+
+    @property
+    def windows(self) -> list[tuple[float, float]]:
+        """(from, to) along the wall, metres."""
+        return [(s0, s1) for s0, s1, o in self.wall.openings if o.kind == "window"]
+
+
+def _run(
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool, free: float, spare: int
+) -> list[Thing] | None:
+    """Sink, cooker and at least `spare` cabinets between `a` and `b` of a wall, the fridge at an end without window.
+
+    Args:
+      free: depth that stays free before the units, metres.
+    """
+    need = kit.units(kit.sink) + (1 if kit.hob else kit.units(kit.cooker)) + spare
+    small = 0.95 if b - a > 3.2 and ctx.space.area > 8 else 0.65
+    fridge = ctx.pick("fridge", most=(small, 1.0, 2.1), avoid=()) if with_fridge else None
+    room = b - a - (fridge.size[0] + 0.02 if fridge else 0.0)
+    count = min(int(room / kit.unit + 0.15), int(4.0 / kit.unit))
+    if count < need:
+        return None
+    line = Line(kit, wall, min(max(room / count, 0.88 * kit.unit), 1.12 * kit.unit), free)
+    for at_end in _fridge_ends(ctx, line.windows, a, b, fridge):
+        start = a if at_end or fridge is None else a + fridge.size[0] + 0.02
+        if at_end and fridge is not None:
+            start = b - fridge.size[0] - 0.02 - count * line.width
+        view = next(((s0 + s1) / 2 for s0, s1 in line.windows if a < (s0 + s1) / 2 < b), None)
+        items = _run_items(ctx, line, _slots(ctx, line, count, start, view))
+        if fridge is not None:
+            s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
+            items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, clear=free - 0.05, role="fridge")))
+        found = _put_line(ctx, wall, items)
+        if found:
+            return found
+    return None
+
+
+def _fridge_ends(
+    ctx: Context, windows: list[tuple[float, float]], a: float, b: float, fridge: Asset | None
+) -> list[bool]:
+    """Whether the fridge goes to the end `b` of a run, in the order to try: to no end where it hides a window."""
+    if fridge is None:
+        return [False, True]
+    span = fridge.size[0]
+    clear = [
+        all(s1 < a - 0.05 or s0 > a + span + 0.05 for s0, s1 in windows),
+        all(s1 < b - span - 0.05 or s0 > b + 0.05 for s0, s1 in windows),
+    ]
+    ends = [at_end for at_end in (False, True) if clear[int(at_end)]]
+    return ends[::-1] if ctx.chance(0.5) else ends
+
+
+def _put_line(ctx: Context, wall: Wall, items: list[tuple[float, Item]]) -> list[Thing] | None:
+    """Put (s, item) at their places along a wall."""
+    x, y = wall.point(0.0, 0.005)
+    return ctx.put([_moved(item, -s) for s, item in items], [Pose(0.0, x, y, wall.yaw, wall)], "kitchen")
+
+
+def _moved(item: Item, x: float) -> Item:
+    return item if item.on is not None else replace(item, x=item.x + x)
+
+
+def _slots(ctx: Context, line: Line, count: int, start: float, view: float | None) -> list[Slot]:
+    """The modules of a run of `count` units from `start`: the sink before a window, the cooker at an arm's length."""
+    kit, width = line.kit, line.width
+    sink, cook = kit.units(kit.sink), 1 if kit.hob else kit.units(kit.cooker)
+    best, i, j = -math.inf, 0, 0
+    for at_sink in range(count - sink + 1):
+        for at_cook in range(count - cook + 1):
+            if at_sink < at_cook + cook and at_cook < at_sink + sink:
+                continue
+            ends = at_sink + sink if at_sink < at_cook else at_cook + cook
+            gap = (max(at_sink, at_cook) - ends) * width
+            value = -abs(gap - 0.9) if gap > 0 else -2.5
+            if view is not None:
+                value -= 2.0 * abs(start + (at_sink + sink / 2) * width - view)
+            value -= 0.4 * (at_cook == 0 or at_cook + cook == count) + 0.2 * (at_sink == 0 or at_sink + sink == count)
+            value += 0.3 * ctx.rng.random()
+            if value > best:
+                best, i, j = value, at_sink, at_cook
+    slots = [("sink", i, sink), ("cooker", j, cook)]
+    k = 0
+    while k < count:
+        if k == i:
+            k += sink
+        elif k == j:
+            k += cook
+        else:
+            n = 1
+            while n < 2 and k + n < count and k + n not in (i, j):
+                n += 1
+            slots.append(("base", k, n))
+            k += n
+    return [Slot(kind, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]
+
+
+def _run_items(ctx: Context, line: Line, slots: list[Slot]) -> list[tuple[float, Item]]:
+    """(s, item) of all modules, the hob, the hood and the wall cabinets of a run."""
+    items: list[tuple[float, Item]] = []
+    for slot in slots:
+        items += _base_items(ctx, line, slot, len(items))
+    for slot in slots:
+        half = slot.units * line.width / 2
+        covered = any(s0 - 0.02 < slot.s + half and slot.s - half < s1 + 0.02 for s0, s1 in line.windows)
+        if not covered:
+            items += _hood(ctx, line, slot) if slot.kind == "cooker" else _upper_items(ctx, line, slot)
+    return items
+
+
+def _base_items(ctx: Context, line: Line, slot: Slot, first: int) -> list[tuple[float, Item]]:
+    """The floor units of one module; `first` is the index that the first item will have."""
+    kit = line.kit
+
+    def unit(asset: Asset, s: float, w: float, role: str) -> tuple[float, Item]:
+        size = (w, asset.size[1], asset.size[2])
+        cornered = role == "counter" and (s - w / 2 < 0.12 or s + w / 2 > line.wall.length - 0.12)
+        clear = 0.0 if cornered else line.free  # another run may meet it
+        return s, Item(asset, 0.0, -asset.size[1] / 2, size=size, clear=clear, role=role)
+
+    s, n = slot.s, slot.units
+    if slot.kind == "sink":
+        return [unit(kit.sink, s, n * line.width, "kitchen sink")]
+    if slot.kind == "cooker":
+        below = unit(kit.cooker, s, n * line.width, "base cabinet" if kit.hob else "cooker")
+        return [below] if kit.hob is None else [below, (s, Item(kit.hob, on=first, role="cooker"))]
+    wide = [a for a in kit.base if kit.units(a) == n]
+    if wide and n > 1 and ctx.chance(0.7):
+        return [unit(wide[0], s, n * line.width, "counter")]
+    single = [a for a in kit.base if kit.units(a) == 1] or list(kit.base)
+    return [
+        unit(single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * line.width, line.width, "counter")
+        for k in range(n)
+    ]
+
+
+def _hood(ctx: Context, line: Line, slot: Slot) -> list[tuple[float, Item]]:
+    """The hood over the cooker, if the kit has one."""
+    hood = line.kit.hood
+    if hood is None:
+        return []
+    top = max(a.size[2] for a in line.kit.base)
+    z = min(max(hood.elevation, top + 0.62), ctx.space.height - hood.size[2])
+    size = (min(hood.size[0], slot.units * line.width), hood.size[1], hood.size[2])
+    return [(slot.s, Item(hood, 0.0, -hood.size[1] / 2, z=z, size=size, optional=True, role="range hood"))]
+
+
+def _upper_items(ctx: Context, line: Line, slot: Slot) -> list[tuple[float, Item]]:
+    """The wall cabinets over one module: one of double width, or single ones."""
+    upper, s, n, width = line.kit.upper, slot.s, slot.units, line.width
+    if not upper:
+        return []
+    single = [a for a in upper if line.kit.units(a) == 1] or list(upper)
+    pair = [a for a in upper if line.kit.units(a) == 2]
+    if n == 2 and pair and ctx.chance(0.6):
+        blocks = [(pair[0], s, n * width)]
+    else:
+        blocks = [(single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * width, width) for k in range(n)]
+    found = []
+    for asset, at, w in blocks:
+        size = (w, asset.size[1], min(asset.size[2], ctx.space.height - UPPER - 0.02))
+        item = Item(asset, 0.0, -asset.size[1] / 2, z=UPPER, size=size, optional=True, role="wall cabinet")
+        found.append((at, item))
+    return found
+
+
+def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
+    """More cabinets, round the corner or opposite, until the kitchen has the worktop its size deserves."""
+    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - sum(
+        t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t)
+    )
+    for _ in range(3):
+        if want < 0.8 * kit.unit:
+            return
+        runs = []
+        for wall in ctx.space.walls:
+            for a, b in free_runs(ctx.space, wall, kit.depth, 0.9):
+                if b - a > 0.95 * kit.unit:
+                    near = min(_gap(wall.point(s), t) for t in done if _on_floor(ctx, t) for s in (a, b))
+                    runs.append((near > 0.35, -min(b - a, want), a, b, wall))
+        for far, _, a, b, wall in sorted(runs, key=lambda r: r[:2]):
+            length = _add_run(ctx, kit, wall, a, b, want, done, least=2 if far else 1)
+            if length:
+                want -= length
+                break
+        else:
+            return
+
+
+def _on_floor(ctx: Context, thing: Thing) -> bool:
+    return thing.z < ctx.space.bottom + 0.1
+
+
+def _gap(point: tuple[float, float], thing: Thing) -> float:
+    return math.hypot(thing.x - point[0], thing.y - point[1]) - thing.size[0] / 2
+
+
+def _add_run(
+    ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, want: float, done: list[Thing], least: int
+) -> float:
+    """Cabinets along part of a..b, from the end that is nearer to what stands already; returns their length."""
+    starts_at_a = min(_gap(wall.point(a), t) for t in done) <= min(_gap(wall.point(b), t) for t in done)
+    most = min(int((b - a) / kit.unit + 0.1), max(round(want / kit.unit), 1), 5)
+    for n in range(most, least - 1, -1):
+        width = min((b - a) / n, kit.unit) - 0.002
+        at = a + 0.004 if starts_at_a else b - 0.004 - n * width
+        slots = [Slot("base", 1, at + (k + 0.5) * width) for k in range(n)]
+        found = _put_line(ctx, wall, _run_items(ctx, Line(kit, wall, width, 0.55), slots))
+        if found:
+            done.extend(found)
+            return n * width
+    return 0.0
+
+
+def island(ctx: Context) -> list[Thing] | None:
+    """A kitchen island with stools, parallel to the line."""
+    line = ctx.roles("kitchen sink", "counter")
+    asset = ctx.pick("kitchen island")
+    if asset is None or not line:
+        return None
+    face = line[0].yaw
+    long_y = asset.size[1] > asset.size[0]
+    stool = ctx.pick("bar stool", most=(0.6, 0.6, 1.2))
+    w, d = (asset.size[1], asset.size[0]) if long_y else asset.size[:2]
+    items = [Item(asset, 0.0, 0.0, math.pi / 2 if long_y else 0.0, role="kitchen island")]
+    if stool is not None:
+        count = max(1, int(w / 0.55))
+        for k in range(count):
+            x = (k + 0.5) * w / count - w / 2
+            items.append(
+                Item(
+                    stool,
+                    x,
+                    -d / 2 - stool.size[1] / 2 + 0.05,
+                    math.pi + float(ctx.rng.normal(0, 0.15)),
+                    optional=True,
+                    under=(0,),
+                    role="bar stool",
+                )
+            )
+    cx = sum(t.x for t in line) / len(line)
+    cy = sum(t.y for t in line) / len(line)
+    fx, fy = line[0].front
+
+    def score(x: float, y: float, yaw: float) -> float:
+        ahead = (x - cx) * fx + (y - cy) * fy
+        aside = abs(-(x - cx) * fy + (y - cy) * fx)
+        return -abs(ahead - (0.31 + 1.05 + d / 2)) - 0.5 * aside
+
+    return ctx.put(items, floor_poses(ctx.space, score=score, yaws=(face,), step=0.2), "island", tries=20)
