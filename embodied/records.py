@@ -78,6 +78,18 @@ def read_json(path: Path) -> dict[str, typing.Any]:
     return value
 
 
+def load_json(path: Path, kind: type[T]) -> T:
+    """The record of a JSON file.
+
+    Raises:
+      RecordError: names the file.
+    """
+    try:
+        return from_plain(kind, parse(Path(path).read_bytes(), f"a {kind.__name__}"))
+    except RecordError as e:
+        raise RecordError(f"{path}: {e}") from e
+
+
 def parse_file(path: Path) -> object:
     """What a JSON file holds, whatever it is; raises RecordError with the file's name."""
     try:

@@ -7,6 +7,7 @@ on the number of workers. One house is one unit of work.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, show
@@ -98,9 +99,10 @@ def run(args: argparse.Namespace) -> int:
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
+    splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
     show(
         args,
-        {"folder": str(args.out), "digest": data.digest, "splits": data.index["splits"]},
+        {"folder": str(args.out), "digest": data.digest, "splits": splits},
         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
     )
     return 0

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import joblib
 
-from assets.cache import digest, write_bytes
+from assets.cache import digest, draft_prefix, write_bytes
 from assets.catalogue import load_catalogue
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
@@ -24,8 +24,9 @@ from embodied.generate.people import add_people, meet
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
+from embodied.locks import LOCK, locked
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
-from embodied.records import save_lines
+from embodied.records import load_json, read_json, save_lines
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
@@ -89,6 +90,21 @@ class Unit:
         return f"{self.group}_{self.index:04d}"
 
 
+@dataclass(frozen=True)
+class UnitFacts:
+    """unit.json: what is in a house's folder; its presence says that the folder is whole."""
+
+    version: int
+    config: DatasetConfig
+    group: str
+    index: int
+    house_digest: str
+    nodes: int
+    routes: int
+    tasks: Mapping[str, int]
+    """Split to number of tasks."""
+
+
 Watch = Callable[[Iterable[str], int], Iterable[str]]
 HouseMaker = Callable[[int, str, DatasetConfig, object], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
@@ -119,16 +135,23 @@ def build_dataset(
 
     Raises:
       ValueError: the folder holds another data set.
+      LockedError: another process builds it.
     """
     folder = Path(folder)
-    wanted = scale(config.scale, config.kind)
-    _claim(folder, config)
-    work = units(wanted)
+    work = units(scale(config.scale, config.kind))
     arguments = (config, folder, Path(cache), make_house or make_dataset_house, packs)
-    for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
-    for draft in sorted((folder / "houses").glob(".*")):  # of processes killed outright; every house is whole now
-        shutil.rmtree(draft)
-    return write_index(config, folder)
+    with locked(folder):
+        _claim(folder, config)
+        for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+        _sweep(folder, work)
+        return write_index(config, folder)
+
+
+def _sweep(folder: Path, work: tuple[Unit, ...]) -> None:
+    """Remove what processes that were killed outright left unfinished; all is whole now, and ours alone."""
+    for home in (folder / "houses", *(folder / "houses" / unit.name for unit in work)):
+        for draft in sorted(home.glob(".*")):
+            shutil.rmtree(draft) if draft.is_dir() else draft.unlink()
 
 
 def draw_panoramas(
@@ -146,7 +169,9 @@ def draw_panoramas(
     """Draw the panoramas of all houses into their folders, unless they are there."""
     arguments = (Path(folder), Path(cache), quality, size, packs)
     work = units(scale(config.scale, config.kind))
-    for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+    with locked(Path(folder)):
+        for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+        _sweep(Path(folder), work)
 
 
 def draw_unit(unit: Unit, folder: Path, cache: Path, quality: str, size: int, packs: tuple[Path, ...]) -> str:
@@ -193,7 +218,7 @@ def build_unit(
     if (home / "unit.json").exists():
         return unit.name
     home.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{unit.name}.", dir=home.parent))
+    draft = Path(tempfile.mkdtemp(prefix=draft_prefix(unit.name), dir=home.parent))
     try:
         _write_unit(unit, config, draft, cache, make_house, packs)
         os.chmod(draft, 0o755)
@@ -256,17 +281,11 @@ def _write_unit(
         s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
         for s, _ in shares(unit, config)
     }
-    facts = {
-        "version": VERSION,
-        "config": dataclasses.asdict(config),
-        "group": unit.group,
-        "index": unit.index,
-        "house_digest": house.digest,
-        "nodes": len(graph.ids),
-        "routes": len(routes),
-        "tasks": counts,
-    }
-    write_bytes(home / "unit.json", (json.dumps(facts, sort_keys=True, indent=1) + "\n").encode())
+    facts = UnitFacts(
+        VERSION, config, unit.group, unit.index, house.digest, nodes=len(graph.ids), routes=len(routes), tasks=counts
+    )
+    body = json.dumps(dataclasses.asdict(facts), sort_keys=True, indent=1)
+    write_bytes(home / "unit.json", (body + "\n").encode())
 
 
 def shares(unit: Unit, config: DatasetConfig) -> list[tuple[Split, int]]:
@@ -291,7 +310,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
     mine = {"version": VERSION, "config": json.loads(json.dumps(dataclasses.asdict(config)))}
     path = folder / "config.json"
     if path.exists():
-        theirs = json.loads(path.read_text())
+        theirs = read_json(path)
         begun_by = theirs.pop("program", None)
         if theirs != mine:
             raise ValueError(f"{folder} holds another data set ({theirs}); this one is {mine}; choose another folder")
@@ -301,7 +320,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
                 "would not match; finish it with that version, or build it anew in another folder"
             )
     else:
-        if folder.exists() and any(folder.iterdir()):
+        if any(f.name != LOCK for f in folder.iterdir()):
             raise ValueError(f"{folder} is not empty and holds no data set; choose an empty folder")
         write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
 
@@ -323,10 +342,10 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
     files: dict[str, str] = {}
     for unit in units(scale(config.scale, config.kind)):
         home = folder / "houses" / unit.name
-        facts = json.loads((home / "unit.json").read_text())
-        for name, n in facts["tasks"].items():
+        facts = load_json(home / "unit.json", UnitFacts)
+        for name, n in facts.tasks.items():
             row = table.setdefault(name, {"houses": 0, "tasks": 0, "routes": 0, "nodes": 0})
-            for key, value in (("houses", 1), ("tasks", n), ("routes", facts["routes"]), ("nodes", facts["nodes"])):
+            for key, value in (("houses", 1), ("tasks", n), ("routes", facts.routes), ("nodes", facts.nodes)):
                 row[key] += value
         for path in sorted(home.iterdir()):
             if path.suffix in (".json", ".jsonl"):

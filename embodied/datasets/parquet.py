@@ -255,7 +255,7 @@ def card(data: Dataset, files: Sequence[Path]) -> str:
         "FIELDS": fields,
         "AREA": "{:g} to {:g}".format(*data.config.area),
         "LANGUAGE": data.config.language,
-        "SIZE": size_category(sum(row["tasks"] for row in data.index["splits"].values())),
+        "SIZE": size_category(sum(row.tasks for row in data.index.splits.values())),
     }
     return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text)
 

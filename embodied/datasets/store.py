@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from embodied.assistants.descriptions import Describer, frequent_classes
-from embodied.datasets.build import VERSION, DatasetConfig, missing_units, units
+from embodied.datasets.build import missing_units, units
+from embodied.datasets.checks import (
+    DatasetError,
+    check_place,
+    check_routes,
+    check_tasks,
+    read_checked,
+    read_config,
+    read_index,
+)
 from embodied.datasets.scale import Scale, scale
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
-from embodied.records import load_lines
+from embodied.records import read_lines
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 
 if TYPE_CHECKING:
@@ -34,10 +42,6 @@ ANNA_SPLIT = {
     "test_unseen": "test",
 }
 """Whose wordings are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
-
-
-class DatasetError(ValueError):
-    """A folder that is not a whole data set of this version, or a split it does not have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class Dataset:
           DatasetError: no data set, half built, or of another version.
         """
         self.folder = Path(folder)
-        self.config = _config(self.folder)
+        self.config = read_config(self.folder)
         self.scale: Scale = scale(self.config.scale, self.config.kind)
         index = self.folder / "dataset.json"
         if not index.exists():
@@ -70,7 +74,7 @@ class Dataset:
                 f"{folder} is half built: {missing} of {len(units(self.scale))} houses are missing; "
                 "run the command that began it once more, it goes on from there"
             )
-        self.index = json.loads(index.read_text())
+        self.index = read_index(self.folder, self.config)
 
     @property
     def kind(self) -> str:
@@ -79,7 +83,7 @@ class Dataset:
     @property
     def digest(self) -> str:
         """Names the content: two data sets with one digest are the same."""
-        return self.index["digest"]
+        return self.index.digest
 
     @property
     def splits(self) -> tuple[str, ...]:
@@ -94,7 +98,11 @@ class Dataset:
     def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
         home = self.folder / "houses" / name
-        return StoredPlace(House.load(home / "house.json"), from_matterport(home / "connectivity.json"))
+        for file in ("house.json", "connectivity.json"):
+            self._content(name, file)
+        house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
+        check_place(home / "connectivity.json", house, graph, name)
+        return StoredPlace(house, graph)
 
     def places(self, split: str) -> dict[str, StoredPlace]:
         return {name: self.place(name) for name in self.names(split)}
@@ -108,25 +116,36 @@ class Dataset:
         return World(place.house, catalogue, place.graph, cache, file=file, **options)
 
     def routes(self, name: str) -> tuple[Route, ...]:
-        return tuple(self._lines(name, "routes.jsonl", Route))
+        """The routes that assistants know in a house.
+
+        Raises:
+          DatasetError: changed since they were written, or not on the house's graph.
+        """
+        routes = self._lines(name, "routes.jsonl", Route)
+        check_routes(self._path(name, "routes.jsonl"), routes, self.place(name).graph)
+        return tuple(routes)
+
+    def _path(self, name: str, file: str) -> Path:
+        return self.folder / "houses" / name / file
+
+    def _content(self, name: str, file: str) -> bytes:
+        return read_checked(self.folder, name, file, self.index.files)
 
     def _lines(self, name: str, file: str, kind: type[T]) -> list[T]:
-        home = self.folder / "houses" / name
-        try:
-            return list(load_lines(home / file, kind))
-        except FileNotFoundError:
-            raise DatasetError(
-                f"{home} has lost its {file}; delete {home} and run the command that built "
-                f"{self.folder} once more, it builds that house again"
-            ) from None
+        return list(read_lines(self._content(name, file), kind, self._path(name, file)))
 
     def tasks(self, split: str) -> tuple[Task, ...]:
         """All tasks of a split, house by house.
 
         Raises:
-          DatasetError: an unknown split.
+          DatasetError: an unknown split, files that were changed, or tasks that cannot be done in their house.
         """
-        tasks = [t for name in self.names(split) for t in self._lines(name, f"tasks_{split}.jsonl", Task)]
+        tasks: list[Task] = []
+        for name in self.names(split):
+            mine, file = self._lines(name, f"tasks_{split}.jsonl", Task), f"tasks_{split}.jsonl"
+            place = self.place(name)
+            check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
+            tasks += mine
         if self.kind == "vnla" and split != "train":
             limits = self._vnla_limits()
             tasks = [self._with_limit(t, limits) for t in tasks]
@@ -157,10 +176,9 @@ class Dataset:
     def table(self) -> str:
         """The table of the splits, as Markdown."""
         lines = ["| split | houses | tasks | routes | nodes per house |", "|---|---|---|---|---|"]
-        for name, row in self.index["splits"].items():
-            lines.append(
-                f"| {name} | {row['houses']} | {row['tasks']:,} | {row['routes']:,} | {row['nodes'] / row['houses']:.0f} |"
-            )
+        for name, row in self.index.splits.items():
+            nodes = row.nodes / row.houses
+            lines.append(f"| {name} | {row.houses} | {row.tasks:,} | {row.routes:,} | {nodes:.0f} |")
         return "\n".join(lines) + "\n"
 
     def _split(self, name: str):
@@ -180,16 +198,3 @@ class Dataset:
         key = limit_key(self.place(task.world), task.start.node, task.goal)
         horizon = max(task.horizon, limits.get(key, config.most_actions))
         return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
-
-
-def _config(folder: Path) -> DatasetConfig:
-    path = folder / "config.json"
-    if not path.exists():
-        raise DatasetError(f"{folder} holds no data set; build one with `embodied dataset hanna --out {folder}`")
-    body = json.loads(path.read_text())
-    if body.get("version") != VERSION:
-        raise DatasetError(
-            f"{folder} was built by version {body.get('version')!r} of the format, this is {VERSION}; build it again"
-        )
-    fields = body["config"]
-    return DatasetConfig(**{**fields, "area": tuple(fields["area"])})

@@ -395,21 +395,43 @@ def from_matterport(path: Path) -> NavGraph:
     """Read a connectivity file; viewpoints that are not included are left out, unknown rooms are ''.
 
     Raises:
-      HouseError: not such a file, an asymmetric matrix, or a graph in several pieces.
+      HouseError: not such a file, an asymmetric matrix, viewpoints of one name, or a graph in several pieces.
     """
     try:
-        items = json.loads(Path(path).read_text())
-        keep = [k for k, i in enumerate(items) if i["included"]]
-        positions = [[float(items[k]["pose"][at]) for at in (3, 7, 11)] for k in keep]
-        matrix = np.array([[bool(items[k]["unobstructed"][j]) for j in keep] for k in keep]).reshape(
-            len(keep), len(keep)
-        )
-        ids = tuple(str(items[k]["image_id"]) for k in keep)
-    except (ValueError, KeyError, IndexError, TypeError) as e:
+        items = json.loads(Path(path).read_bytes())
+        wrong = [k for k, i in enumerate(items) if not _is_viewpoint(i, len(items))]
+    except (ValueError, TypeError, RecursionError) as e:
         raise HouseError(f"{path} is not a Matterport connectivity file ({e!r}); write one with to_matterport") from e
-    if not keep or not np.isfinite(positions).all():
-        raise HouseError(f"{path} has no included viewpoints with finite positions")
+    if wrong:
+        raise HouseError(
+            f"{path} is not a Matterport connectivity file: viewpoint {wrong[0]} should have an image_id, a pose of 16 "
+            f"finite numbers, 'included', and {len(items)} booleans 'unobstructed'; write one with to_matterport"
+        )
+    keep = [k for k, i in enumerate(items) if i["included"]]
+    ids = tuple(items[k]["image_id"] for k in keep)
+    if not keep or len(set(ids)) < len(ids):
+        raise HouseError(f"{path} should include at least one viewpoint, each with an image_id of its own, got {ids}")
+    positions = np.array([[items[k]["pose"][at] for at in (3, 7, 11)] for k in keep], dtype=float)
+    matrix = np.array([[items[k]["unobstructed"][j] for j in keep] for k in keep], dtype=bool)
     if (matrix != matrix.T).any():
         raise HouseError(f"{path}: 'unobstructed' should be symmetric")
     edges = np.argwhere(np.triu(matrix, 1))
-    return graph_of(np.array(positions), edges, ids, tuple(str(items[k].get("room", "")) for k in keep))
+    return graph_of(positions, edges, ids, tuple(items[k].get("room", "") for k in keep))
+
+
+def _is_viewpoint(item: object, count: int) -> bool:
+    """Whether `item` is one of the `count` viewpoints of a connectivity file."""
+    if not isinstance(item, dict):
+        return False
+    pose, open_ = item.get("pose"), item.get("unobstructed")
+    return (
+        isinstance(item.get("image_id"), str)
+        and isinstance(item.get("included"), bool)
+        and isinstance(item.get("room", ""), str)
+        and isinstance(pose, list)
+        and len(pose) == 16
+        and all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= 1e6 for x in pose)
+        and isinstance(open_, list)
+        and len(open_) == count
+        and all(isinstance(x, bool) for x in open_)
+    )

@@ -1,0 +1,223 @@
+"""A data set that was changed, or that contradicts itself, is refused with the file and the remedy."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from test_datasets import build, content
+
+from assets.cache import digest
+from embodied.datasets.store import Dataset, DatasetError
+from embodied.house.house import HouseError
+from embodied.records import RecordError
+
+HOUSE = "test_0000"
+TASKS = "tasks_test_unseen.jsonl"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("checks")
+    return {kind: build(folder / kind, folder / "cache", kind).folder for kind in ("hanna", "vln")}
+
+
+@pytest.fixture
+def folder(built, tmp_path) -> Path:
+    return Path(shutil.copytree(built["hanna"], tmp_path / "data"))
+
+
+def use(folder: Path) -> None:
+    """Read what judging in one house would read."""
+    data = Dataset(folder)
+    assert data.table() and data.names("test_unseen") == (HOUSE,)
+    data.tasks("test_unseen")
+    data.routes(HOUSE)
+
+
+def rewrite(folder: Path, file: str, text: str, name: str = HOUSE) -> None:
+    """Change a file of a house and make dataset.json agree, as somebody who knows the format would."""
+    (folder / "houses" / name / file).write_text(text)
+    index = json.loads((folder / "dataset.json").read_text())
+    index["files"][f"{name}/{file}"] = digest(text.encode())[:16]
+    index["digest"] = digest(index["files"])
+    (folder / "dataset.json").write_text(json.dumps(index))
+
+
+def lines_of(folder: Path, file: str) -> list[dict]:
+    return [json.loads(line) for line in (folder / "houses" / HOUSE / file).read_text().splitlines()]
+
+
+def as_lines(items: list[dict]) -> str:
+    return "".join(json.dumps(i) + "\n" for i in items)
+
+
+@pytest.mark.parametrize("kind", ["hanna", "vln"])
+def test_what_was_built_is_read(built, kind):
+    use(built[kind])
+
+
+@pytest.mark.parametrize("file", ["routes.jsonl", TASKS, "house.json", "connectivity.json"])
+def test_a_file_that_was_changed_is_noticed(file, folder):
+    path = folder / "houses" / HOUSE / file
+    path.write_bytes(b"" if file == "routes.jsonl" else path.read_bytes().replace(b"1", b"2", 1))
+    with pytest.raises(DatasetError, match=rf"{file} was changed since it was written.*delete .*{HOUSE}"):
+        use(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t["start"].update(turn=99), r"turn should be 0 to 11"),
+        (lambda t: t["start"].update(node=-1), "nodes are counted from 0"),
+        (lambda t: t["start"].update(node=9999), "the viewpoints 0 to"),
+        (lambda t: t["start"].update(node=10**30), "at most 1e"),
+        (lambda t: t.update(kind="nope"), "expected a 'hanna'"),
+        (lambda t: t.update(world="elsewhere"), "in 'elsewhere'"),
+        (lambda t: t["goal"].update(object_class="zebra"), "no 'zebra' called"),
+        (lambda t: t["goal"].update(placements=[]), "names no placements"),
+        (lambda t: t["goal"].update(placements=["ghost_1"]), "called 'ghost_1'"),
+        (lambda t: t["goal"].update(placements=None), "should be a list"),
+        (lambda t: t["goal"].update(room_kind="garage"), "is not in a 'garage'"),
+        (lambda t: t["goal"].update({"is": "Nothing"}), "should be one of"),
+        (lambda t: t.update(goal_nodes=[]), "at least one node"),
+        (lambda t: t.update(goal_nodes=7), "should be a list"),
+        (lambda t: t.update(goal_nodes=[-3]), "nodes are counted from 0"),
+        (lambda t: t.update(radius=-1.0), "radius, horizon and budget"),
+        (lambda t: t.update(horizon=0), "radius, horizon and budget"),
+        (lambda t: t.update(surprise=1), "unknown fields"),
+        (lambda t: t.pop("request"), "missing fields"),
+    ],
+)
+def test_a_task_that_cannot_be_is_refused_with_its_line(change, message, folder):
+    tasks = lines_of(folder, TASKS)
+    change(tasks[1])
+    rewrite(folder, TASKS, as_lines(tasks))
+    with pytest.raises((DatasetError, RecordError), match=rf"{TASKS}:2: .*{message}"):
+        use(folder)
+
+
+def test_a_task_that_stands_twice_is_refused(folder):
+    tasks = lines_of(folder, TASKS)
+    rewrite(folder, TASKS, as_lines([*tasks, tasks[0]]))
+    with pytest.raises(DatasetError, match="stands in an earlier line"):
+        use(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda r: r.update(path=[0, 9999]), "the viewpoints 0 to"),
+        (lambda r: r.update(path=[0, 63]), "no neighbours"),
+        (lambda r: r.update(path=[]), "at least one node"),
+        (lambda r: r.update(path=None), "should be a list"),
+        (lambda r: r.update(tilt=2), "tilt -1 to 1"),
+    ],
+)
+def test_a_route_off_the_graph_is_refused(change, message, folder):
+    routes = lines_of(folder, "routes.jsonl")
+    change(routes[2])
+    rewrite(folder, "routes.jsonl", as_lines(routes))
+    with pytest.raises((DatasetError, RecordError), match=rf"routes.jsonl:3: .*{message}"):
+        use(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda v: v[0].update(pose=v[0]["pose"][:15]), "a pose of 16"),
+        (lambda v: v[0].update(pose=[*v[0]["pose"], 0.0]), "a pose of 16"),
+        (lambda v: v[0]["pose"].__setitem__(3, 1e300), "a pose of 16"),
+        (lambda v: v[0].update(unobstructed=["false"] * len(v)), "booleans 'unobstructed'"),
+        (lambda v: v[0].update(included=1), "'included'"),
+        (lambda v: v[0].update(image_id=v[1]["image_id"]), "an image_id of its own"),
+        (lambda v: v[0].update(image_id=7), "should have an image_id"),
+        (lambda v: v[0].update(room="attic_1"), "unknown room 'attic_1'"),
+        (lambda v: v[0]["pose"].__setitem__(3, 80.0), "not in its room"),
+    ],
+)
+def test_a_graph_that_cannot_be_is_refused(change, message, folder):
+    items = json.loads((folder / "houses" / HOUSE / "connectivity.json").read_text())
+    change(items)
+    rewrite(folder, "connectivity.json", json.dumps(items))
+    with pytest.raises((DatasetError, HouseError), match=rf"connectivity.json.*{message}"):
+        use(folder)
+
+
+def test_another_house_is_refused(folder):
+    rewrite(folder, "house.json", (folder / "houses" / "val_0000" / "house.json").read_text())
+    with pytest.raises(DatasetError, match="holds the house 'val_0000', expected 'test_0000'"):
+        use(folder)
+
+
+@pytest.mark.parametrize("file", ["config.json", "dataset.json"])
+@pytest.mark.parametrize(
+    "text", ["[]", "null", "{", '{"version":1}', '{"version":1,"version":1}', "[" * 99_999, "\xff"]
+)
+def test_a_damaged_index_is_named(file, text, folder):
+    (folder / file).write_text(text, encoding="latin-1")
+    with pytest.raises(DatasetError, match=file):
+        use(folder)
+
+
+@pytest.mark.parametrize(
+    ("file", "change"),
+    [
+        ("config.json", lambda b: b["config"].update(kind="nope")),
+        ("config.json", lambda b: b["config"].update(scale=None)),
+        ("config.json", lambda b: b["config"].update(area=[1])),
+        ("config.json", lambda b: b["config"].update(surprise=1)),
+        ("config.json", lambda b: b["config"].update(seed=5)),
+        ("dataset.json", lambda b: b.update(digest="0" * 64)),
+        ("dataset.json", lambda b: b["files"].pop(f"{HOUSE}/{TASKS}")),
+        ("dataset.json", lambda b: b.update(splits=None)),
+        ("dataset.json", lambda b: b["splits"]["train"].update(houses="two")),
+    ],
+)
+def test_an_index_that_was_changed_is_refused(file, change, folder):
+    body = json.loads((folder / file).read_text())
+    change(body)
+    (folder / file).write_text(json.dumps(body))
+    with pytest.raises(DatasetError, match=r"\.json"):
+        use(folder)
+
+
+BUILD = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[3])
+import test_datasets
+slow = lambda *args: (print("building", flush=True), time.sleep(float(sys.argv[4])), test_datasets.hand_house(*args))[2]
+from embodied.datasets.build import DatasetConfig, build_dataset
+config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
+build_dataset(config, Path(sys.argv[1]), Path(sys.argv[2]), make_house=slow)
+"""
+
+
+def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(built, tmp_path):
+    arguments = [str(tmp_path / "data"), str(tmp_path / "cache"), os.path.dirname(__file__)]
+    first = subprocess.Popen([sys.executable, "-c", BUILD, *arguments, "0.5"], stdout=subprocess.PIPE, text=True)
+    try:
+        assert first.stdout.readline() == "building\n"
+        second = subprocess.run(
+            [sys.executable, "-c", BUILD, *arguments, "0"], check=False, capture_output=True, text=True, timeout=60
+        )
+        assert second.returncode and f"being written by process {first.pid}" in second.stderr, second.stderr
+        assert first.wait(timeout=120) == 0
+    finally:
+        first.kill()
+    assert content(tmp_path / "data") == content(built["hanna"])
+
+
+def test_what_killed_builds_left_in_houses_is_swept(folder):
+    debris = [folder / "houses" / ".train_0000.old", folder / "houses" / HOUSE / ".panoramas.pano.x.pano"]
+    before = content(folder)
+    for path in debris:
+        path.write_text("half")
+    build(folder, folder.parent / "cache")
+    assert content(folder) == before
