@@ -11,7 +11,7 @@ from hand_worlds import grid_world, thing
 
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
-from embodied.datasets.scale import PAPER, quota, scale
+from embodied.datasets.scale import PAPER, own_size, quota, scale
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -189,3 +189,15 @@ def test_a_house_that_cannot_be_made_is_an_error_after_a_bounded_number_of_seeds
     monkeypatch.setattr(module, "generate_house", never)
     with pytest.raises(HouseError, match="after 12 seeds"):
         module.make_dataset_house(0, "train_0000", DatasetConfig("hanna"), None)
+
+
+def test_a_size_of_ones_own_is_a_scale():
+    assert own_size(40, 4000) == "40x4000"
+    wanted = scale("40x4000", "hanna")
+    assert dict(wanted.houses) == {"train": 40, "val": 4, "test": 8}
+    assert {s.name: s.tasks for s in wanted.splits}["test_unseen"] == 800
+    assert dict(scale("1x5", "hari").houses) == {"train": 1, "extra": 1, "val": 1, "test": 1}
+    with pytest.raises(ValueError, match="at least one house"):
+        own_size(0, 10)
+    with pytest.raises(ValueError, match="40x4000"):
+        scale("0x5", "hanna")

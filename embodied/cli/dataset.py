@@ -11,13 +11,26 @@ import dataclasses
 from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, show
-from embodied.datasets.scale import KINDS, SCALES
+from embodied.datasets.scale import KINDS, SCALES, described, own_size
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=KINDS, help="what is to be done in the houses")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the data set")
-    parser.add_argument("--scale", choices=SCALES, default="mini", help="how much of it (default: %(default)s)")
+    sizes = "; ".join(f"{name}: {described(name)}" for name in SCALES)
+    parser.add_argument(
+        "--scale",
+        choices=SCALES,
+        help=f"how much of it, as houses to learn from + validate in + test in and training tasks: {sizes} "
+        "(HANNA's; default: mini)",
+    )
+    parser.add_argument(
+        "--houses",
+        type=int,
+        metavar="N",
+        help="instead of --scale: houses to learn from; a tenth to validate, a fifth to test in",
+    )
+    parser.add_argument("--tasks", type=int, metavar="N", help="with --houses: training tasks (default: 100 per house)")
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
     parser.add_argument(
         "--area",
@@ -73,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if args.export and not programs:
         raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
     config = DatasetConfig(
-        args.kind, args.scale, args.seed, tuple(args.area), args.routes, not args.no_people, args.language
+        args.kind, chosen_scale(args), args.seed, tuple(args.area), args.routes, not args.no_people, args.language
     )
 
     def watch(jobs, total):
@@ -106,3 +119,18 @@ def run(args: argparse.Namespace) -> int:
         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
     )
     return 0
+
+
+def chosen_scale(args: argparse.Namespace) -> str:
+    """The scale that --scale, or --houses and --tasks, name.
+
+    Raises:
+      ValueError: both of them, or --tasks alone.
+    """
+    if args.houses is None:
+        if args.tasks is not None:
+            raise ValueError("--tasks wants --houses beside it; or choose a --scale")
+        return args.scale or "mini"
+    if args.scale:
+        raise ValueError("--scale and --houses say the same thing twice; leave one out")
+    return own_size(args.houses, 100 * args.houses if args.tasks is None else args.tasks)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -97,7 +98,26 @@ def _small(
     return {"train": train, "val": val, "test": test}, _seen_and_unseen(tasks, held, held, held, judged)
 
 
-SCALES = ("paper", "maxi", "midi", "mini", "tiny")
+SMALL: Mapping[str, tuple[tuple[int, int, int, int], int, int]] = {
+    "maxi": ((256, 16, 4, 20), 25_600, 500),
+    "midi": ((128, 8, 4, 20), 12_800, 500),
+    "mini": ((24, 8, 4, 20), 2_400, 500),
+    "tiny": ((2, 1, 1, 1), 20, 8),
+}
+"""Houses to learn from, extra ones (HARI), to validate and to test in; training tasks; tasks in unseen houses."""
+SCALES = ("paper", *SMALL)
+OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)")
+
+
+def own_size(houses: int, tasks: int) -> str:
+    """The name of a scale with so many training houses and tasks: '40x4000'.
+
+    Raises:
+      ValueError: less than one of either.
+    """
+    if houses < 1 or tasks < 1:
+        raise ValueError(f"a data set needs at least one house and one task, got {houses} and {tasks}")
+    return f"{houses}x{tasks}"
 
 
 def scale(name: str, kind: str) -> Scale:
@@ -106,26 +126,32 @@ def scale(name: str, kind: str) -> Scale:
     'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
     20 unseen houses to judge by; 'midi' has the same unseen houses and five times the houses to
     learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
-    are those of the smaller; 'tiny' is for tests.
+    are those of the smaller; 'tiny' is for tests. '40x4000' has 40 houses and 4,000 tasks to learn
+    from, a tenth as many houses to validate in, a fifth as many to test in and a fifth as many
+    tasks there.
 
     Raises:
       ValueError: an unknown scale or kind.
     """
     if kind not in KINDS:
         raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
-    if name == "paper":
+    if own := OWN_SIZE.fullmatch(name):
+        n, tasks = int(own[1]), int(own[2])
+        houses, splits = _small(kind, (n, max(1, n // 3), max(1, n // 10), max(1, n // 5)), tasks, max(2, tasks // 5))
+    elif name == "paper":
         houses, splits = PAPER[kind]
-    elif name == "maxi":
-        houses, splits = _small(kind, (256, 16, 4, 20), 25_600, 500)
-    elif name == "midi":
-        houses, splits = _small(kind, (128, 8, 4, 20), 12_800, 500)
-    elif name == "mini":
-        houses, splits = _small(kind, (24, 8, 4, 20), 2_400, 500)
-    elif name == "tiny":
-        houses, splits = _small(kind, (2, 1, 1, 1), 20, 8)
+    elif name in SMALL:
+        houses, splits = _small(kind, *SMALL[name])
     else:
-        raise ValueError(f"unknown scale {name!r}; use one of {SCALES}")
+        raise ValueError(f"unknown scale {name!r}; use one of {SCALES}, or a size such as '40x4000' (houses x tasks)")
     return Scale(name, dict(houses), splits)
+
+
+def described(name: str, kind: str = "hanna") -> str:
+    """A scale in words: '24 + 4 + 20 houses, 2,400 tasks'."""
+    about = scale(name, kind)
+    houses = " + ".join(str(about.houses[g]) for g in ("train", "val", "test"))
+    return f"{houses} houses, {about.splits[0].tasks:,} tasks"
 
 
 def quota(total: int, houses: int, index: int) -> int:
