@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib.metadata
 import logging
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from tqdm import tqdm
 
@@ -15,27 +16,25 @@ from assets.cache import digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
+from embodied.interface import Sight, Sighting
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.render.classic import Renderer
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.render.sightings import FACE, Sighting, SightingTable, load_table, save_table, sightings_table
+from embodied.render.pictures import TRACED, PictureSettings
+from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
-    from embodied.interface import Sight
     from embodied.light import Bake
     from embodied.light.reference import Tracer
 
-QUALITIES = ("unlit", "baked", "glossy", "reference")
-TRACED = ("glossy", "reference")
-"""Qualities whose panoramas are ray-traced; everything else, free cameras too, is drawn by a Renderer."""
-SIZES = (8, 4096)
-"""Sides of a cube face that can be drawn, pixels."""
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
+LIGHTS = {"fast": "draft"}
+"""Light settings by the name of a picture's light, where embodied.light calls them otherwise."""
 log = logging.getLogger(__name__)
 ROOT = Path(__file__).resolve().parent.parent
 PICTURE_SOURCES = (
@@ -58,25 +57,19 @@ class World:
         catalogue: Catalogue,
         graph: NavGraph,
         cache: Path,
+        pictures: PictureSettings = PictureSettings(),
         *,
-        size: int = 256,
-        quality: str = "unlit",
-        backend: str = "classic",
-        light: str = "normal",
         file: Path | None = None,
     ) -> None:
-        """See `open_world`."""
-        if quality not in QUALITIES:
-            raise ValueError(f"quality {quality!r} is unknown; use one of {QUALITIES}")
-        if not SIZES[0] <= size <= SIZES[1]:  # said now, not after the house was lit
-            raise ValueError(f"size is {size} pixels; a cube face needs {SIZES[0]} to {SIZES[1]}")
+        """See `open_world`; `file` is where the panoramas go, or lie, instead of the cache."""
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
-        self.size, self.quality, self.backend, self.light = size, quality, backend, light
+        self.pictures = pictures
         self._path = file
         self._renderer: Renderer | None = None
         self._tracer: Tracer | None = None
         self._file: PanoramaFile | None = None
-        self._refused = self._progress = False
+        self._bake: Bake | None = None
+        self._refused = False
         self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
 
     @property
@@ -106,14 +99,11 @@ class World:
     @functools.cached_property
     def fingerprint(self) -> dict[str, object]:
         """All that the panoramas depend on, and what draws them."""
-        light = None if self.quality == "unlit" else self.light
-        return self._origin | {
-            "size": self.size,
-            "quality": self.quality,
-            "backend": self.backend,
-            "light": light,
-            "renderer": str(gl.info()),
-        }
+        return (
+            self._origin
+            | dataclasses.asdict(self.pictures)
+            | {"light": self.pictures.lit_by, "renderer": str(gl.info())}
+        )
 
     @functools.cached_property
     def path(self) -> Path:
@@ -122,42 +112,53 @@ class World:
 
     @property
     def lit(self) -> LitPages | None:
-        """The house with its baked light painted on; None for unlit worlds. Bakes on first use."""
-        return None if self.quality == "unlit" else self._bake.lit
+        """The house with its baked light painted on; None where it is not lit. Bakes on first use."""
+        return self._baked().lit if self.pictures.lit else None
 
     @property
     def renderer(self) -> Renderer:
-        """The renderer of this world, for pictures from anywhere; opened on first use."""
+        """The renderer of this world, for pictures from anywhere; opened on first use.
+
+        Raises:
+          ValueError: the world was opened without pictures.
+        """
         if self._renderer is None:
-            baked = self.quality != "unlit"
+            if self.pictures.quality == "none":
+                raise ValueError(f"world {self.name!r} was opened without pictures; open it with another quality")
+            painter = None
+            if self.lit is not None and self.pictures.backend == "filament":
+                from embodied.render.filament import Painter  # late: loads Vulkan
+
+                painter = Painter(self.house, self.catalogue, self.lit)
             self._renderer = Renderer(
-                self.house,
-                self.catalogue,
-                quality="baked" if baked else "unlit",
-                backend=self.backend,
-                size=self.size,
-                lit=self._bake.lit if baked else None,
+                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, painter=painter
             )
         return self._renderer
 
-    @functools.cached_property
-    def _bake(self) -> Bake:
-        from embodied import light  # late: loads the path tracer
+    def _baked(self, progress: bool = False) -> Bake:
+        """The light of this world, baked on first use."""
+        if self._bake is None:
+            from embodied import light  # late: loads the path tracer
 
-        if not self._progress:
-            return light.bake(self.house, self.catalogue, self.cache, self.light)
-        with light.progress_bar() as tell:
-            return light.bake(self.house, self.catalogue, self.cache, self.light, progress=tell)
+            name = self.pictures.lit_by or "normal"
+            work = functools.partial(light.bake, self.house, self.catalogue, self.cache, LIGHTS.get(name, name))
+            if progress:
+                with light.progress_bar() as tell:
+                    self._bake = work(progress=tell)
+            else:
+                self._bake = work()
+        return self._bake
 
-    @property
-    def _source(self) -> Renderer | Tracer:
-        """What draws the panoramas."""
-        if self.quality not in TRACED:
+    def _source(self, progress: bool = False) -> Renderer | Tracer:
+        """What draws the panoramas; what it needs is made first, with progress bars if wanted."""
+        if self.pictures.lit:
+            self._baked(progress)
+        if self.pictures.quality not in TRACED:
             return self.renderer
         if self._tracer is None:
             from embodied.light.reference import Tracer  # late: loads the path tracer
 
-            self._tracer = Tracer(self._bake, self.house, quality=self.quality, size=self.size)
+            self._tracer = Tracer(self._baked(), self.house, quality=self.pictures.quality, size=self.pictures.size)
         return self._tracer
 
     def panorama(self, node: int) -> Panorama:
@@ -182,7 +183,6 @@ class World:
 
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
-        self._progress = progress
         file = self._open_file()
         if file is not None and (damaged := file.damaged()):
             log.warning("%s: %s of its pictures are damaged; drawing again", self.path, len(damaged))
@@ -212,10 +212,10 @@ class World:
 
     def _load(self, node: int) -> Panorama:
         file = self._open_file()
-        return self._source.panorama(self.graph.positions[node]) if file is None else file.read(node)
+        return self._source().panorama(self.graph.positions[node]) if file is None else file.read(node)
 
     def _draw_all(self, progress: bool) -> Iterator[Panorama]:
-        source = self._source
+        source = self._source(progress)
         for position in tqdm(self.graph.positions, "panoramas", disable=not progress, unit="node"):
             yield source.panorama(position)
 
@@ -252,55 +252,38 @@ def open_world(
     house: House,
     catalogue: Catalogue,
     cache: Path,
+    pictures: PictureSettings = PictureSettings(),
     *,
     graph: NavGraph | None = None,
-    size: int = 256,
-    quality: str = "unlit",
-    backend: str = "classic",
-    light: str = "normal",
+    **changes: Any,
 ) -> World:
     """A world over `house`; nothing is drawn until asked for.
 
     Args:
       catalogue: where meshes and materials come from.
       cache: folder for what is expensive; may be deleted at any time.
+      pictures: how the house is drawn.
       graph: the navigation graph; built when not given.
-      size: side of a cube face, pixels.
-      quality: 'unlit', 'baked', 'glossy' or 'reference'.
-      backend: 'classic' or 'filament'.
-      light: name of the light settings that the baked qualities use, one of embodied.light.QUALITIES.
+      changes: fields of PictureSettings, instead of those of `pictures`: size=512, quality="normal".
     """
     graph = graph or build_graph(house, catalogue)
-    return World(house, catalogue, graph, cache, size=size, quality=quality, backend=backend, light=light)
+    return World(house, catalogue, graph, cache, dataclasses.replace(pictures, **changes))
 
 
 def open_folder(
-    folder: Path,
-    catalogue: Catalogue,
-    cache: Path,
-    *,
-    size: int = 256,
-    quality: str = "unlit",
-    backend: str = "classic",
-    light: str = "normal",
+    folder: Path, catalogue: Catalogue, cache: Path, pictures: PictureSettings = PictureSettings(), **changes: Any
 ) -> World:
-    """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there."""
+    """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there.
+
+    Args:
+      pictures, changes: as in `open_world`.
+    """
     folder = Path(folder)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
-    graph = build_graph(house, catalogue)
-    return World(
-        house,
-        catalogue,
-        graph,
-        cache,
-        size=size,
-        quality=quality,
-        backend=backend,
-        light=light,
-        file=folder / "panoramas.pano",
-    )
+    graph, pictures = build_graph(house, catalogue), dataclasses.replace(pictures, **changes)
+    return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
 
 
 @functools.cache

@@ -8,6 +8,8 @@ import math
 import numpy as np
 import pytest
 import torch
+from agents.imitation.config import SCALES
+from agents.imitation.training import Split
 from hand_worlds import grid_world
 
 from agents.bandit import navigation, runs
@@ -28,8 +30,6 @@ from agents.bandit.ratings import CLEAN, Rater
 from agents.hanna.agent import HannaAgent, new_agent
 from agents.hanna.vocabulary import build_vocabulary
 from agents.imitation.checkpoint import CheckpointError
-from agents.imitation.config import SCALES
-from agents.imitation.training import Split
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

@@ -11,6 +11,8 @@ from handmade import HandCatalogue, furnished, painted
 
 from embodied.render import filament
 from embodied.render.classic import Renderer
+from embodied.render.filament import Painter
+from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import owners
 
 EYE = (2.5, 2.6, 1.2)
@@ -29,7 +31,7 @@ def lit(house):
 
 def test_pages_are_shown_as_they_are(house, lit):
     """What a texel says is what a pixel shows: no lamp is added, and red stays that red."""
-    with Renderer(house, HandCatalogue(), size=64, quality="baked", lit=lit) as r:
+    with Renderer(house, HandCatalogue(), size=64, lit=lit) as r:
         p = r.panorama(EYE)
     i = lit.meshes[next(i for i, m in enumerate(lit.meshes) if m.owner == "red_box_1")]
     texel = lit.pages[0][4, int(i.uv[0, 0] * lit.pages[0].shape[1])]
@@ -39,9 +41,9 @@ def test_pages_are_shown_as_they_are(house, lit):
 
 def test_back_ends_agree(house, lit):
     catalogue = HandCatalogue()
-    with Renderer(house, catalogue, size=64, quality="baked", lit=lit) as classic:
+    with Renderer(house, catalogue, size=64, lit=lit) as classic:
         a = classic.panorama(EYE)
-    with Renderer(house, catalogue, size=64, quality="baked", lit=lit, backend="filament") as other:
+    with Renderer(house, catalogue, size=64, lit=lit, painter=Painter(house, catalogue, lit)) as other:
         b = other.panorama(EYE)
     assert np.array_equal(a.ids, b.ids) and np.array_equal(a.depth, b.depth)
     assert np.median(np.abs(a.rgb.astype(int) - b.rgb)) <= 6
@@ -55,7 +57,7 @@ def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
     )
     shots = []
     for pages in (lit, shiny):
-        with Renderer(house, HandCatalogue(), size=96, quality="baked", lit=pages, backend="filament") as r:
+        with Renderer(house, HandCatalogue(), size=96, lit=pages, painter=Painter(house, HandCatalogue(), pages)) as r:
             shots.append(r.view(EYE, 0.6, -0.5, 1.2, (96, 96)))
     floors = np.array([i + 1 for i, o in enumerate(lit.owners or owners(house)) if "/floor" in o])
     on_floor = np.isin(shots[0].ids, floors)
@@ -74,9 +76,9 @@ def test_the_camera_is_in_the_room_around_it_and_in_none_outdoors(house):
     assert filament.room_at(house, EYE) == "living_room_1" and filament.room_at(house, (-30.0, 0.0, 1.0)) is None
 
 
-def test_unlit_is_left_to_the_classic_back_end(house):
-    with pytest.raises(ValueError, match="baked"):
-        Renderer(house, HandCatalogue(), backend="filament")
+def test_unlit_is_left_to_the_classic_back_end():
+    with pytest.raises(ValueError, match="unlit.*classic"):
+        PictureSettings(backend="filament")
 
 
 def test_no_vulkan_gives_the_remedy(monkeypatch):

@@ -498,7 +498,7 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
 
     house, catalogue, _, baked = lit
     at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)
-    with Renderer(house, catalogue, quality="baked", lit=baked.lit, size=96) as renderer:
+    with Renderer(house, catalogue, lit=baked.lit, size=96) as renderer:
         view = renderer.view(at, yaw, pitch, vfov, size)
     camera = camera_at(at, yaw, pitch, vfov)
     traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(

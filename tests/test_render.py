@@ -17,6 +17,7 @@ from embodied.render import visibility
 from embodied.render.camera import camera_at
 from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
+from embodied.render.pictures import QUALITIES, PictureSettings
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
 
@@ -205,12 +206,24 @@ def test_two_houses_can_be_open_at_once_and_a_closed_one_says_so(house):
         ({"backend": "metal"}, "metal"),
         ({"size": 0}, "size"),
         ({"size": -5}, "size"),
-        ({"quality": "baked"}, "lit"),
+        ({"backend": "filament"}, "unlit"),
+        ({"backend": "filament", "quality": "glossy"}, "glossy"),
+        ({"light": "high"}, "unlit"),
     ],
 )
-def test_bad_settings_are_refused(house, wrong, match):
+def test_bad_settings_are_refused(wrong, match):
     with pytest.raises(ValueError, match=match):
-        Renderer(house, HandCatalogue(), **wrong)
+        PictureSettings(**wrong)
+
+
+def test_a_renderer_refuses_impossible_sizes(house):
+    with pytest.raises(ValueError, match="size"):
+        Renderer(house, HandCatalogue(), size=0)
+
+
+def test_a_quality_says_by_which_light():
+    assert [PictureSettings(quality=q).lit_by for q in QUALITIES] == [None, None, "fast", "normal", "normal", "normal"]
+    assert PictureSettings(quality="normal", light="high").lit_by == "high"
 
 
 def _draw(queue) -> None:

@@ -126,6 +126,18 @@ def test_unknown_nodes_folders_and_sights_are_refused(world, tmp_path):
         world.node_of(Sight("other house", 2))
 
 
+def test_a_world_without_pictures_says_so(house, tmp_path):
+    with make(house, tmp_path, quality="none") as w:
+        assert w.sightings(0), "what can be seen is known without pictures"
+        with pytest.raises(ValueError, match="without pictures"):
+            w.panorama(0)
+
+
+def test_a_misspelt_setting_is_refused(house, tmp_path):
+    with pytest.raises(TypeError, match="qualitty"):
+        make(house, tmp_path, qualitty="unlit")
+
+
 def test_unknown_quality_is_refused_at_once(house, tmp_path):
     with pytest.raises(ValueError, match="pretty"):
         make(house, tmp_path, quality="pretty")

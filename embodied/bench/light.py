@@ -23,10 +23,11 @@ from embodied.light.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
+from embodied.render.filament import Painter
 
 AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
-DRAWN = ("unlit", "baked", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
+DRAWN = ("unlit", "normal", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
 WAYS = (*DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
@@ -129,11 +130,9 @@ def draw(
     shots = []
     for way in WAYS:
         if way in DRAWN:
-            quality, backend = (
-                ("unlit", "classic") if way == "unlit" else ("baked", "filament" if way == "filament" else "classic")
-            )
             lit = None if way == "unlit" else baked.lit
-            with Renderer(house, catalogue, quality=quality, backend=backend, lit=lit, size=256) as r:
+            painter = Painter(house, catalogue, baked.lit) if way == "filament" else None
+            with Renderer(house, catalogue, lit=lit, painter=painter) as r:
                 for room, eye, yaw in views:
                     rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
                     ms = _median_ms(lambda at=eye, to=yaw, by=r: by.rgb(camera_at(at, to), (256, 256)))

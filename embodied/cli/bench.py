@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -27,9 +28,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
     )
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
-    parser.add_argument(
-        "--quality", choices=("unlit", "baked"), default="unlit", help="how pictures are drawn (default: unlit)"
-    )
+    parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
     parser.add_argument(
         "--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)"
     )

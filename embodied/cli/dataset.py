@@ -12,6 +12,7 @@ from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, show
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
+from embodied.render.pictures import QUALITIES, PictureSettings
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -53,9 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)",
     )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
-    parser.add_argument(
-        "--panoramas", choices=("unlit", "baked", "glossy"), help="also draw every viewpoint, this well"
-    )
+    parser.add_argument("--panoramas", choices=QUALITIES[1:5], help="also draw every viewpoint, this well")
     parser.add_argument(
         "--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
@@ -101,8 +100,7 @@ def run(args: argparse.Namespace) -> int:
             config,
             args.out,
             args.cache,
-            quality=args.panoramas,
-            size=args.size,
+            pictures=PictureSettings(args.size, args.panoramas),
             workers=args.workers,
             watch=watch,
             packs=tuple(args.pack),

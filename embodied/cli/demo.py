@@ -15,6 +15,7 @@ from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.recording import add_sinks, viewers_of
+from embodied.render.pictures import DRAWN
 
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
@@ -26,9 +27,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument(
-        "--quality", choices=("unlit", "baked"), default="baked", help="unlit is drawn at once (default: baked)"
-    )
+    parser.add_argument("--quality", choices=DRAWN, default="normal", help="unlit is drawn at once (default: normal)")
     parser.add_argument(
         "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder to write (default: %(default)s)"
     )

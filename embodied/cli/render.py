@@ -10,9 +10,7 @@ import argparse
 from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-
-QUALITIES = ("unlit", "baked", "glossy", "reference")
-BACKENDS = ("classic", "filament")
+from embodied.render.pictures import BACKENDS, QUALITIES
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -20,9 +18,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, default=512, help="side of a cube face in pixels (default: %(default)s)")
     parser.add_argument(
         "--quality",
-        choices=QUALITIES,
-        default="baked",
-        help="unlit: at once; baked: global illumination, default; glossy: traced from the bake; "
+        choices=QUALITIES[1:],
+        default="normal",
+        help="unlit: at once; fast, normal: global illumination, normal is the default; glossy: traced from it; "
         "reference: path-traced, slow",
     )
     parser.add_argument(

@@ -12,6 +12,7 @@ from pathlib import Path
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.demo import texts
 from embodied.cli.recording import add_sinks, viewers_of
+from embodied.render.pictures import DRAWN
 
 AGENTS = ("shortest", "random", "forward10")
 
@@ -22,9 +23,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
     parser.add_argument("--episodes", type=int, default=1, metavar="N", help="how many tasks (default: %(default)s)")
-    parser.add_argument(
-        "--quality", choices=("unlit", "baked"), default="baked", help="how the house is drawn (default: baked)"
-    )
+    parser.add_argument("--quality", choices=DRAWN, default="normal", help="how the house is drawn (default: normal)")
     parser.add_argument(
         "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )

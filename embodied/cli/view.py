@@ -13,6 +13,7 @@ from pathlib import Path
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
 from embodied.cli.recording import add_sinks, viewers_of
+from embodied.render.pictures import DRAWN
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +24,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings"
     )
     parser.add_argument(
-        "--quality", choices=("unlit", "baked"), default="unlit", help="how --episode draws the house (default: unlit)"
+        "--quality", choices=DRAWN, default="unlit", help="how --episode draws the house (default: unlit)"
     )
     add_sinks(parser, "RUN/recordings/N.rrd")
     add_cache(parser)

@@ -27,6 +27,7 @@ from embodied.language import People, PlainLanguage
 from embodied.locks import LOCK, locked
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
 from embodied.records import load_json, read_json, save_lines
+from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
@@ -159,27 +160,26 @@ def draw_panoramas(
     folder: Path,
     cache: Path,
     *,
-    quality: str,
-    size: int,
+    pictures: PictureSettings,
     workers: int = 1,
     watch: Watch | None = None,
     packs: tuple[Path, ...] = (),
     ray_address: str | None = None,
 ) -> None:
     """Draw the panoramas of all houses into their folders, unless they are there."""
-    arguments = (Path(folder), Path(cache), quality, size, packs)
+    arguments = (Path(folder), Path(cache), pictures, packs)
     work = units(scale(config.scale, config.kind))
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
         _sweep(Path(folder), work)
 
 
-def draw_unit(unit: Unit, folder: Path, cache: Path, quality: str, size: int, packs: tuple[Path, ...]) -> str:
+def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings, packs: tuple[Path, ...]) -> str:
     """The panoramas of one house, from its saved files; returns its name."""
     home = folder / "houses" / unit.name
     house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
     catalogue = load_catalogue(cache, packs)
-    with World(house, catalogue, graph, cache, size=size, quality=quality, file=home / "panoramas.pano") as world:
+    with World(house, catalogue, graph, cache, pictures, file=home / "panoramas.pano") as world:
         world.render_all()
     return unit.name
 

@@ -34,7 +34,7 @@ def write_skyboxes(panoramas: Path, ids: Sequence[str], folder: Path) -> list[Pa
     if not Path(panoramas).exists():
         raise ValueError(
             f"{panoramas} does not exist; draw the panoramas first: run the command that built the data set "
-            "once more, with --panoramas baked"
+            "once more, with --panoramas normal"
         )
     with PanoramaFile(panoramas) as file:
         return [path for node, key in enumerate(ids) for path in write_skybox(file.read(node), key, folder)]

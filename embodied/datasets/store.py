@@ -7,7 +7,7 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import missing_units, units
@@ -27,6 +27,7 @@ from embodied.house.house import House
 from embodied.interface import FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import read_lines
+from embodied.render.pictures import PictureSettings
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 
 if TYPE_CHECKING:
@@ -107,13 +108,20 @@ class Dataset:
     def places(self, split: str) -> dict[str, StoredPlace]:
         return {name: self.place(name) for name in self.names(split)}
 
-    def open_world(self, name: str, catalogue: Catalogue, cache: Path, **options: object) -> World:
-        """The world with pictures of one house; `options` as in embodied.world.open_world."""
+    def open_world(
+        self,
+        name: str,
+        catalogue: Catalogue,
+        cache: Path,
+        pictures: PictureSettings = PictureSettings(),
+        **changes: Any,
+    ) -> World:
+        """The world with pictures of one house; `pictures` and `changes` as in embodied.world.open_world."""
         from embodied.world import World  # the one part that needs a renderer
 
         place = self.place(name)
         file = self.folder / "houses" / name / "panoramas.pano"
-        return World(place.house, catalogue, place.graph, cache, file=file, **options)
+        return World(place.house, catalogue, place.graph, cache, dataclasses.replace(pictures, **changes), file=file)
 
     def routes(self, name: str) -> tuple[Route, ...]:
         """The routes that assistants know in a house.

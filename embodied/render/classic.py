@@ -7,7 +7,7 @@ behind walls, things outside the field of view) is left out of the list of geoms
 from __future__ import annotations
 
 import math
-from typing import Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from embodied import gl
 
@@ -21,11 +21,13 @@ from embodied.house.house import House
 from embodied.render import visibility
 from embodied.render.camera import Camera, View, camera_at, face_cameras
 from embodied.render.panorama import Panorama
+from embodied.render.pictures import check_size
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
 
-QUALITIES = ("unlit", "baked")
-BACKENDS = ("classic", "filament")
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
 SUPERSAMPLING = 1.5
@@ -34,6 +36,16 @@ there than multi-sampling, which multiplies the cost of every small triangle, an
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
+
+
+class Painter(Protocol):
+    """Draws the colours of a house in the classic renderer's place."""
+
+    def rgb(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
+        """(h, w, 3) uint8 as `camera` sees it, top row first, between two planes."""
+        ...
+
+    def close(self) -> None: ...
 
 
 class Renderer:
@@ -46,12 +58,11 @@ class Renderer:
     def __init__(
         self,
         house: House,
-        catalogue,
+        catalogue: Catalogue,
         *,
-        quality: str = "unlit",
-        backend: str = "classic",
         size: int = 256,
         lit: LitPages | None = None,
+        painter: Painter | None = None,
         scene: Scene | None = None,
     ) -> None:
         """Compile `house`, open OpenGL and upload.
@@ -59,19 +70,18 @@ class Renderer:
         A pane of glass counts as what is seen where it is: its depth and its id, though colours shine through.
 
         Args:
-          quality: 'unlit' (even light from all sides) or 'baked' (needs `lit`).
-          backend: 'classic' (OpenGL), or 'filament' (Vulkan) for the colours; depth and ids are the classic ones.
           size: side of a cube face of `panorama`, pixels.
-          lit: the baked pages that 'baked' shows.
+          lit: the baked pages to show; even light from all sides without.
+          painter: draws the colours instead, from the same pages; it is closed with the renderer.
           scene: a scene compiled before from the same house and pages, to save compiling again.
 
         Raises:
-          ValueError: unknown quality or backend, impossible size, 'baked' without pages.
+          ValueError: impossible size.
           GLError: no OpenGL context can be opened.
         """
-        _check(house, quality, backend, size, lit)
-        self.house, self.size, self.quality = house, size, quality
-        self._mjr = self._painter = None
+        check_size(size)
+        self.house, self.size = house, size
+        self._mjr, self._painter = None, painter
         self.scene = scene or compile_scene(house, catalogue, collisions=False, lit=lit)
         model = self.scene.model
         self._data = mujoco.MjData(model)
@@ -92,10 +102,6 @@ class Renderer:
         self._is_visual = np.array([k != "collision" for k in self.scene.kind_of_geom])
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, self.scene)
-        if backend == "filament":
-            from embodied.render.filament import Painter  # late: loads Vulkan
-
-            self._painter = Painter(house, catalogue, lit)
         self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
 
     def view(
@@ -251,19 +257,6 @@ def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> 
     """
     depth = near * far / (near + z.astype(np.float64) * (far - near))
     return np.where(z > 0, depth, np.inf).astype(np.float32)
-
-
-def _check(house: House, quality: str, backend: str, size: int, lit: LitPages | None) -> None:
-    if quality not in QUALITIES:
-        raise ValueError(f"quality {quality!r} is unknown to this renderer; use one of {QUALITIES}")
-    if backend not in BACKENDS:
-        raise ValueError(f"backend {backend!r} is unknown to this renderer; use one of {BACKENDS}")
-    if not 8 <= size <= 4096:
-        raise ValueError(f"size is {size} pixels; a cube face needs 8 to 4096")
-    if backend == "filament" and quality != "baked":
-        raise ValueError(f"backend 'filament' draws quality 'baked' only, not {quality!r}; use backend 'classic'")
-    if (quality == "baked") != (lit is not None):
-        raise ValueError("quality 'baked' needs lit=..., the pages of embodied.light; 'unlit' takes none")
 
 
 def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
