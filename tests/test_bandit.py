@@ -9,9 +9,9 @@ import pytest
 import sacrebleu
 import torch
 
-from agents.bandit.a2c import DivergedError, Rated, actor_loss, advantages, critic_loss, descend
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
+from agents.imitation.actor_critic import Decisions, DivergedError, actor_loss, advantages, critic_loss, descend
 from embodied.seeds import stream
 
 
@@ -110,11 +110,11 @@ def test_raters_refuse_negative_settings():
         Rater(variance=-1)
 
 
-def two_sequences() -> tuple[Rated, torch.Tensor, torch.Tensor]:
+def two_sequences() -> tuple[Decisions, torch.Tensor, torch.Tensor]:
     log_p = torch.tensor([[-1.0, -2.0, -3.0], [-0.5, -1.5, 0.0]], requires_grad=True)
     values = torch.tensor([[0.2, 0.4, 0.9], [0.5, 0.1, 7.0]], requires_grad=True)
     mask = torch.tensor([[True, True, True], [True, True, False]])
-    return Rated(log_p, values, torch.tensor([0.6, 0.3]), mask), log_p, values
+    return Decisions(log_p, values, torch.tensor([0.6, 0.3]), mask), log_p, values
 
 
 def test_advantage_is_rating_less_value_and_nothing_behind_the_end():
@@ -153,7 +153,7 @@ def test_actor_critic_finds_the_better_of_two_arms_from_coarse_ratings():
         arms = rng.random(16) < logits.softmax(-1)[1].item()
         ratings = torch.tensor([rater.rate(0.8 if a else 0.3, rng=rng) for a in arms], dtype=torch.float32)
         chosen = logits.log_softmax(-1)[torch.tensor(arms).long()][:, None]
-        rated = Rated(chosen, value.expand(16)[:, None], ratings, torch.ones(16, 1, dtype=torch.bool))
+        rated = Decisions(chosen, value.expand(16)[:, None], ratings, torch.ones(16, 1, dtype=torch.bool))
         descend(actor_loss(rated), optimizers[0], 5.0, "actor")
         descend(critic_loss(rated), optimizers[1], 5.0, "critic")
     assert logits.softmax(-1)[1] > 0.9

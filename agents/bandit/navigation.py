@@ -1,6 +1,6 @@
 """Navigation from ratings: a person watches an episode and gives one to five stars, nothing else.
 
-The learner is the translator's (agents.bandit.a2c): an agent that was taught by imitation plays
+The learner is the translator's (agents.imitation.actor_critic): an agent that was taught by imitation plays
 episodes, each episode gets one rating, and every decision of it is credited with the rating less
 what a critic expected. Decisions are words there; here they are moves, stopping, and asking.
 """
@@ -18,7 +18,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.bandit.a2c import Rated, actor_loss, critic_loss, descend
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
 from agents.bandit.runs import Note, Run
@@ -28,6 +27,7 @@ from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
 from agents.hanna.training import Split
+from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
 from agents.imitation.loop import stop_signal, tasks_of_update
 from assets.cache import digest
 from embodied.evaluation import metrics
@@ -125,7 +125,7 @@ def shortest_path(graph: NavGraph, start: int, goal: int) -> tuple[int, ...]:
     return tuple(path)
 
 
-def rated(decided: Sequence[Decided], critic: StateCritic, ratings: Sequence[float]) -> Rated:
+def rated(decided: Sequence[Decided], critic: StateCritic, ratings: Sequence[float]) -> Decisions:
     """The steps of all episodes side by side, (B, T)."""
     episodes, steps = len(ratings), len(decided)
     log_p, states = torch.zeros(episodes, steps), torch.zeros(episodes, steps, decided[0].states.shape[-1])
@@ -135,7 +135,7 @@ def rated(decided: Sequence[Decided], critic: StateCritic, ratings: Sequence[flo
         rows = torch.tensor(moment.positions)
         columns.append(log_p[:, t].index_put((rows,), moment.log_probabilities))
         states[rows, t], mask[rows, t] = moment.states, True
-    return Rated(torch.stack(columns, 1), critic(states), torch.tensor(ratings, dtype=torch.float32), mask)
+    return Decisions(torch.stack(columns, 1), critic(states), torch.tensor(ratings, dtype=torch.float32), mask)
 
 
 def learn_from_stars(

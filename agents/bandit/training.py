@@ -20,7 +20,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.bandit.a2c import Rated, actor_loss, critic_loss, descend
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import corpus_digest, load
@@ -30,6 +29,7 @@ from agents.bandit.runs import Note, Run, run_passes
 from agents.bandit.store import load_weights, save_weights
 from agents.bandit.translate import Numbered, decode, drawn_with, greedy, numbered, padded, perplexity
 from agents.bandit.words import BUILDERS, Lexicon
+from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
 from embodied.seeds import stream
 
 LEARNERS = ("reference", "supervised", "a2c")
@@ -156,7 +156,7 @@ def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = pri
         scores = scores_of(said, m, data, chosen)
         target = padded(said)
         values = critic(source, target)
-        rated = Rated(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
+        rated = Decisions(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
         loss = critic_loss(rated)
         descend(loss, optimizer, config.clip, f"critic, update {run.update}")
         return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
@@ -250,7 +250,9 @@ def learn_from_ratings(
     where: str,
 ) -> None:
     """Lines 5 and 6 of Algorithm 2, for a batch of sampled translations `said` (B, T)."""
-    rated = Rated(translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0)
+    rated = Decisions(
+        translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0
+    )
     descend(actor_loss(rated), optimizers["translator"], clip, f"{where}, translator")
     descend(critic_loss(rated), optimizers["critic"], clip, f"{where}, critic")
 

@@ -1,4 +1,4 @@
-"""Checkpoints: everything that decides what comes next in a run, written atomically, refused when it is another run's."""
+"""Checkpoints: everything that decides what comes next in a run, written atomically, refused if another run's."""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ not been.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import signal
 import threading
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import torch
 
@@ -109,3 +110,90 @@ def stop_signal() -> Iterator[threading.Event]:
         yield event
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+class Session:
+    """One session of a resumable run: counts updates and seconds, saves when due, and ends when told.
+
+        with Session(progress, total, save, minutes=30, note=note) as session:
+            for update in session:
+                ...                                             # update counts from 0
+                session.progress = dataclasses.replace(session.progress, best=...)
+
+    What the body did with an update counts, and is saved, when the next one is asked for.
+    """
+
+    def __init__(
+        self,
+        progress: Progress,
+        total: int,
+        save: Callable[[Progress], None],
+        *,
+        minutes: float | None = None,
+        checkpoint_minutes: float = 3.0,
+        note: Note = print,
+    ) -> None:
+        """
+        Args:
+          total: updates of the whole run.
+          save: writes a checkpoint.
+          minutes: stop after this long, as if interrupted.
+          checkpoint_minutes: how often to save besides.
+        """
+        self.progress, self.total, self._save, self._note = progress, total, save, note
+        self._minutes, self._every = minutes, checkpoint_minutes
+        self._signals = stop_signal()
+
+    def __enter__(self) -> Self:
+        self._stop = self._signals.__enter__()
+        if self.progress.update:
+            self._note(f"continuing after update {self.progress.update}")
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._signals.__exit__(*error)
+
+    def __iter__(self) -> Iterator[int]:
+        """The updates that are left.
+
+        Raises:
+          KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+        """
+        began = saved = time.monotonic()
+        before = self.progress.seconds
+        while self.progress.update < self.total:
+            yield self.progress.update
+            now = time.monotonic()
+            self.progress = dataclasses.replace(
+                self.progress, update=self.progress.update + 1, seconds=before + now - began
+            )
+            last, stopped = self.progress.update == self.total, self._stop.is_set()
+            late = self._minutes is not None and now - began > 60 * self._minutes
+            if last or stopped or late or now - saved > 60 * self._every:
+                self._save(self.progress)
+                saved = now
+            if stopped or (late and not last):
+                why = "stopped" if stopped else "time is up"
+                self._note(f"{why} after update {self.progress.update}; the same command goes on from there")
+                if stopped:
+                    raise KeyboardInterrupt
+                return
+
+
+def falling_rate(rate: float, update: int, updates: int, cooldown: float) -> float:
+    """A learning rate that falls linearly over the last share `cooldown` of the updates; never zero."""
+    falling = round(cooldown * updates)
+    return rate * min(1.0, (updates - update) / (falling + 1))
+
+
+def refuse_divergence(update: int, loss: torch.Tensor, norm: torch.Tensor) -> None:
+    """Called before weights change.
+
+    Raises:
+      TrainingError: the loss or the gradient's norm is not finite.
+    """
+    if not (torch.isfinite(loss) and torch.isfinite(norm)):
+        raise TrainingError(
+            f"update {update}: loss {float(loss.detach()):.3g}, gradient {float(norm):.3g}, not finite; the last "
+            "checkpoint is intact, lower the learning rate and begin from it"
+        )

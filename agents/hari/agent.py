@@ -1,0 +1,122 @@
+"""HARI's agents on disk: the execution policy alone, or with the intention policy that learned to use it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import safetensors
+import safetensors.torch
+import torch
+from torch import nn
+
+from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
+from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
+from agents.hari.words import FeatureWords
+from agents.vision.resnet import read_weights
+from assets.cache import atomic_path
+
+FORMAT = "embodied-hari-1"
+
+
+@dataclass(frozen=True, eq=False)
+class Executor:
+    """A trained execution policy with the words it knows."""
+
+    network: ExecutionNetwork
+    words: FeatureWords
+    config: ExecutionConfig
+
+
+@dataclass(frozen=True, eq=False)
+class HariAgent:
+    """An execution policy and the intention policy that was trained on it."""
+
+    executor: Executor
+    actor: RecurrentHead
+    config: IntentionConfig
+
+
+def new_executor(config: ExecutionConfig, words: FeatureWords) -> Executor:
+    """Random weights that follow from the seed."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        return Executor(ExecutionNetwork(config, len(words)), words, config)
+
+
+def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, RecurrentHead]:
+    """Actor psi and critic V with random weights that follow from the seed."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        actor = RecurrentHead(belief, config.hidden_size, len(INTENTIONS), knows_stack=config.knows_stack)
+        return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
+
+
+def save_executor(executor: Executor, path: Path) -> None:
+    """Write an execution policy, atomically."""
+    _save({"execution": executor.network}, {"execution": as_dict(executor.config)}, executor.words, path)
+
+
+def save_agent(agent: HariAgent, path: Path) -> None:
+    """Write an agent with its execution policy, atomically."""
+    settings = {"execution": as_dict(agent.executor.config), "intention": as_dict(agent.config)}
+    _save({"execution": agent.executor.network, "actor": agent.actor}, settings, agent.executor.words, path)
+
+
+def load_executor(path: Path) -> Executor:
+    """The execution policy of a file of `save_executor` or `save_agent`.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged or of another format.
+    """
+    tensors, settings, words = _load(Path(path))
+    executor = new_executor(ExecutionConfig(**settings["execution"]), words)
+    _fill(executor.network, tensors, "execution", path)
+    executor.network.eval()
+    return executor
+
+
+def load_agent(path: Path) -> HariAgent:
+    """What `save_agent` wrote.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.
+    """
+    tensors, settings, _ = _load(Path(path))
+    if "intention" not in settings:
+        raise ValueError(
+            f"{path} holds an execution policy alone; teach it to ask: "
+            f"`embodied train hari intention --execution {path}`"
+        )
+    executor, config = load_executor(path), IntentionConfig(**settings["intention"])
+    actor, _ = new_heads(config, executor.config.hidden_size)
+    _fill(actor, tensors, "actor", path)
+    actor.eval()
+    return HariAgent(executor, actor, config)
+
+
+def _save(
+    modules: dict[str, nn.Module], settings: dict[str, dict[str, object]], words: FeatureWords, path: Path
+) -> None:
+    about = {"format": FORMAT, "settings": json.dumps(settings), "names": json.dumps(words.names)}
+    tensors = {f"{n}.{k}": v.detach().contiguous() for n, m in modules.items() for k, v in m.state_dict().items()}
+    with atomic_path(Path(path)) as temporary:
+        safetensors.torch.save_file(tensors, temporary, metadata=about)
+
+
+def _load(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, dict], FeatureWords]:
+    tensors = read_weights(path)
+    with safetensors.safe_open(path, "pt") as f:
+        about = f.metadata() or {}
+    if about.get("format") != FORMAT:
+        raise ValueError(f"{path}: format {about.get('format')!r}, this version reads {FORMAT!r}; train it again")
+    return tensors, json.loads(about["settings"]), FeatureWords(tuple(json.loads(about["names"])))
+
+
+def _fill(module: nn.Module, tensors: dict[str, torch.Tensor], name: str, path: Path) -> None:
+    mine = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
+    try:
+        module.load_state_dict(mine)
+    except RuntimeError as e:
+        raise ValueError(f"{path}: its weights are not those of its settings ({e}); train it again") from e

@@ -1,0 +1,148 @@
+"""HARI's networks: the execution policy (a Transformer), the intention policy and its critic (LSTMs); appendix E."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from agents.hari.config import ExecutionConfig
+from agents.hari.words import SIZES, Inputs
+
+INTENTIONS = ("cur", "goal", "sub", "do", "done")
+"""A-bar of 4.3.3.2, in the order of the intention policy's outputs."""
+DEPTHS = 4
+"""Stack sizes that `knows_stack` tells apart; larger ones count as the largest."""
+SHOWN = 8
+"""Probabilities of moves that the intention policy is shown."""
+
+
+class ExecutionNetwork(nn.Module):
+    """pi-hat: (b^s_{t-1}, d^s, d^g) -> b^s_t and a distribution over moves.
+
+    "We adapt the V&L BERT architecture": an encoder reads each description by itself, a decoder
+    attends from the previous hidden vector over both. What the text leaves open and is decided
+    here (docs/sources.md, section HARI): moves are scored by the product of b^s_t with the
+    embedding of the feature set that an assistant would use for them, so that "go north" and the
+    neighbour to the north are near each other from the start.
+    """
+
+    def __init__(self, config: ExecutionConfig, names: int) -> None:
+        super().__init__()
+        h = config.hidden_size
+        self.names = nn.Embedding(names, h, padding_idx=0)
+        self.others = nn.ModuleList(nn.Embedding(n, h, padding_idx=0) for n in SIZES)
+        for table in (self.names, *self.others):
+            nn.init.normal_(table.weight, std=h**-0.5)
+            with torch.no_grad():
+                table.weight[0].zero_()
+        self.angles = nn.Linear(4, h, bias=False)
+        self.encoder = _transformer(config)
+        self.decoder = _transformer(config)
+        self.roles = nn.Parameter(torch.randn(3, h) * h**-0.5)
+        """Which of the three a row is: the belief, of d^s, of d^g."""
+        self.first = nn.Parameter(torch.zeros(h))
+        """b^s_0."""
+        self.query = nn.Linear(h, h)
+        self.key = nn.Linear(h, h)
+        self.norm = nn.LayerNorm(h)
+
+    def begin(self, batch: int) -> Tensor:
+        """(B, h): b^s_0."""
+        return self.first.expand(batch, -1)
+
+    def forward(self, before: Tensor, inputs: Inputs) -> tuple[Tensor, Tensor]:
+        """One step.
+
+        Args:
+          before: (B, h) b^s of the move before.
+
+        Returns:
+          (B, h) b^s_t, and (B, C + 1) log-probabilities of the moves, stopping last; -inf where not allowed.
+        """
+        device = before.device
+        state, goal, moves = (torch.from_numpy(x).to(device) for x in (inputs.state, inputs.goal, inputs.moves))
+        state_rows, goal_rows = self.encode(state), self.encode(goal)  # (B, S, h), (B, G, h)
+        rows = torch.cat(
+            [(before + self.roles[0])[:, None], state_rows + self.roles[1], goal_rows + self.roles[2]], 1
+        )  # (B, 1 + S + G, h)
+        empty = torch.cat([torch.zeros_like(state[:, :1, 1]), state[..., 1], goal[..., 1]], 1) == 0
+        empty[:, 0] = False
+        belief = self.norm(self.decoder(rows, src_key_padding_mask=empty)[:, 0])  # (B, h)
+        keys = self.key(self.embed(moves) + self.angles(torch.from_numpy(inputs.angles).to(device)))  # (B, C + 1, h)
+        scores = torch.einsum("bh,bch->bc", self.query(belief), keys) / math.sqrt(keys.shape[-1])
+        allowed = torch.from_numpy(inputs.allowed).to(device)
+        return belief, scores.masked_fill(~allowed, -torch.inf).log_softmax(-1)
+
+    def encode(self, rows: Tensor) -> Tensor:
+        """(B, M, 5) int64 of a description -> (B, M, h)."""
+        return self.encoder(self.embed(rows), src_key_padding_mask=rows[..., 1] == 0)
+
+    def embed(self, rows: Tensor) -> Tensor:
+        """(..., 5) int64 -> (..., h): "sum all the embeddings into a single vector"."""
+        parts = [table(rows[..., k + 1]) for k, table in enumerate(self.others)]
+        return self.names(rows[..., 0]) + torch.stack(parts).sum(0)
+
+
+def _transformer(config: ExecutionConfig) -> nn.TransformerEncoder:
+    h = config.hidden_size
+    layer = nn.TransformerEncoderLayer(h, config.heads, 4 * h, config.dropout, batch_first=True, norm_first=True)
+    return nn.TransformerEncoder(layer, config.layers, nn.LayerNorm(h), enable_nested_tensor=False)
+
+
+class RecurrentHead(nn.Module):
+    """An LSTM over what the execution policy thinks: psi with five outputs, V with one.
+
+    "The input of this model is the execution policy's model outputs, b^s_t and p_t, and the
+    embedding of the previously taken action" (appendix E). p_t has as many entries as there are
+    moves; here it is the probability of stopping and the `SHOWN` largest of moving, in descending order.
+    """
+
+    def __init__(self, belief: int, hidden: int, outputs: int, *, knows_stack: bool) -> None:
+        super().__init__()
+        self.knows_stack = knows_stack
+        self.last = nn.Embedding(1 + len(INTENTIONS), hidden // 4)
+        """Of the intention before; 0 at the beginning."""
+        extra = DEPTHS if knows_stack else 0
+        self.cell = nn.LSTMCell(belief + 1 + SHOWN + hidden // 4 + extra, hidden)
+        self.out = nn.Linear(hidden, outputs)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def begin(self, batch: int) -> tuple[Tensor, Tensor]:
+        """(B, hidden) twice: nothing has been thought."""
+        zero = self.out.weight.new_zeros(batch, self.cell.hidden_size)
+        return zero, zero
+
+    def forward(
+        self, belief: Tensor, shown: Tensor, last: Tensor, depth: Tensor, memory: tuple[Tensor, Tensor]
+    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        """One step.
+
+        Args:
+          belief: (B, h) b^s_t.
+          shown: (B, 1 + SHOWN) p_t, see `shown_probabilities`.
+          last: (B,) int64, 0 or 1 + the intention before.
+          depth: (B,) int64, goals on the stack, at least 1.
+          memory: what this returned before.
+
+        Returns:
+          (B, outputs), and the memory.
+        """
+        parts = [belief, shown, self.last(last)]
+        if self.knows_stack:
+            parts.append(nn.functional.one_hot((depth - 1).clamp(0, DEPTHS - 1), DEPTHS).to(belief.dtype))
+        memory = self.cell(torch.cat(parts, -1), memory)
+        return self.out(memory[0]), memory
+
+
+def shown_probabilities(log_moves: Tensor) -> Tensor:
+    """(B, 1 + SHOWN): the probability of stopping, then those of moving from the largest on.
+
+    Args:
+      log_moves: (B, C + 1) log-probabilities, stopping last.
+    """
+    p = log_moves.exp()
+    moves = p[:, :-1].sort(-1, descending=True).values[:, :SHOWN]
+    return torch.cat([p[:, -1:], nn.functional.pad(moves, (0, SHOWN - moves.shape[1]))], -1)

@@ -1,0 +1,210 @@
+"""HARI's agent at work: it thinks with its execution policy, and chooses among CUR, GOAL, SUB, DO and DONE (4.3.3.2).
+
+DO goes where the execution policy most wants to go; that one may not stop is what DONE is for. The
+belief b^s is carried on when the agent moves, as in pre-training, where nothing is asked in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.hari.agent import Executor, HariAgent
+from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
+from agents.hari.words import collate, percept_of
+from embodied.interface import Action, Ask, Intention, Move, Observation, Situation, Stop, Thought
+from embodied.teachers.shortest import shortest_action
+
+Observations = Sequence[Observation | None]
+Actions = list[Action | None]
+DO, DONE = INTENTIONS.index("do"), INTENTIONS.index("done")
+ASKS = {name: INTENTIONS.index(name) for name in ("cur", "goal", "sub")}
+
+
+@dataclass
+class Belief:
+    """What the execution policy carries along for B agents."""
+
+    carried: Tensor
+    """(B, h) b^s of the last move."""
+
+
+@dataclass(frozen=True, eq=False)
+class Considered:
+    """What the execution policy thinks of b agents at one step."""
+
+    rows: list[int]
+    """Which of the B agents, those that have not ended."""
+    belief: Tensor
+    """(b, h) b^s_t."""
+    log_moves: Tensor
+    """(b, C + 1) log-probabilities, stopping last."""
+
+    @property
+    def best_moves(self) -> np.ndarray:
+        """(b,) int64: the likeliest move, stopping aside."""
+        return self.log_moves[:, :-1].argmax(1).numpy()
+
+    @property
+    def would_stop(self) -> np.ndarray:
+        """(b,) bool: whether stopping is the likeliest action."""
+        return (self.log_moves.argmax(1) == self.log_moves.shape[1] - 1).numpy()
+
+
+@torch.inference_mode()
+def consider(executor: Executor, observations: Observations, memory: Belief | None) -> tuple[Considered, Belief]:
+    """Run the execution policy, which learns no more, on every agent that has not ended."""
+    memory = memory or Belief(executor.network.begin(len(observations)).clone())
+    rows = [i for i, o in enumerate(observations) if o is not None]
+    inputs = collate([percept_of(executor.words, o) for o in observations if o is not None])
+    belief, log_moves = executor.network(memory.carried[rows], inputs)
+    return Considered(rows, belief, log_moves), memory
+
+
+def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
+    """The beliefs after `actions`: those of agents that moved are the new ones."""
+    carried = memory.carried.clone()
+    for k, i in enumerate(considered.rows):
+        if isinstance(actions[i], Move):
+            carried[i] = considered.belief[k]
+    return Belief(carried)
+
+
+def available(observation: Observation) -> np.ndarray:
+    """(5,) bool: the intentions that are possible now."""
+    possible = np.ones(len(INTENTIONS), dtype=bool)
+    for name, k in ASKS.items():
+        possible[k] = Intention(name) in observation.can_ask
+    possible[DO] = bool(observation.candidates.allowed.any())
+    return possible
+
+
+def action_of(intention: int, move: int, thought: Thought | None = None) -> Action:
+    """An intention as an action of the environment; DO goes to the candidate `move`."""
+    if intention == DO:
+        return Move(move, thought)
+    return Stop(thought) if intention == DONE else Ask(Intention(INTENTIONS[intention]), thought)
+
+
+@dataclass
+class Mind:
+    """What a learned agent carries along for B episodes."""
+
+    belief: Belief
+    actor: tuple[Tensor, Tensor]
+    """(B, hidden) twice."""
+    last: Tensor
+    """(B,) int64: 0, or 1 + the intention before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """One step of the learner's, for b agents: what training needs of it."""
+
+    rows: list[int]
+    logits: Tensor
+    """(b, 5), -inf where not possible."""
+    intentions: Tensor
+    """(b,) int64, what was chosen."""
+    belief: Tensor
+    shown: Tensor
+    last: Tensor
+    depth: Tensor
+    """(b, ...) inputs of the heads."""
+
+
+@dataclass(eq=False)
+class HariPolicy:
+    """The intention policy over its execution policy, as it is judged or as it learns."""
+
+    executor: Executor
+    actor: RecurrentHead
+    sample: bool = True
+    """Intentions are drawn from psi; False takes the likeliest. The text leaves open which is judged."""
+    choices: list[Choice] | None = field(default=None, repr=False)
+    """Where each step is written down for training; None: nowhere."""
+
+    def act(
+        self, observations: Observations, memory: Mind | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Mind]:
+        """See embodied.interface.Policy."""
+        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        moves = considered.best_moves
+        return self._choose(observations, considered, moves, belief, memory, rngs)
+
+    def _pick(self, p: np.ndarray, rng: np.random.Generator) -> int:
+        return int(rng.choice(len(INTENTIONS), p=p)) if self.sample else int(p.argmax())
+
+    def _choose(
+        self,
+        observations: Observations,
+        considered: Considered,
+        moves: np.ndarray,
+        belief: Belief,
+        memory: Mind | None,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[Actions, Mind]:
+        mind = memory or Mind(
+            belief, self.actor.begin(len(observations)), torch.zeros(len(observations), dtype=torch.long)
+        )
+        rows = considered.rows
+        seen = [observations[i] for i in rows]
+        inputs = (
+            considered.belief.clone(),
+            shown_probabilities(considered.log_moves).clone(),
+            mind.last[rows],
+            torch.tensor([len(o.goal_descriptions) for o in seen if o is not None]),
+        )
+        possible = torch.from_numpy(np.stack([available(o) for o in seen if o is not None]))
+        before = (mind.actor[0][rows], mind.actor[1][rows])
+        scores, after = self.actor(*inputs, before)
+        logits = scores.masked_fill(~possible, -torch.inf)
+        p = logits.detach().double().softmax(-1).numpy()
+        drawn = [
+            int(rngs[i].choice(len(INTENTIONS), p=p[k])) if self.sample else int(p[k].argmax())
+            for k, i in enumerate(rows)
+        ]
+        actions: Actions = [None] * len(observations)
+        for k, i in enumerate(rows):
+            thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
+            actions[i] = action_of(drawn[k], int(moves[k]), thought)
+        intentions = torch.tensor(drawn)
+        if self.choices is not None:
+            self.choices.append(Choice(rows, logits, intentions, *inputs))
+        index = torch.tensor(rows)
+        actor = tuple(old.index_put((index,), new) for old, new in zip(mind.actor, after, strict=True))
+        last = mind.last.index_put((index,), intentions + 1)
+        return actions, Mind(carry(considered, actions, belief), (actor[0], actor[1]), last)
+
+
+@dataclass(eq=False)
+class PerfectOnSubgoals(HariPolicy):
+    """The skyline of Table 4.7: on a sub-goal, DO walks the shortest path to it, one node each."""
+
+    def act_privileged(
+        self,
+        observations: Observations,
+        situations: Sequence[Situation | None],
+        memory: Mind | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[Actions, Mind]:
+        """See embodied.interface.PrivilegedPolicy."""
+        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        moves = considered.best_moves.copy()
+        for k, i in enumerate(considered.rows):
+            s = situations[i]
+            if s is not None and len(s.goals) > 1:
+                action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+                moves[k] = action.candidate if isinstance(action, Move) else moves[k]
+        return self._choose(observations, considered, moves, belief, memory, rngs)
+
+
+def policy_of(agent: HariAgent, *, sample: bool = True) -> HariPolicy:
+    """A trained agent as it is judged."""
+    kind = PerfectOnSubgoals if agent.config.perfect else HariPolicy
+    return kind(agent.executor, agent.actor, sample)

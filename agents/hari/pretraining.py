@@ -1,0 +1,262 @@
+"""Pre-training of the execution policy: DAgger on shortest paths, with rich descriptions that are thinned at random.
+
+    for update in ...:
+        play a batch of pre-training tasks with the policy's own draws     (DAgger: states it will visit)
+        ask the shortest path what would have been right at each step
+        cross-entropy, Adam step                                           (appendix E)
+
+A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.hari.agent import Executor, save_executor
+from agents.hari.config import ExecutionConfig, as_dict
+from agents.hari.words import collate, percept
+from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
+from agents.imitation.loop import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
+from assets.cache import write_json
+from embodied.action_spaces import PanoramicMoves
+from embodied.assistants.descriptions import Describer, dropped
+from embodied.interface import Description, FindObject, Move, Place, Pose, Task
+from embodied.seeds import stream
+from embodied.teachers.shortest import shortest_action
+
+FORMAT = "embodied-hari-execution-1"
+MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
+"""Settings that may differ on resuming."""
+EVERY = 25
+"""Updates per progress line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """Where pre-training takes place."""
+
+    places: Mapping[str, Place]
+    describer: Describer
+    training: Sequence[Task]
+    validation: Sequence[Task]
+    moves: PanoramicMoves = dataclasses.field(default_factory=PanoramicMoves)
+
+
+@dataclass
+class Walk:
+    """One pre-training episode as it goes on."""
+
+    task: Task
+    place: Place
+    pose: Pose
+    goal: Description
+    rng: np.random.Generator
+    ended: bool = False
+
+
+def pretrain(
+    executor: Executor, lessons: Lessons, folder: Path, *, minutes: float | None = None, note: Note = print
+) -> Progress:
+    """Train `executor` in place, from `folder`'s checkpoint if there is one.
+
+    Writes checkpoint.pt, best.safetensors (by validation success), settings.json and validation.jsonl.
+
+    Args:
+      minutes: stop after this long in this session, as if interrupted.
+
+    Raises:
+      TrainingError: the loss or a gradient is not finite; the last checkpoint is intact.
+      CheckpointError: the folder's run has other settings or words, or is damaged.
+      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+    """
+    config, folder = executor.config, Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    optimizer = torch.optim.Adam(executor.network.parameters(), config.learning_rate)
+    progress = _restore(folder / "checkpoint.pt", executor, optimizer)
+    write_json(folder / "settings.json", as_dict(config), indent=1)
+    seen: list[dict[str, float]] = []
+
+    def save(progress: Progress) -> None:
+        _save(folder / "checkpoint.pt", executor, optimizer, progress)
+
+    with Session(
+        progress, config.iterations, save, minutes=minutes, checkpoint_minutes=config.checkpoint_minutes, note=note
+    ) as session:
+        for update in session:
+            seen.append(learn_once(executor, optimizer, lessons, update))
+            done, last = update + 1, update + 1 == config.iterations
+            if done % EVERY == 0 or last:
+                note(_line(done, session.progress.seconds, config, seen))
+                seen = []
+            if done % config.validate_every == 0 or last:
+                session.progress = _validate(executor, lessons, session.progress, done, folder, note)
+    executor.network.eval()
+    return session.progress
+
+
+def learn_once(executor: Executor, optimizer: torch.optim.Optimizer, lessons: Lessons, update: int) -> dict[str, float]:
+    """One update; returns its loss per step and the share of steps at which the likeliest move was right.
+
+    Raises:
+      TrainingError: not finite; no weight was changed.
+    """
+    config = executor.config
+    tasks = tasks_of_update(lessons.training, update, config.batch, config.seed)
+    walks = [_begin(lessons, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
+    executor.network.train()
+    with dropout_of(config.seed, update):
+        losses, right = _play(executor, lessons, walks, config.horizon)
+    loss = torch.cat(losses).mean()
+    for group in optimizer.param_groups:
+        group["lr"] = falling_rate(config.learning_rate, update, config.iterations, config.cooldown)
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    norm = torch.nn.utils.clip_grad_norm_(executor.network.parameters(), config.clip)
+    refuse_divergence(update, loss, norm)
+    optimizer.step()
+    steps = torch.cat(right)
+    return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}
+
+
+def _play(
+    executor: Executor, lessons: Lessons, walks: Sequence[Walk], horizon: int
+) -> tuple[list[Tensor], list[Tensor]]:
+    """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right."""
+    beliefs = executor.network.begin(len(walks))  # (B, h)
+    losses, right = [], []
+    for _ in range(horizon):
+        alive = [i for i, w in enumerate(walks) if not w.ended]
+        if not alive:
+            break
+        reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
+        seen = [_thinned(lessons.describer, walks[i]) for i in alive]
+        batch = collate(
+            [
+                percept(executor.words, d, walks[i].goal, candidates, walks[i].pose.turn)
+                for i, d, (candidates, _) in zip(alive, seen, reach, strict=True)
+            ]
+        )
+        new, log_moves = executor.network(beliefs[alive], batch)  # (b, h), (b, C + 1)
+        stop = log_moves.shape[1] - 1
+        wanted = torch.tensor([_right(walks[i], poses, stop) for i, (_, poses) in zip(alive, reach, strict=True)])
+        losses.append(-log_moves.gather(1, wanted[:, None])[:, 0])
+        right.append((log_moves.argmax(1) == wanted).detach())
+        beliefs = beliefs.index_put((torch.tensor(alive),), new)
+        p = log_moves.detach().exp().double().numpy()
+        for row, i in enumerate(alive):
+            _go(walks[i], int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum())), reach[row][1], stop)
+    return losses, right
+
+
+def _begin(lessons: Lessons, task: Task, rng: np.random.Generator) -> Walk:
+    """An episode with its goal described as in pre-training."""
+    place, goal = lessons.places[task.world], task.goal_nodes[0]
+    if not isinstance(task.goal, FindObject):
+        raise TypeError(f"HARI's tasks ask for objects; task {task.id!r} asks for {task.goal}")
+    described = lessons.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
+    return Walk(task, place, task.start, described, rng)
+
+
+def _thinned(describer: Describer, walk: Walk) -> Description:
+    return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
+
+
+def _right(walk: Walk, poses: Sequence[Pose], stop: int) -> int:
+    """Column of the shortest path's action."""
+    action = shortest_action(walk.place.graph, walk.pose, walk.task.goal_nodes, tuple(p.node for p in poses))
+    return action.candidate if isinstance(action, Move) else stop
+
+
+def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
+    if column == stop:
+        walk.ended = True
+    else:
+        walk.pose = poses[column]
+
+
+def pretraining_success(executor: Executor, lessons: Lessons, tasks: Sequence[Task]) -> float:
+    """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state."""
+    config = executor.config
+    executor.network.eval()
+    walks = [_begin(lessons, t, stream(config.seed, "validation", t.id)) for t in tasks]
+    with torch.inference_mode():
+        for k in range(0, len(walks), config.batch):
+            _play_greedily(executor, lessons, walks[k : k + config.batch], config.horizon)
+    return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
+
+
+def _play_greedily(executor: Executor, lessons: Lessons, walks: Sequence[Walk], horizon: int) -> None:
+    beliefs = executor.network.begin(len(walks)).clone()
+    for _ in range(horizon):
+        alive = [i for i, w in enumerate(walks) if not w.ended]
+        if not alive:
+            return
+        reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
+        rows = [
+            percept(
+                executor.words,
+                lessons.describer.dense(walks[i].place, walks[i].pose.node),
+                walks[i].goal,
+                candidates,
+                walks[i].pose.turn,
+            )
+            for i, (candidates, _) in zip(alive, reach, strict=True)
+        ]
+        beliefs[alive], log_moves = executor.network(beliefs[alive], collate(rows))
+        for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
+            _go(walks[i], column, poses, log_moves.shape[1] - 1)
+
+
+def _validate(
+    executor: Executor, lessons: Lessons, progress: Progress, update: int, folder: Path, note: Note
+) -> Progress:
+    tasks = lessons.validation[: executor.config.validation_tasks]
+    success = pretraining_success(executor, lessons, tasks)
+    with open(folder / "validation.jsonl", "a") as f:
+        f.write(json.dumps({"update": update, "success": success, "episodes": len(tasks)}) + "\n")
+    kept = success >= progress.best
+    note(
+        f"validation on {len(tasks)} tasks after {progress.update} updates: success {100 * success:.1f} %"
+        + "; kept" * kept
+    )
+    if kept:
+        save_executor(executor, folder / "best.safetensors")
+        return dataclasses.replace(progress, best=success, best_update=update)
+    return progress
+
+
+def _save(path: Path, executor: Executor, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
+    body = {
+        "settings": as_dict(executor.config) | {"names": list(executor.words.names)},
+        "network": executor.network.state_dict(),
+        "optimizer": optimizer.state_dict(),
+        "progress": vars(progress),
+    }
+    write_checkpoint(path, FORMAT, body)
+
+
+def _restore(path: Path, executor: Executor, optimizer: torch.optim.Optimizer) -> Progress:
+    if not path.exists():
+        return Progress()
+    body = read_checkpoint(path, FORMAT)
+    refuse_changes(path, body["settings"], as_dict(executor.config) | {"names": list(executor.words.names)}, MAY_CHANGE)
+    executor.network.load_state_dict(body["network"])
+    optimizer.load_state_dict(body["optimizer"])
+    return Progress(**body["progress"])
+
+
+def _line(update: int, seconds: float, config: ExecutionConfig, seen: Sequence[Mapping[str, float]]) -> str:
+    mean = {k: math.fsum(s[k] for s in seen) / len(seen) for k in seen[0]}
+    return (
+        f"{update}/{config.iterations}  loss {mean['loss']:.3f}  right moves {100 * mean['right moves']:.0f} %"
+        f"  {seconds / 60:.1f} min"
+    )

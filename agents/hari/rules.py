@@ -1,0 +1,144 @@
+"""Rules that choose intentions where nothing has learned to: the upper half of Table 4.7."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from agents.hari.agent import Executor
+from agents.hari.networks import INTENTIONS
+from agents.hari.policy import ASKS, DO, DONE, Actions, Belief, Observations, action_of, available, carry, consider
+
+CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What a rule may look at."""
+
+    taken: np.ndarray
+    """(5,) int64: how often each intention was chosen in this episode."""
+    described: bool
+    """Whether CUR was answered since the last move."""
+    would_stop: bool
+    """Whether stopping is the execution policy's likeliest action."""
+    possible: np.ndarray
+    """(5,) bool: what the environment allows."""
+    budget: np.ndarray
+    """(5,) what this episode may take of each, drawn at its beginning."""
+
+
+class Rule(Protocol):
+    def budget(self, rng: np.random.Generator) -> np.ndarray:
+        """(5,) the most that an episode may take of each intention."""
+        ...
+
+    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+        """The next intention, an index into INTENTIONS."""
+        ...
+
+
+@dataclass(frozen=True)
+class AskFirst:
+    """Asks what it always asks, then does, and is done when the execution policy is."""
+
+    goal: bool = False
+    """Ask GOAL once, at the beginning."""
+    state: bool = False
+    """Ask CUR before every move."""
+
+    def budget(self, rng: np.random.Generator) -> np.ndarray:
+        return np.full(len(INTENTIONS), np.inf)
+
+    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+        if self.goal and not moment.taken[GOAL]:
+            return GOAL
+        if self.state and not moment.described:
+            return CUR
+        return DONE if moment.would_stop else DO
+
+
+@dataclass(frozen=True)
+class RandomWithBudgets:
+    """ "Random + rules" of Table 4.7: GOAL first, then at random among what its budgets leave.
+
+    An episode may take at most floor(X_a) + Bernoulli(X_a - floor(X_a)) intentions of kind a, where
+    X_a is the learned policy's mean on validation tasks. DONE is possible where the execution
+    policy would stop (the heading of the table's upper half), and no more often than SUB until
+    SUB's budget is spent. Where nothing else is left, it is done.
+    """
+
+    means: Mapping[str, float]
+    """X_a of 'cur', 'goal', 'sub' and 'do'."""
+
+    def budget(self, rng: np.random.Generator) -> np.ndarray:
+        budget = np.full(len(INTENTIONS), np.inf)
+        for k, name in enumerate(INTENTIONS[:DONE]):
+            whole = np.floor(self.means[name])
+            budget[k] = whole + (rng.random() < self.means[name] - whole)
+        return budget
+
+    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+        if not moment.taken.any() and moment.possible[GOAL] and moment.budget[GOAL] >= 1:
+            return GOAL
+        free = moment.possible & (moment.taken < moment.budget)
+        subs_spent = moment.taken[SUB] >= moment.budget[SUB]
+        free[DONE] = moment.would_stop and (subs_spent or moment.taken[DONE] < moment.taken[SUB])
+        return int(rng.choice(np.flatnonzero(free))) if free.any() else DONE
+
+
+RULES: Mapping[str, AskFirst] = {
+    "no assistance": AskFirst(),
+    "dense goal": AskFirst(goal=True),
+    "dense state": AskFirst(state=True),
+    "dense goal and state": AskFirst(goal=True, state=True),
+}
+"""Rows 1 to 4 of Table 4.7."""
+
+
+@dataclass
+class RuleMemory:
+    """What a rule's agent remembers of B episodes."""
+
+    belief: Belief
+    taken: np.ndarray
+    """(B, 5) int64."""
+    described: np.ndarray
+    """(B,) bool."""
+    budgets: np.ndarray
+    """(B, 5)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RuleAgent:
+    """An execution policy whose intentions follow a rule."""
+
+    executor: Executor
+    rule: Rule
+
+    def act(
+        self, observations: Observations, memory: RuleMemory | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, RuleMemory]:
+        """See embodied.interface.Policy."""
+        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        mind = memory or self._begin(belief, rngs)
+        actions: Actions = [None] * len(observations)
+        taken, described = mind.taken.copy(), mind.described.copy()
+        for k, i in enumerate(considered.rows):
+            seen = observations[i]
+            assert seen is not None  # rows are those that have not ended
+            stop = bool(considered.would_stop[k])
+            moment = Moment(taken[i].copy(), bool(described[i]), stop, available(seen), mind.budgets[i])
+            chosen = self.rule.choose(moment, rngs[i])
+            actions[i] = action_of(chosen, int(considered.best_moves[k]))
+            taken[i, chosen] += 1
+            described[i] = chosen == CUR or (described[i] and chosen != DO)
+        return actions, RuleMemory(carry(considered, actions, belief), taken, described, mind.budgets)
+
+    def _begin(self, belief: Belief, rngs: Sequence[np.random.Generator]) -> RuleMemory:
+        shape = (len(rngs), len(INTENTIONS))
+        budgets = np.stack([self.rule.budget(rng) for rng in rngs])
+        return RuleMemory(belief, np.zeros(shape, dtype=np.int64), np.zeros(len(rngs), dtype=bool), budgets)

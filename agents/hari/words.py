@@ -1,0 +1,150 @@
+"""Descriptions and moves as numbers: one row of five indices per feature set (appendix E).
+
+A feature set is summed up from five embeddings: name, type, horizontal and vertical direction,
+distance. Index 0 of each table is silent; of the names, 1 stands for all that are not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.interface import STEP, TURNS, Candidates, Description, Feature, Observation
+
+TYPES = ("object", "room", "action", "state", "goal")
+"""Of feature sets; the last two mark what is described, as the first token of a description."""
+COLUMNS = 5
+"""Name, type, horizontal, vertical, distance."""
+NAMELESS, UNKNOWN = 0, 1
+SIZES = (1 + len(TYPES), 1 + TURNS, 1 + 3, 1 + 5)
+"""Sizes of the tables of types, horizontal and vertical directions and distances."""
+GO, STOP = Feature("action", "go"), Feature("action", "stop")
+
+
+@dataclass(frozen=True)
+class FeatureWords:
+    """The names that a policy knows, sorted; written with its weights, so that indices mean the same for ever."""
+
+    names: tuple[str, ...]
+    """'object/mug', 'room/kitchen', 'action/go'."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_index", {name: i + UNKNOWN + 1 for i, name in enumerate(self.names)})
+
+    def __len__(self) -> int:
+        """Size of the table of names."""
+        return len(self.names) + UNKNOWN + 1
+
+    def row(self, feature: Feature) -> tuple[int, int, int, int, int]:
+        """The five indices of a feature set; of a room or of stopping only name and type."""
+        index: dict[str, int] = self._index  # type: ignore[attr-defined]  # set in __post_init__
+        name = index.get(f"{feature.kind}/{feature.name}", UNKNOWN)
+        kind = 1 + TYPES.index(feature.kind)
+        if feature.kind == "room" or feature.name == "stop":
+            return name, kind, 0, 0, 0
+        return name, kind, 1 + feature.horizontal, 2 + feature.vertical, 1 + feature.distance
+
+    def rows(self, description: Description, what: str) -> np.ndarray:
+        """(1 + M, 5) int64 of a description of M feature sets; the first row is a marker.
+
+        Args:
+          what: 'state' or 'goal'; a description may be empty, so the marker says that there is one at all.
+        """
+        marker = (NAMELESS, 1 + TYPES.index(what), 0, 0, 0)
+        return np.array([marker, *map(self.row, description)], dtype=np.int64)
+
+
+def feature_words(descriptions: Iterable[Description]) -> FeatureWords:
+    """The names that occur in some (training) descriptions, and the two of actions."""
+    names = {f"{f.kind}/{f.name}" for d in descriptions for f in d} | {f"{f.kind}/{f.name}" for f in (GO, STOP)}
+    return FeatureWords(tuple(sorted(names)))
+
+
+def move_rows(words: FeatureWords, candidates: Candidates) -> np.ndarray:
+    """(n + 1, 5) int64: what an agent may do next as feature sets, like an assistant's "go there"; stopping last.
+
+    Directions are absolute, as those of descriptions; distances are not known before one has walked.
+    """
+    moves = [words.row(Feature("action", "go", int(v) % TURNS, int(v) // TURNS - 1)) for v in candidates.view]
+    return np.array([(*m[:4], 0) for m in moves] + [words.row(STOP)], dtype=np.int64)
+
+
+def move_angles(candidates: Candidates, turn: int) -> np.ndarray:
+    """(n + 1, 4) float32: sine and cosine of the exact absolute direction and slope of each move; zeros for stopping.
+
+    The 30-degree steps of `move_rows` may be alike for two neighbours.
+    """
+    yaw, slope = candidates.bearing + turn * STEP, candidates.slope
+    angles = np.stack([np.sin(yaw), np.cos(yaw), np.sin(slope), np.cos(slope)], axis=1)
+    return np.concatenate([angles, np.zeros((1, 4))]).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What the execution policy reads of B agents at one step; padding rows are zeros."""
+
+    state: np.ndarray
+    """(B, S, 5) int64: d^s."""
+    goal: np.ndarray
+    """(B, G, 5) int64: d^g."""
+    moves: np.ndarray
+    """(B, C + 1, 5) int64: the candidates and, always last, stopping."""
+    angles: np.ndarray
+    """(B, C + 1, 4) float32."""
+    allowed: np.ndarray
+    """(B, C + 1) bool."""
+
+
+@dataclass(frozen=True, eq=False)
+class Percept:
+    """What one agent has before it."""
+
+    state: np.ndarray
+    goal: np.ndarray
+    moves: np.ndarray
+    angles: np.ndarray
+    allowed: np.ndarray
+
+
+def percept(words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int) -> Percept:
+    """One agent's descriptions and moves as rows."""
+    return Percept(
+        words.rows(state, "state"),
+        words.rows(goal, "goal"),
+        move_rows(words, candidates),
+        move_angles(candidates, turn),
+        np.append(candidates.allowed, True),
+    )
+
+
+def percept_of(words: FeatureWords, observation: Observation) -> Percept:
+    """What an agent perceives: d^s, the description on top of the stack, and where it can go."""
+    goals = observation.goal_descriptions
+    return percept(words, observation.state_description, goals[-1], observation.candidates, observation.turn)
+
+
+def collate(percepts: Sequence[Percept]) -> Inputs:
+    """Percepts of B agents side by side, padded; stopping moves to the last column of all."""
+    most = max(len(p.moves) for p in percepts)
+    return Inputs(
+        _padded([p.state for p in percepts]),
+        _padded([p.goal for p in percepts]),
+        np.stack([_stop_last(p.moves, most) for p in percepts]),
+        np.stack([_stop_last(p.angles, most) for p in percepts]),
+        np.stack([_stop_last(p.allowed, most) for p in percepts]),
+    )
+
+
+def _padded(rows: Sequence[np.ndarray]) -> np.ndarray:
+    out = np.zeros((len(rows), max(map(len, rows)), COLUMNS), dtype=np.int64)
+    for i, r in enumerate(rows):
+        out[i, : len(r)] = r
+    return out
+
+
+def _stop_last(rows: np.ndarray, most: int) -> np.ndarray:
+    out = np.zeros((most, *rows.shape[1:]), dtype=rows.dtype)
+    out[: len(rows) - 1], out[-1] = rows[:-1], rows[-1]
+    return out
