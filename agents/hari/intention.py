@@ -110,7 +110,7 @@ class Run:
 
     @property
     def _settings(self) -> dict[str, object]:
-        frozen = sum(float(p.double().sum()) for p in self.agent.executor.network.parameters())
+        frozen = sum(float(p.detach().double().sum()) for p in self.agent.executor.network.parameters())
         return as_dict(self.agent.config) | {"execution policy": round(frozen, 6)}
 
     def save(self, path: Path, progress: Progress) -> None:

@@ -1,0 +1,395 @@
+"""HARI's learner: descriptions as numbers, the networks, returns and signs, and small worlds in which it must learn."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
+
+from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
+from agents.hari.config import ExecutionConfig, IntentionConfig
+from agents.hari.intention import Ground, Run, counts_of, learn_once, train, values
+from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
+from agents.hari.policy import DO, DONE, Choice, HariPolicy, policy_of
+from agents.hari.pretraining import Lessons, pretrain, pretraining_success
+from agents.hari.pretraining import learn_once as lesson
+from agents.hari.rules import RULES, Moment, RandomWithBudgets, RuleAgent
+from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
+from agents.imitation.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
+from agents.imitation.checkpoint import CheckpointError
+from embodied.action_spaces import PanoramicMoves
+from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.assistants.hari import HariAssistant
+from embodied.envs.hari import Costs, HariEnv, shaped_costs
+from embodied.evaluation.rollout import play
+from embodied.house.house import House, Opening, Storey
+from embodied.interface import Ask, Feature, FindObject, Move, Pose, Stop, Task
+from embodied.language.plain import PlainLanguage
+from embodied.tasks.goals import count_hops
+from embodied.tasks.hari import HariConfig, hari_pool, hari_task
+
+SMALL = ExecutionConfig(
+    hidden_size=32, layers=1, heads=2, dropout=0.0, learning_rate=2e-3, iterations=2, batch=8, validate_every=2
+)
+QUICK = IntentionConfig(
+    hidden_size=24, learning_rate=1e-2, batch=16, critic_iterations=1, iterations=2, validate_every=2
+)
+CUR, GOAL, SUB = (INTENTIONS.index(n) for n in ("cur", "goal", "sub"))
+
+
+def silent(line: str) -> None:
+    """Nobody watches."""
+
+
+def fork_world() -> HandWorld:
+    """Three nodes: 0 in the middle of a hall, 1 to the east with a mug, 2 to the west with a book."""
+    hall = room("hall_1", "hall", 0, 0, 14, 2)
+    door = Opening("front_door_1", "front_door", ("hall_1", None), (0, 1.5), (0, 0.5), 0.0, 2.1)
+    things = (thing("mug", 1, "hall_1", 12.8, 1.2), thing("book", 1, "hall_1", 1.2, 1.2))
+    house = House(0, "fork", (Storey(0.0, 2.6),), (hall,), (door,), things, ())
+    return HandWorld(house, hand_graph([[7, 1, 1.5], [13, 1, 1.5], [1, 1, 1.5]], [[0, 1], [0, 2]], ["hall_1"] * 3))
+
+
+def fork_task(goal: int) -> Task:
+    what = FindObject("mug", "hall", ("mug_1",))
+    return Task(f"fork/hari/{goal}", "hari", "fork", Pose(0), what, (goal,), "find a mug in a hall", 0.0, 6)
+
+
+def fork_lessons() -> Lessons:
+    """Both ways of the fork, with the goal described densely or as the next action."""
+    return Lessons(
+        {"fork": fork_world()}, Describer(()), [fork_task(1), fork_task(2)] * 8, [fork_task(1), fork_task(2)]
+    )
+
+
+def grid_lessons() -> tuple[HandWorld, Lessons]:
+    world = grid_world()
+    config = HariConfig(fewest_nodes=1)
+    pool = hari_pool(world, seed=0, config=config)
+    tasks = [hari_task(pool, i, seed=0, language=PlainLanguage(), config=config) for i in range(48)]
+    return world, Lessons({"grid": world}, Describer(frequent_classes([world], 3)), tasks, tasks[:24])
+
+
+def words_of(world: HandWorld) -> FeatureWords:
+    say = Describer(())
+    return feature_words(say.dense(world, v) for v in range(len(world.graph.ids)))
+
+
+# Descriptions as numbers ------------------------------------------------------------------------
+
+
+def test_each_part_of_a_feature_set_has_its_own_column_and_rooms_have_no_direction():
+    words = FeatureWords(("action/go", "action/stop", "object/mug", "room/hall"))
+    assert len(words) == 6
+    assert words.row(Feature("object", "mug", 3, -1, 4)) == (4, 1, 4, 1, 5)
+    assert words.row(Feature("room", "hall")) == (5, 2, 0, 0, 0)
+    assert words.row(Feature("action", "go", 0, 1, 2)) == (2, 3, 1, 3, 3)
+    assert words.row(STOP) == (3, 3, 0, 0, 0)
+    assert words.row(Feature("object", "harp", 3, -1, 4)) == (1, 1, 4, 1, 5), "unknown, but somewhere"
+    assert words.rows((), "goal").tolist() == [[0, 5, 0, 0, 0]], "an empty description is still one"
+
+
+def test_the_move_that_an_assistant_would_name_has_the_same_row_but_for_the_distance():
+    world = grid_world()
+    words, say, moves = words_of(world), Describer(()), PanoramicMoves()
+    for turn in (0, 4, 11):
+        candidates, poses = moves.at(world, Pose(7, turn))
+        rows = move_rows(words, candidates)
+        for row, pose in zip(rows[:-1], poses, strict=True):
+            (said,) = say.step(world, 7, pose.node)
+            assert row[:4].tolist() == list(words.row(said)[:4])
+        assert rows[-1].tolist() == list(words.row(STOP))
+
+
+def test_stopping_is_the_last_column_of_every_agent_and_padding_is_not_allowed():
+    world = grid_world()
+    words, moves = words_of(world), PanoramicMoves()
+    at = lambda node: percept(words, (), (), moves.at(world, Pose(node))[0], 0)
+    degree = [len(moves.at(world, Pose(v))[0]) for v in range(len(world.graph.ids))]
+    corner, middle = at(int(np.argmin(degree))), at(int(np.argmax(degree)))
+    batch = collate([corner, middle])
+    assert len(corner.moves) < len(middle.moves)
+    assert (batch.moves[:, -1] == words.row(STOP)).all() and batch.allowed[:, -1].all()
+    assert batch.allowed.sum(1).tolist() == [len(corner.moves), len(middle.moves)]
+
+
+# Networks ---------------------------------------------------------------------------------------
+
+
+def test_an_agent_thinks_the_same_alone_and_beside_others():
+    world = grid_world()
+    words, moves, say = words_of(world), PanoramicMoves(), Describer(())
+    network = new_executor(SMALL, words).network.eval()
+    some = [
+        percept(words, say.dense(world, v), say.dense(world, 3), moves.at(world, Pose(v))[0], 0) for v in (0, 14, 20)
+    ]
+    with torch.inference_mode():
+        belief, log_moves = network(network.begin(3), collate(some))
+        for i, p in enumerate(some):
+            alone, log_alone = network(network.begin(1), collate([p]))
+            torch.testing.assert_close(belief[i], alone[0], rtol=1e-4, atol=1e-5)
+            torch.testing.assert_close(log_moves[i, : len(p.moves) - 1], log_alone[0, :-1], rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(log_moves.exp().sum(1), torch.ones(3))
+
+
+def test_what_the_intention_policy_is_shown_begins_with_stopping_and_falls():
+    log_moves = torch.tensor([[0.2, 0.5, 0.0, 0.3]]).log()
+    shown = shown_probabilities(log_moves)
+    torch.testing.assert_close(shown[0, :4], torch.tensor([0.3, 0.5, 0.2, 0.0]))
+    assert shown.shape == (1, 9) and shown[0, 4:].sum() == 0
+
+
+# Returns and signs ------------------------------------------------------------------------------
+
+
+def test_costs_to_go_by_hand():
+    costs = torch.tensor([[1.0, 2.0, 4.0], [3.0, 5.0, 99.0]])
+    mask = torch.tensor([[True, True, True], [True, True, False]])
+    assert costs_to_go(costs, mask).tolist() == [[7.0, 6.0, 4.0], [8.0, 5.0, 0.0]]
+
+
+def test_an_intention_that_cost_less_than_expected_becomes_likelier_and_the_critic_comes_nearer():
+    """E.1 is an ascent direction, (V - C) grad log psi; E.2 a descent one."""
+    for cost, likelier in ((1.0, True), (3.0, False)):
+        logits = torch.zeros(1, 5, requires_grad=True)
+        value = torch.full((1, 1), 2.0, requires_grad=True)  # V, a cost
+        log_p = logits.log_softmax(-1)[:, [SUB]]
+        mask = torch.ones(1, 1, dtype=torch.bool)
+        d = Decisions(log_p, -value, -torch.tensor([[cost]]), mask)
+        (actor_loss(d) + critic_loss(d)).backward()
+        assert (logits.grad[0, SUB] < 0) == likelier, "descent on the loss moves against the gradient"
+        assert logits.grad[0, SUB].item() == pytest.approx(-(2.0 - cost) * (1 - 0.2))
+        assert value.grad.item() == pytest.approx(2.0 - cost), "(V - C) grad V of E.2"
+
+
+def test_the_critic_remembers_each_episode_by_itself():
+    torch.manual_seed(0)
+    critic = RecurrentHead(4, 8, 1, knows_stack=True)
+    torch.nn.init.normal_(critic.out.weight)
+    draw = lambda b: (
+        torch.randn(b, 4),
+        torch.rand(b, 9),
+        torch.zeros(b, dtype=torch.long),
+        torch.ones(b, dtype=torch.long),
+    )
+    both, one = draw(2), draw(1)
+    steps = [
+        Choice([0, 1], torch.zeros(2, 5), torch.zeros(2).long(), *both),
+        Choice([1], torch.zeros(1, 5), torch.zeros(1).long(), *one),
+    ]
+    alone = [
+        Choice([0], torch.zeros(1, 5), torch.zeros(1).long(), *(x[1:] for x in both)),
+        Choice([0], torch.zeros(1, 5), torch.zeros(1).long(), *one),
+    ]
+    together = values(critic, steps, 2)
+    torch.testing.assert_close(together[1], values(critic, alone, 1)[0])
+    assert together[0, 1] == 0, "the first episode had ended"
+
+
+# Rules ------------------------------------------------------------------------------------------
+
+
+def moment(taken=(0, 0, 0, 0, 0), described=False, would_stop=False, possible=(True,) * 5, budget=(9,) * 5) -> Moment:
+    return Moment(np.array(taken), described, would_stop, np.array(possible), np.array(budget, dtype=float))
+
+
+def test_the_rules_of_the_table_ask_when_they_say_and_stop_when_the_execution_policy_would():
+    rng = np.random.default_rng(0)
+    assert RULES["no assistance"].choose(moment(), rng) == DO
+    assert RULES["no assistance"].choose(moment(would_stop=True), rng) == DONE
+    both = RULES["dense goal and state"]
+    assert both.choose(moment(would_stop=True), rng) == GOAL
+    assert both.choose(moment(taken=(0, 1, 0, 0, 0)), rng) == CUR
+    assert both.choose(moment(taken=(1, 1, 0, 0, 0), described=True), rng) == DO
+    assert both.choose(moment(taken=(1, 1, 0, 0, 0), described=True, would_stop=True), rng) == DONE
+
+
+def test_random_with_budgets_begins_with_the_goal_spends_no_more_and_keeps_its_means():
+    rule = RandomWithBudgets({"cur": 2.25, "goal": 1.0, "sub": 1.5, "do": 4.0})
+    rng = np.random.default_rng(0)
+    budgets = np.stack([rule.budget(rng) for _ in range(4000)])
+    assert budgets[:, :4].mean(0) == pytest.approx([2.25, 1.0, 1.5, 4.0], abs=0.05)
+    assert set(budgets[:, CUR]) == {2.0, 3.0} and set(budgets[:, GOAL]) == {1.0}
+    for budget in budgets[:50]:
+        taken = np.zeros(5, dtype=int)
+        order = []
+        while DONE not in order or taken[DONE] <= taken[SUB]:
+            choice = rule.choose(moment(taken=taken, would_stop=True, budget=budget), rng)
+            order.append(choice)
+            taken[choice] += 1
+            if choice == DONE and taken[DONE] > taken[SUB]:
+                break
+        assert order[0] == GOAL and (taken[:4] <= budget[:4]).all()
+    assert rule.choose(moment(taken=(0, 1, 0, 0, 0), would_stop=True, budget=(0, 1, 1, 0, 9)), rng) == SUB, (
+        "not DONE first"
+    )
+
+
+# Learning ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fork_executor():
+    """An execution policy that has learned both ways of the fork."""
+    config = dataclasses.replace(SMALL, iterations=60, batch=16, validate_every=60)
+    executor = new_executor(config, words_of(fork_world()))
+    lessons = fork_lessons()
+    optimizer = torch.optim.Adam(executor.network.parameters(), config.learning_rate)
+    for update in range(config.iterations):
+        lesson(executor, optimizer, lessons, update)
+    executor.network.eval()
+    return executor
+
+
+def test_pretraining_learns_a_world_it_can_see(fork_executor):
+    lessons = fork_lessons()
+    assert pretraining_success(fork_executor, lessons, lessons.validation * 8) > 0.9
+    fresh = new_executor(SMALL, fork_executor.words)
+    assert pretraining_success(fresh, lessons, lessons.validation * 8) < 0.9
+
+
+def fork_env() -> HariEnv:
+    """Goals are described by their room alone (nothing is frequent), so only asking tells them apart."""
+    say = Describer(())
+    return HariEnv({"fork": fork_world()}, HariAssistant(say), say, costs=Costs(0.1, 0.1, 0.1, 0.1))
+
+
+def best_costs() -> float:
+    """The least mean cost of both tasks of the fork, over all plans of up to four intentions (enumerated)."""
+    best = {}
+    for plan in itertools.chain.from_iterable(itertools.product(range(5), repeat=n) for n in range(1, 5)):
+        costs = []
+        for goal in (1, 2):
+            env = fork_env()
+            observation = env.reset(fork_task(goal), seed=0)
+            for intention in plan:
+                if observation is None:
+                    break
+                name = INTENTIONS[intention]
+                asks = {i.value: i for i in observation.can_ask}
+                if name in asks:
+                    observation = env.step(Ask(asks[name]))
+                elif name == "done":
+                    observation = env.step(Stop())
+                elif (
+                    name == "do"
+                ):  # a perfect listener: it knows the goal once it was described, else it goes to node 1
+                    told = any(len(d) > 1 or d[0].kind == "action" for d in observation.goal_descriptions)
+                    target = goal if told else 1
+                    column = [p.node for p in env._reach[1]].index(target) if env.pose.node == 0 else 0
+                    observation = env.step(Move(column))
+                else:
+                    break
+            if observation is None:
+                costs.append(sum(s.cost for s in env.episode().steps))
+        if len(costs) == 2:
+            best[plan] = sum(costs) / 2
+    return min(best.values())
+
+
+def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executor):
+    """Enumerated: GOAL (or SUB), DO, DONE costs 0.2; going without asking costs 1.1 on average."""
+    assert best_costs() == pytest.approx(0.2)
+    config = dataclasses.replace(
+        QUICK, cost=0.1, horizon=6, critic_iterations=10, iterations=90, entropy=0.01, batch=24
+    )
+    agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
+    run = Run(agent, new_heads(config, SMALL.hidden_size)[1])
+    world = fork_world()
+    ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
+    hops = {"fork": count_hops(world.graph.next_hop)}
+    for update in range(config.updates):
+        learn_once(run, ground, hops, update)
+    episodes = play(fork_env, policy_of(agent, sample=False), [fork_task(1), fork_task(2)], seed=0)
+    assert all(e.ended == "stop" and e.nodes[-1] in e.task.goal_nodes for e in episodes)
+    assert all(e.requests == 1 for e in episodes), "one question, and not the useless one"
+    assert counts_of(episodes)["cur"] == 0
+    assert sum(s.cost for e in episodes for s in e.steps) / 2 == pytest.approx(best_costs(), abs=0.11)
+
+
+def test_shaped_costs_of_played_episodes_telescope(fork_executor):
+    config = QUICK
+    agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
+    world = fork_world()
+    hops = count_hops(world.graph.next_hop)
+    for episode in play(fork_env, policy_of(agent), [fork_task(1), fork_task(2)] * 5, seed=3, batch=4):
+        plain, shaped = sum(s.cost for s in episode.steps), sum(shaped_costs(episode, hops))
+        assert shaped == pytest.approx(plain - hops[0, episode.task.goal_nodes[0]])
+
+
+def test_an_episode_does_not_depend_on_the_batch_around_it(fork_executor):
+    agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
+    tasks = [dataclasses.replace(fork_task(1 + k % 2), id=f"fork/{k}") for k in range(6)]
+    together = play(fork_env, policy_of(agent), tasks, seed=1, batch=6)
+    alone = [play(fork_env, policy_of(agent), [t], seed=1)[0] for t in reversed(tasks)]
+    assert together == list(reversed(alone))
+    ruled = RuleAgent(fork_executor, RandomWithBudgets({"cur": 1.5, "goal": 1.0, "sub": 0.5, "do": 2.5}))
+    assert play(fork_env, ruled, tasks, seed=1, batch=6) == [play(fork_env, ruled, [t], seed=1)[0] for t in tasks]
+
+
+def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
+    world, lessons = grid_lessons()
+    config = dataclasses.replace(SMALL, iterations=4, dropout=0.1)
+    whole = new_executor(config, words_of(world))
+    pretrain(whole, lessons, tmp_path / "whole", note=silent)
+    half = new_executor(dataclasses.replace(config, iterations=2), words_of(world))
+    pretrain(half, lessons, tmp_path / "parts", note=silent)
+    again = new_executor(config, words_of(world))
+    pretrain(again, lessons, tmp_path / "parts", note=silent)
+    for a, b in zip(whole.network.parameters(), again.network.parameters(), strict=True):
+        assert torch.equal(a, b)
+    with pytest.raises(CheckpointError, match="batch 8 -> 4"):
+        pretrain(
+            new_executor(dataclasses.replace(config, batch=4), words_of(world)),
+            lessons,
+            tmp_path / "parts",
+            note=silent,
+        )
+
+    say = lessons.describer
+    ground = Ground(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
+    runs = {}
+    for name, stops in (("one", (3,)), ("two", (1, 3))):
+        for updates in stops:
+            settings = dataclasses.replace(QUICK, iterations=updates, batch=4, validation_tasks=4)
+            actor, critic = new_heads(settings, SMALL.hidden_size)
+            runs[name] = HariAgent(whole, actor, settings)
+            train(runs[name], critic, ground, ground, tmp_path / name, note=silent)
+    for a, b in zip(runs["one"].actor.parameters(), runs["two"].actor.parameters(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_weights_survive_the_disk_and_say_what_they_lack(tmp_path, fork_executor):
+    agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
+    save_agent(agent, tmp_path / "agent.safetensors")
+    save_executor(fork_executor, tmp_path / "execution.safetensors")
+    again = load_agent(tmp_path / "agent.safetensors")
+    tasks = [fork_task(1), fork_task(2)]
+    assert play(fork_env, policy_of(again), tasks, seed=5) == play(fork_env, policy_of(agent), tasks, seed=5)
+    assert load_executor(tmp_path / "agent.safetensors").words == fork_executor.words
+    with pytest.raises(ValueError, match="execution policy alone.*--execution"):
+        load_agent(tmp_path / "execution.safetensors")
+    (tmp_path / "cut.safetensors").write_bytes((tmp_path / "agent.safetensors").read_bytes()[:500])
+    with pytest.raises(ValueError, match="cut.safetensors"):
+        load_agent(tmp_path / "cut.safetensors")
+
+
+def test_the_skyline_needs_no_execution_policy_on_sub_goals(fork_executor):
+    """With random moves on the main goal, SUB then DO still arrives."""
+    config = dataclasses.replace(QUICK, perfect=True)
+    policy = policy_of(HariAgent(new_executor(SMALL, fork_executor.words), new_heads(config, 32)[0], config))
+    assert isinstance(policy, HariPolicy)
+    for goal in (1, 2):
+        env = fork_env()
+        observation = env.reset(fork_task(goal), seed=0)
+        observation = env.step(Ask(next(i for i in observation.can_ask if i.value == "sub")))
+        memory, rng = None, np.random.default_rng(0)
+        while env.pose.node == 0 and observation is not None:  # whatever it asks: when it does, it goes there
+            (action,), memory = policy.act_privileged([observation], [env.situation], memory, rngs=[rng])
+            if isinstance(action, Move):
+                observation = env.step(action)
+        assert env.pose.node == goal
