@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import joblib
-import numpy as np
-import scipy.stats
 import torch
 
 from agents.bandit.config import BanditConfig
@@ -23,7 +21,7 @@ from agents.bandit.figures import curves_figure, gains_figure
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
 from assets.cache import write_bytes, write_json
-from embodied.evaluation.tables import Estimate
+from embodied.evaluation.tables import Estimate, across_seeds
 
 Note = Callable[[str], None]
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
@@ -126,13 +124,6 @@ def distinct(jobs: Sequence[Job]) -> list[Job]:
 def report(setting: Setting, names: Sequence[str]) -> dict[str, Path]:
     """Write the tables and figures of runs that are there; sweeps show the settings that all seeds have."""
     return {name: {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps}[name](setting) for name in names}
-
-
-def across_seeds(values: Sequence[float]) -> Estimate:
-    """Mean over repeats with Student's 95 % interval; NaN half width for a single one."""
-    n = len(values)
-    half = math.nan if n < 2 else float(scipy.stats.t.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
-    return Estimate(float(np.mean(values)), half, n)
 
 
 def history(setting: Setting, seed: int, job: Job) -> list[dict[str, float]]:

@@ -114,7 +114,7 @@ class Run:
         return as_dict(self.agent.config) | {"execution policy": round(frozen, 6)}
 
     def save(self, path: Path, progress: Progress) -> None:
-        parts = {
+        parts: dict[str, torch.nn.Module | torch.optim.Optimizer] = {
             "actor": self.agent.actor,
             "critic": self.critic,
             "actor optimizer": self.actor_optimizer,

@@ -22,6 +22,7 @@ from embodied.datasets.checks import (
 )
 from embodied.datasets.scale import Scale, scale
 from embodied.envs.base import HelpEnv
+from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import environment_maker
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Place, Route, Task
@@ -160,12 +161,18 @@ class Dataset:
         return tuple(tasks)
 
     def environment(
-        self, split: str, *, language: Language | None = None, worlds: Mapping[str, Place] | None = None
+        self,
+        split: str,
+        *,
+        language: Language | None = None,
+        worlds: Mapping[str, Place] | None = None,
+        hari: HariRules = AS_PRINTED,
     ) -> Callable[[], HelpEnv]:
         """A maker of environments for the tasks of a split; all it makes share their caches.
 
         Args:
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
+          hari: variants of HARI.
         """
         places: Mapping[str, Place] = worlds or self.places(split)
         return environment_maker(
@@ -175,6 +182,7 @@ class Dataset:
             language=language,
             routes={name: self.routes(name) for name in places} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
+            hari=hari,
         )
 
     def describer(self) -> Describer:

@@ -36,6 +36,28 @@ class Costs:
         return getattr(self, action.intention.value) if isinstance(action, Ask) else 0.0
 
 
+@dataclass(frozen=True)
+class HariRules:
+    """What may be varied of HARI's environment; the defaults are Table E.2."""
+
+    costs: Costs = Costs()
+    stack: int = 2
+    """L, the most goals on the stack."""
+    longest: int = 3
+    """l_max, the most nodes to a sub-goal."""
+    cooperative: bool = True
+    """False: the assistant answers a question drawn from those that could be asked (Table 4.7)."""
+    dense_states: bool = False
+    """True: d^s is as rich as the assistant's, always, as for an agent that sees everything."""
+
+    def __post_init__(self) -> None:
+        if min(self.stack, self.longest) < 1:
+            raise ValueError(f"stack {self.stack} and longest {self.longest} should be at least 1")
+
+
+AS_PRINTED = HariRules()
+
+
 @dataclass(frozen=True, slots=True)
 class StackedGoal:
     node: int
@@ -60,9 +82,15 @@ class HariEnv(HelpEnv):
         *,
         costs: Costs = Costs(),
         moves: Moves | None = None,
+        dense_states: bool = False,
     ) -> None:
+        """
+        Args:
+          dense_states: describe where the agent is as richly as the assistant would.
+        """
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs
+        self._see = describer.dense if dense_states else describer.sparse
         self._hops: dict[str, np.ndarray] = {}
 
     def task_error(self, node: int, goal: int) -> float:
@@ -78,7 +106,7 @@ class HariEnv(HelpEnv):
     def _begin(self) -> None:
         goal = self.task.goal_nodes[0]
         self._goals = [StackedGoal(goal, self._describer.sparse(self.world, goal, goal=True), 0)]  # G_1
-        self._state = self._describer.sparse(self.world, self.pose.node)
+        self._state = self._see(self.world, self.pose.node)
 
     def _replied(self, reply: Reply) -> None:
         """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
@@ -95,7 +123,7 @@ class HariEnv(HelpEnv):
         self._on_top()
 
     def _moved(self) -> None:
-        self._state = self._describer.sparse(self.world, self.pose.node)
+        self._state = self._see(self.world, self.pose.node)
         if len(self._goals) > 1:
             top = self._goals[-1]
             self._goals[-1] = StackedGoal(top.node, top.description, top.patience - 1)

@@ -8,10 +8,10 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
 from embodied.assistants.descriptions import Describer, frequent_classes
-from embodied.assistants.hari import HariAssistant
+from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
-from embodied.envs.hari import HariEnv
+from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.vnla import VnlaEnv
 from embodied.interface import Language, Place, Route
 from embodied.language.plain import PlainLanguage
@@ -26,6 +26,7 @@ def environment_maker(
     wording: str = "test",
     describer: Describer | None = None,
     language: Language | None = None,
+    hari: HariRules = AS_PRINTED,
 ) -> Callable[[], HelpEnv]:
     """A maker of environments for a kind of task; all it makes share assistant and caches.
 
@@ -33,6 +34,7 @@ def environment_maker(
       routes: HANNA's, by world; `wording` is the split of them that is spoken.
       describer: HARI's; frequent objects are counted over `worlds` where not given.
       language: of VNLA's advisor.
+      hari: variants of HARI.
 
     Raises:
       ValueError: an unknown kind.
@@ -50,6 +52,8 @@ def environment_maker(
         return lambda: VnlaEnv(worlds, advisor, teacher.moves)
     if kind == "hari":
         say = describer or Describer(frequent_classes(worlds.values()))
-        assistant, moves = HariAssistant(say), PanoramicMoves()
-        return lambda: HariEnv(worlds, assistant, say, moves=moves)
+        willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
+        assistant = willing if hari.cooperative else Uncooperative(willing)
+        moves = PanoramicMoves()
+        return lambda: HariEnv(worlds, assistant, say, costs=hari.costs, moves=moves, dense_states=hari.dense_states)
     raise ValueError(f"unknown kind of task {kind!r}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Ask, Episode, FollowRoute, Mode, Move, Stop
+from embodied.interface import Ask, Episode, FollowRoute, Intention, Mode, Move, Stop
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -158,6 +158,20 @@ def route_sdtw(episode: Episode, graph: NavGraph) -> float:
     return sdtw(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else float("nan")
 
 
+def asked(intention: Intention) -> Callable[[Episode, NavGraph], float]:
+    """How often an episode asked with an intention (Table 4.7)."""
+
+    def count(episode: Episode, graph: NavGraph) -> float:
+        return float(sum(isinstance(s.action, Ask) and s.action.intention is intention for s in episode.steps))
+
+    return count
+
+
+def moves(episode: Episode, graph: NavGraph) -> float:
+    """How often an episode moved: DO of Table 4.7."""
+    return float(sum(isinstance(s.action, Move) for s in episode.steps))
+
+
 PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
     "success": success,
     "spl": spl,
@@ -172,5 +186,6 @@ PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {
     "hanna": {"subtask success": subtask_success},
     "vnla": {"room success": room_success},
     "vln": {"nDTW": route_ndtw, "SDTW": route_sdtw},
+    "hari": {"CUR": asked(Intention.CUR), "GOAL": asked(Intention.GOAL), "SUB": asked(Intention.SUB), "DO": moves},
 }
 """What only some kinds of task report."""

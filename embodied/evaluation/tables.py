@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.stats
 
 from assets.cache import write_bytes
 from embodied.evaluation import metrics
@@ -75,6 +76,13 @@ def estimate(values: Sequence[float], groups: Sequence[str]) -> Estimate:
     k = len(sums)
     variance = math.fsum(s * s for s in sums.values()) / n**2 * (k / (k - 1) if k > 1 else 0.0)
     return Estimate(mean, 1.96 * math.sqrt(variance), n)
+
+
+def across_seeds(values: Sequence[float]) -> Estimate:
+    """Mean over repeats with Student's 95 % interval; NaN half width for a single one."""
+    n = len(values)
+    half = math.nan if n < 2 else float(scipy.stats.t.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    return Estimate(float(np.mean(values)), half, n)
 
 
 def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str]) -> Estimate:

@@ -1,0 +1,89 @@
+"""Judging a HARI agent beside rules: the rows of Table 4.7 for one trained agent."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import torch
+
+from agents.hari.agent import HariAgent
+from agents.hari.intention import counts_of
+from agents.hari.policy import policy_of
+from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
+from agents.hari.run import CONDITIONS, ground_of, rules_of
+from embodied.datasets.store import Dataset
+from embodied.evaluation.evaluate import spread
+from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import Row, row
+from embodied.interface import Agent, Episode, Task
+
+TEST = tuple(f"test_{c}" for c in CONDITIONS)
+COLUMNS = ("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error")
+SHARED = ("random + rules", "learned", "learned, likeliest")
+
+
+@torch.inference_mode()
+def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
+    """The rows of Table 4.7 that one agent gives.
+
+    Args:
+      means: X_a of "random + rules": the agent's mean number of each intention on validation tasks.
+    """
+    return {
+        **{name: RuleAgent(agent.executor, rule) for name, rule in RULES.items()},
+        "random + rules": RuleAgent(agent.executor, RandomWithBudgets(means)),
+        "learned": policy_of(agent),
+        "learned, likeliest": policy_of(agent, sample=False),
+    }
+
+
+def validation_means(data: Dataset, agent: HariAgent, *, seed: int, tasks: int) -> dict[str, float]:
+    """The agent's mean number of each intention on validation tasks of all three conditions."""
+    ground = ground_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
+    asked = [dataclasses.replace(t, horizon=agent.config.horizon) for t in ground.tasks]
+    with torch.inference_mode():
+        return counts_of(play(ground.make_env, policy_of(agent), asked, seed=seed, batch=agent.config.batch))
+
+
+def judge(
+    data: Dataset,
+    agent: HariAgent,
+    splits: Sequence[str] = TEST,
+    *,
+    seed: int = 0,
+    limit: int | None = None,
+    only: Sequence[str] = (),
+    keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
+    watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+) -> list[Row]:
+    """One row per policy and split, over the same tasks, in the environment that the agent was trained for.
+
+    Args:
+      limit: at most so many tasks per split, from all houses alike.
+      only: names of rows; none for all.
+      keep: is given split, name and episodes (to save them).
+
+    Raises:
+      ValueError: an unknown row.
+    """
+    judged = policies(agent, validation_means(data, agent, seed=seed, tasks=agent.config.validation_tasks))
+    if unknown := sorted(set(only) - set(judged)):
+        raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
+    rows = []
+    for split in splits:
+        tasks = [dataclasses.replace(t, horizon=agent.config.horizon) for t in spread(data.tasks(split), limit)]
+        for name in watch(only or list(judged)):
+            episodes = _play(data, split, judged[name], tasks, agent, seed)
+            rows.append(row(name, split, episodes, {n: p.graph for n, p in data.places(split).items()}, seed=seed))
+            if keep:
+                keep(split, name, episodes)
+    return rows
+
+
+def _play(
+    data: Dataset, split: str, policy: Agent, tasks: Sequence[Task], agent: HariAgent, seed: int
+) -> list[Episode]:
+    make_env = data.environment(split, hari=rules_of(agent.config))
+    with torch.inference_mode():
+        return play(make_env, policy, tasks, seed=seed, batch=agent.config.batch)

@@ -1,0 +1,102 @@
+"""What the commands of HARI do: a data set becomes lessons and grounds, lessons an executor, grounds an agent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from agents.hari.agent import Executor, HariAgent, load_executor, new_executor, new_heads
+from agents.hari.config import ExecutionConfig, IntentionConfig
+from agents.hari.intention import Ground, train
+from agents.hari.pretraining import Lessons, pretrain
+from agents.hari.words import feature_words
+from agents.imitation.loop import Note, Progress
+from embodied.datasets.store import Dataset
+from embodied.envs.base import HelpEnv
+from embodied.envs.hari import Costs, HariRules
+from embodied.evaluation.evaluate import spread
+from embodied.interface import Place
+
+CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
+"""What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
+
+
+def hari_data(folder: Path) -> Dataset:
+    """A HARI data set.
+
+    Raises:
+      ValueError: it is of another kind.
+    """
+    data = Dataset(folder)
+    if data.kind != "hari":
+        raise ValueError(
+            f"{folder} is a data set of {data.kind!r}, HARI learns from its own: embodied dataset hari --out DIR"
+        )
+    return data
+
+
+def lessons_of(data: Dataset) -> Lessons:
+    """The pre-training splits."""
+    places: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
+    validation = spread(data.tasks("pretrain_val"), None)
+    return Lessons(places, data.describer(), data.tasks("pretrain"), validation)
+
+
+def rules_of(config: IntentionConfig) -> HariRules:
+    """The environment that an intention policy is trained for."""
+    cost = config.cost
+    return HariRules(Costs(cost, cost, cost, cost), config.stack, config.longest, config.cooperative)
+
+
+def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
+    """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
+    makers: dict[str, Callable[[], HelpEnv]] = {s: data.environment(s, hari=rules_of(config)) for s in splits}
+    each = None if limit is None else -(-limit // len(splits))
+    tasks = [t for s in splits for t in spread(data.tasks(s), each)]
+    places: Mapping[str, Place] = {name: place for s in splits for name, place in data.places(s).items()}
+    return Ground(places, tasks, makers[splits[0]] if len(splits) == 1 else _over(makers[splits[0]], places))
+
+
+def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:
+    """Environments of one split with the houses of several."""
+
+    def made() -> HelpEnv:
+        env = make()
+        env.worlds = places
+        return env
+
+    return made
+
+
+def train_execution(
+    data: Dataset, config: ExecutionConfig, folder: Path, *, minutes: float | None = None, note: Note = print
+) -> Progress:
+    """Train, or go on training, the execution policy of a run folder."""
+    lessons = lessons_of(data)
+    describe = lessons.describer.dense
+    houses = {t.world for t in lessons.training}
+    places = [lessons.places[name] for name in sorted(houses)]
+    words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
+    executor = new_executor(config, words)
+    size = sum(p.numel() for p in executor.network.parameters())
+    note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(words)} names, {size:,} parameters")
+    return pretrain(executor, lessons, folder, minutes=minutes, note=note)
+
+
+def train_intention(
+    data: Dataset,
+    executor: Executor | Path,
+    config: IntentionConfig,
+    folder: Path,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
+) -> Progress:
+    """Train, or go on training, the intention policy of a run folder over a trained execution policy."""
+    executor = load_executor(executor) if isinstance(executor, Path) else executor
+    actor, critic = new_heads(config, executor.config.hidden_size)
+    training = ground_of(data, ["train"], config)
+    validation = ground_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
+    size = sum(p.numel() for p in actor.parameters())
+    note(f"{len(training.tasks)} tasks in {len(training.places)} houses, {size:,} parameters of each head")
+    return train(HariAgent(executor, actor, config), critic, training, validation, folder, minutes=minutes, note=note)

@@ -1,0 +1,222 @@
+"""Tables 4.7 and 4.8 and Figures 4.5 and 4.6: train what is missing, judge it, print it beside the dissertation's.
+
+A study is a folder: `execution` holds the execution policy, `VARIANT/seed_N` an intention policy
+and what it did in `episodes`. Variants that tables share are trained once, and everything goes on
+where it stopped.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import joblib
+import numpy as np
+import torch
+
+from agents.hari.agent import load_agent, load_executor
+from agents.hari.config import ExecutionConfig, IntentionConfig
+from agents.hari.figures import costs_figure, requests_figure, times_figure
+from agents.hari.judging import TEST, judge
+from agents.hari.networks import INTENTIONS
+from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention
+from agents.imitation.loop import Note
+from assets.cache import write_bytes
+from embodied.evaluation.tables import Estimate, across_seeds, as_json, save, shown
+from embodied.interface import Ask, Episode, Move
+from embodied.records import load_lines, save_lines
+
+VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
+COSTS = (0.01, 0.05, 0.1, 0.2, 0.5)
+HORIZONS = (10, 20, 30)
+"""Figure 4.6."""
+VARIANTS: Mapping[str, Mapping[str, object]] = {
+    "learned": {},
+    "uncooperative": {"cooperative": False},
+    "skyline": {"perfect": True},
+    "stack 1": {"stack": 1},
+    "stack 3": {"stack": 3},
+    **{f"cost {c:g}, H {h}": {"cost": c, "horizon": h} for c in COSTS for h in HORIZONS if (c, h) != (0.01, 30)},
+}
+"""Name of a variant to what differs from the settings of the study."""
+RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", "random + rules")
+PRINTED: Mapping[str, str] = {
+    "no assistance": "43.4 / 16.4 / 3.0 (–, –, –, 13.1)",
+    "dense goal": "67.2 / 56.6 / 9.7 (–, 1.0, –, 12.6)",
+    "dense state": "77.9 / 30.6 / 4.1 (12.0, –, –, 12.0)",
+    "dense goal and state": "97.8 / 81.7 / 9.4 (11.0, 1.0, –, 11.0)",
+    "random + rules": "78.8 / 68.5 / 12.7 (2.0, 1.0, 1.7, 11.3)",
+    "learned": "85.8 / 78.2 / 19.8 (2.1, 1.0, 1.7, 11.1)",
+    "uncooperative": "81.1 / 71.2 / 16.1 (2.7, 2.7, 1.5, 9.6)",
+    "skyline": "94.3 / 95.1 / 92.6 (0.0, 0.0, 6.3, 7.3)",
+    "stack 1": "92.2 / 78.4 / 12.5 (5.1, 1.9, 0.0, 10.7)",
+    "stack 2": "86.9 / 77.6 / 21.6 (2.1, 1.0, 1.7, 11.2)",
+    "stack 3": "83.2 / 78.6 / 33.5 (1.3, 1.0, 5.0, 8.2)",
+}
+"""Success on unseen starts, objects and environments, and CUR, GOAL, SUB, DO, of Tables 4.7 and 4.8."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all runs of a study share."""
+
+    data: Path
+    out: Path
+    execution: ExecutionConfig
+    intention: IntentionConfig
+    """Its seed is the first one."""
+    executor: Path | None = None
+    """A trained execution policy; None trains one into the study's folder."""
+    seeds: int = 3
+    """Intention policies of each variant."""
+    tasks: int | None = None
+    """Judge on at most so many tasks of a split."""
+    threads: int = 1
+    """Of PyTorch, per run."""
+
+    @property
+    def repeats(self) -> list[int]:
+        return [self.intention.seed + k for k in range(self.seeds)]
+
+    def folder(self, variant: str, seed: int) -> Path:
+        return self.out / variant.replace(" ", "_").replace(",", "") / f"seed_{seed}"
+
+
+TABLES: Mapping[str, Sequence[str]] = {
+    "4.7": ("learned", "uncooperative", "skyline"),
+    "4.8": ("stack 1", "learned", "stack 3"),
+    "figure 4.5": ("learned",),
+    "figure 4.6": tuple(v for v in VARIANTS if v.startswith("cost ")) + ("learned",),
+}
+"""Table or figure to the variants it needs."""
+
+
+def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+    """Train and judge what is missing and write tables and figures; returns the Markdown files.
+
+    Results do not depend on `workers`.
+
+    Raises:
+      ValueError: an unknown table.
+    """
+    if unknown := [n for n in names if n not in TABLES]:
+        raise ValueError(f"unknown tables {unknown}; HARI's are {list(TABLES)}")
+    executor = setting.executor or setting.out / "execution" / "best.safetensors"
+    if setting.executor is None:
+        torch.set_num_threads(setting.threads)
+        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note)
+    jobs = [(v, s) for v in dict.fromkeys(v for n in names for v in TABLES[n]) for s in setting.repeats]
+    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
+    for line in parallel(joblib.delayed(_run)(setting, executor, v, s, note) for v, s in jobs):
+        note(line)
+    writers: Mapping[str, Callable[[Setting], Path]] = {
+        "4.7": lambda x: _write_table(x, "4.7", [*RULE_ROWS, *TABLES["4.7"]], "test"),
+        "4.8": lambda x: _write_table(x, "4.8", TABLES["4.8"], "val"),
+        "figure 4.5": _write_behaviour,
+        "figure 4.6": _write_costs,
+    }
+    return {name: writers[name](setting) for name in names}
+
+
+def _run(setting: Setting, executor: Path, variant: str, seed: int, note: Note) -> str:
+    """Train one intention policy and judge it on validation and test splits, unless that is done."""
+    torch.set_num_threads(setting.threads)
+    data, folder = hari_data(setting.data), setting.folder(variant, seed)
+    config = dataclasses.replace(setting.intention, seed=seed, **VARIANTS[variant])  # type: ignore[arg-type]
+    quiet: Note = lambda line: None
+    train_intention(data, load_executor(executor), config, folder, note=note if seed == setting.repeats[0] else quiet)
+    agent, rows = load_agent(folder / "best.safetensors"), []
+    if (folder / "rows.json").exists():
+        return f"{variant}, seed {seed}: judged before"
+
+    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
+        if name == "learned":
+            save_lines(folder / "episodes" / f"{split}.jsonl", episodes)
+
+    only = ("learned", *(RULE_ROWS if variant == "learned" else ()))
+    rows = judge(data, agent, (*VALIDATION, *TEST), seed=seed, limit=setting.tasks, only=only, keep=keep)
+    save(rows, folder, "table")
+    write_bytes(folder / "rows.json", as_json(rows).encode())
+    return f"{variant}, seed {seed}: trained and judged"
+
+
+def rows_of(setting: Setting, name: str, split: str) -> list[dict[str, float]]:
+    """The means of one row of a table on one split, per seed."""
+    variant = "learned" if name in RULE_ROWS else name
+    row = name if name in RULE_ROWS else "learned"
+    found = []
+    for seed in setting.repeats:
+        body = json.loads((setting.folder(variant, seed) / "rows.json").read_text())
+        (mine,) = [r for r in body if r["agent"] == row and r["split"] == split]
+        found.append({k: v["mean"] for k, v in mine["values"].items()})
+    return found
+
+
+def estimates(setting: Setting, name: str, split: str, column: str) -> Estimate:
+    """A number of a row over seeds, with Student's interval."""
+    return across_seeds([r[column] for r in rows_of(setting, name, split)])
+
+
+def _write_table(setting: Setting, table: str, names: Sequence[str], when: str) -> Path:
+    """Success per condition, and actions over all of them, beside what the dissertation prints."""
+    splits = [f"{when}_{c}" for c in CONDITIONS]
+    heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for name in names:
+        successes = [shown("success", estimates(setting, name, s, "success")) for s in splits]
+        actions = [f"{np.mean([estimates(setting, name, s, a).mean for s in splits]):.1f}" for a in heads[4:8]]
+        shown_name = "stack 2" if table == "4.8" and name == "learned" else name
+        lines.append("| " + " | ".join([shown_name, *successes, *actions, PRINTED[shown_name]]) + " |")
+    about = f"{setting.seeds} training seeds per row; ± is Student's 95 % interval over them.\n"
+    path = setting.out / f"table_{table}.md"
+    write_bytes(path, ("\n".join([*lines, "", about])).encode())
+    return path
+
+
+def _write_behaviour(setting: Setting) -> Path:
+    """Figure 4.5: which requests are made in which condition, and when."""
+    per_condition = {
+        c: {a: estimates(setting, "learned", f"val_{c}", a) for a in ("CUR", "GOAL", "SUB")} for c in CONDITIONS
+    }
+    episodes = [
+        e
+        for seed in setting.repeats
+        for e in load_lines(setting.folder("learned", seed) / "episodes" / "val_unseen_env.jsonl", Episode)
+    ]
+    requests_figure(per_condition, setting.out / "figure_4_5a.png")
+    times_figure(intentions_by_time(episodes, setting.intention.horizon), setting.out / "figure_4_5b.png")
+    path = setting.out / "figure_4_5.md"
+    write_bytes(path, b"![Requests per condition](figure_4_5a.png)\n![Intentions by time](figure_4_5b.png)\n")
+    return path
+
+
+def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> np.ndarray:
+    """(horizon, 5): how many of the episodes chose each intention at each time step."""
+    counts = np.zeros((horizon, len(INTENTIONS)))
+    for episode in episodes:
+        for t, step in enumerate(episode.steps[:horizon]):
+            action = step.action
+            name = action.intention.value if isinstance(action, Ask) else "do" if isinstance(action, Move) else "done"
+            counts[t, INTENTIONS.index(name)] += 1
+    return counts
+
+
+def _write_costs(setting: Setting) -> Path:
+    """Figure 4.6: success and actions against the cost of an action, for several horizons."""
+    variant = lambda c, h: "learned" if (c, h) == (0.01, 30) else f"cost {c:g}, H {h}"
+    success = {
+        (condition, h): [estimates(setting, variant(c, h), f"val_{condition}", "success") for c in COSTS]
+        for condition in CONDITIONS
+        for h in HORIZONS
+    }
+    actions = {
+        a: [float(np.mean([estimates(setting, variant(c, 30), f"val_{k}", a).mean for k in CONDITIONS])) for c in COSTS]
+        for a in ("CUR", "GOAL", "SUB", "DO")
+    }
+    costs_figure(COSTS, success, actions, setting.out / "figure_4_6.png")
+    path = setting.out / "figure_4_6.md"
+    write_bytes(path, b"![Success and actions against cost](figure_4_6.png)\n")
+    return path
