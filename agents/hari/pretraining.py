@@ -225,7 +225,7 @@ def _validate(
         f.write(json.dumps({"update": update, "success": success, "episodes": len(tasks)}) + "\n")
     kept = success >= progress.best
     note(
-        f"validation on {len(tasks)} tasks after {progress.update} updates: success {100 * success:.1f} %"
+        f"validation on {len(tasks)} tasks after {update} updates: success {100 * success:.1f} %"
         + "; kept" * kept
     )
     if kept:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from agents.hanna.training_config import SCALES, TrainingConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import VisionConfig
 from assets.cache import default_cache
@@ -121,6 +122,54 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     add_fields(parser, TrainingConfig)
 
 
+def add_train_hari(parser: argparse.ArgumentParser) -> None:
+    """Two phases, one after the other."""
+    phases = parser.add_subparsers(dest="phase", metavar="PHASE", required=True)
+    execution = phases.add_parser("execution", help="first: to understand descriptions and walk by them (DAgger)")
+    _add_hari(execution, EXECUTION_SCALES)
+    add_fields(execution, ExecutionConfig, scales=EXECUTION_SCALES)
+    intention = phases.add_parser("intention", help="then: which question to ask when (actor-critic)")
+    _add_hari(intention, INTENTION_SCALES)
+    intention.add_argument(
+        "--execution", type=Path, required=True, metavar="FILE", help="a trained execution policy (best.safetensors)"
+    )
+    add_fields(intention, IntentionConfig, scales=INTENTION_SCALES)
+
+
+def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
+    add_common(parser)
+    parser.set_defaults(threads=1)
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="run folder; an interrupted run goes on from it"
+    )
+    parser.add_argument(
+        "--scale", choices=sorted(scales), default="mini", help="settings to start from (default: %(default)s)"
+    )
+    parser.add_argument("--minutes", type=float, help="stop after this long; the same command goes on")
+
+
+def add_study_hari(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.7, 4.8, 'figure 4.5' or 'figure 4.6'")
+    _add_hari(parser, INTENTION_SCALES)
+    parser.add_argument(
+        "--execution", type=Path, metavar="FILE", help="a trained execution policy (default: trained in --out first)"
+    )
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=3,
+        metavar="N",
+        help="agents per row, from --seed on (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--tasks", type=int, metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
+    )
+    add_fields(parser, IntentionConfig, scales=INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))
+
+
 def add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2 or houses")
     add_common(parser)
@@ -157,7 +206,7 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)"
     )
-    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
+    parser.add_argument("--split", nargs="+", help="which splits (default: test_unseen; HARI: all three of test)")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
     parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")

@@ -1,4 +1,4 @@
-"""Teach: the encoder that sees (vision), or the agent that navigates and asks for help (hanna).
+"""Teach: the encoder that sees (vision), or an agent that navigates and asks for help (hanna, hari).
 
 Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
 not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
@@ -29,13 +29,15 @@ def add(parser: argparse.ArgumentParser) -> None:
         "hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__
     )
     learning.add_train_hanna(hanna)
+    hari = kinds.add_parser("hari", help="the agent that learns which question to ask", description=run_hari.__doc__)
+    learning.add_train_hari(hari)
     hanna.add_argument(
         "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    return run_vision(args) if args.what == "vision" else run_hanna(args)
+    return {"vision": run_vision, "hanna": run_hanna, "hari": run_hari}[args.what](args)
 
 
 def run_vision(args: argparse.Namespace) -> int:
@@ -56,6 +58,25 @@ def run_hanna(args: argparse.Namespace) -> int:
     return run_train_hanna(
         args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None
     )
+
+
+def run_hari(args: argparse.Namespace) -> int:
+    """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
+    import torch
+
+    from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
+    from agents.hari.run import hari_data, train_execution, train_intention
+    from embodied.cli.learning import chosen
+
+    torch.set_num_threads(args.threads)
+    data = hari_data(args.data)
+    if args.phase == "execution":
+        config = chosen(args, EXECUTION_SCALES[args.scale])
+        train_execution(data, config, args.out, minutes=args.minutes, note=note)
+    else:
+        config = chosen(args, INTENTION_SCALES[args.scale])
+        train_intention(data, args.execution, config, args.out, minutes=args.minutes, note=note)
+    return 0
 
 
 def _recorder(args: argparse.Namespace):
