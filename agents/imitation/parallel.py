@@ -52,6 +52,17 @@ def check_device(device: str) -> None:
         raise UnableError(f"--device {device} cannot be used here ({str(e).splitlines()[0]}); use --device cpu") from e
 
 
+def use_threads(threads: int) -> None:
+    """Let PyTorch use so many threads on the CPU.
+
+    Raises:
+      ValueError: fewer than one.
+    """
+    if threads < 1:
+        raise ValueError(f"--threads should be at least 1, got {threads}")
+    torch.set_num_threads(threads)
+
+
 def share(items: Sequence[T]) -> Sequence[T]:
     """What this process works on: every n-th item."""
     return items[rank() :: processes()]

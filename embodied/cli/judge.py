@@ -37,10 +37,9 @@ def run(args: argparse.Namespace) -> int:
 
 def run_hari(args: argparse.Namespace) -> int:
     """Rows of Table 4.7 for one agent."""
-    import torch
-
     from agents.hari.agent import load_agent
     from agents.hari.judging import COLUMNS, TEST, judge
+    from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT
     from embodied.datasets.store import Dataset
     from embodied.evaluation.tables import as_json, markdown, save
@@ -48,7 +47,7 @@ def run_hari(args: argparse.Namespace) -> int:
 
     if args.agent == SHIPPED_AGENT:
         raise ValueError("no HARI agent ships yet; name yours with --agent (`embodied train hari`)")
-    torch.set_num_threads(args.threads)
+    use_threads(args.threads)
 
     def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
         if args.out:

@@ -62,13 +62,12 @@ def run_hanna(args: argparse.Namespace) -> int:
 
 def run_hari(args: argparse.Namespace) -> int:
     """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
-    import torch
-
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention
+    from agents.imitation.parallel import use_threads
     from embodied.cli.learning import chosen
 
-    torch.set_num_threads(args.threads)
+    use_threads(args.threads)
     data = hari_data(args.data)
     if args.phase == "execution":
         config = chosen(args, EXECUTION_SCALES[args.scale])
