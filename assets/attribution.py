@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from assets.cache import write_bytes
-from assets.catalogue import DATA, Catalogue
-from assets.rows import read_json
+from assets.catalogue import Catalogue
+from assets.records import Asset
+from assets.rows import DATA, read_json
 
 LICENCES = {
     "CC0-1.0": "https://creativecommons.org/publicdomain/zero/1.0/",
@@ -26,7 +27,7 @@ def attribution(catalogue: Catalogue) -> str:
         "(http://www.sweethome3d.com), and are converted, resized and decimated on import.",
         "This file is written by `embodied assets attribution`.",
     ]
-    by_pack: dict[str, list] = {}
+    by_pack: dict[str, list[Asset]] = {}
     for asset in catalogue.assets.values():
         if not asset.key.startswith("built/") and "+" not in asset.key:
             by_pack.setdefault(asset.pack, []).append(asset)

@@ -2,30 +2,34 @@
 
 `data/classes.json` says once per object class what its models share (how they are supported,
 the rooms they belong in, synonyms, what they rest on); `data/catalogue.json` has one line per
-model and may override any of it. Meshes come from the packs, or the makers of built things, on
-first use.
+model and may override any of it; `data/built.json` has one line per thing that code builds.
+Meshes come from the packs, or the makers of built things, on first use.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
 from tqdm import tqdm
 
+from assets import materials
+from assets.built import MAKERS
 from assets.cache import default_cache
-from assets.importing.importer import Recipe, import_model, scaled
-from assets.importing.own import OwnModel, import_own, read_own
+from assets.importing.importer import import_model, scaled
+from assets.importing.own import OwnModel, import_own, read_own, source_digest
 from assets.importing.packs import find_packs, pack_of
 from assets.importing.sh3f import open_pack
-from assets.records import Asset, Finish, MeshPart
-from assets.rows import CatalogueError, check_classes, read_json, read_models
+from assets.records import Asset, Finish, MeshPart, Recipe
+from assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
 
-DATA = Path(__file__).parent / "data"
+__all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
+
+Params = tuple[tuple[str, str | float], ...]
+"""What a maker of built things is told, by name."""
 
 
 class Catalogue:
@@ -38,7 +42,7 @@ class Catalogue:
         cache: Path,
         packs: Sequence[Path] = (),
         own: Mapping[str, OwnModel] = MappingProxyType({}),
-    ):
+    ) -> None:
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
         self.cache = Path(cache)
         self.packs = tuple(packs)
@@ -46,6 +50,10 @@ class Catalogue:
         self._own = dict(own)
         self._imported = functools.lru_cache(maxsize=512)(self._import)
         self._scaled = functools.lru_cache(maxsize=1024)(self._scale)
+
+    def __reduce__(self) -> tuple[type[Catalogue], tuple[object, ...]]:
+        """What another process needs to make it again; meshes are read from the cache there."""
+        return Catalogue, (dict(self.assets), self._recipes, self.cache, self.packs, self._own)
 
     @functools.cached_property
     def classes(self) -> tuple[str, ...]:
@@ -64,7 +72,7 @@ class Catalogue:
         return self._by_class.get(name, ())
 
     def mesh(
-        self, key: str, size: tuple[float, float, float] | None = None, params: tuple[tuple[str, str | float], ...] = ()
+        self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
     ) -> tuple[MeshPart, ...]:
         """The parts of an asset at `size` (its own if None); the caller must not change the arrays.
 
@@ -72,8 +80,8 @@ class Catalogue:
           CatalogueError: unknown key.
           PackError, MeshError: the model's pack is missing or damaged.
         """
-        own = self._asset(key).size
-        return self._scaled(key, tuple(own if size is None else size), tuple(params))
+        x, y, z = self._asset(key).size if size is None else size
+        return self._scaled(key, (x, y, z), tuple(params))
 
     def parameters(self, key: str) -> Mapping[str, str | float]:
         """What the maker of a built asset can be told, with its usual values; empty for models.
@@ -82,7 +90,15 @@ class Catalogue:
           CatalogueError: unknown key.
         """
         self._asset(key)
-        return _makers()[key].look if key not in self._recipes else {}
+        return MAKERS[key].look if key not in self._recipes else {}
+
+    def own_digests(self, keys: Iterable[str]) -> dict[str, str]:
+        """Hex digests of the files of those of `keys` that are a user's own models, which may change any day.
+
+        Raises:
+          MeshError, PackError: a file is gone since the catalogue was read.
+        """
+        return {key: source_digest(self._own[key]) for key in sorted(set(keys)) if key in self._own}
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
@@ -110,15 +126,15 @@ class Catalogue:
         pack = pack_of(model, self.packs)
         return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[model].rotation), self.cache)
 
-    def _scale(self, key: str, size: tuple[float, float, float], params: tuple) -> tuple[MeshPart, ...]:
+    def _scale(self, key: str, size: tuple[float, float, float], params: Params) -> tuple[MeshPart, ...]:
         if key not in self._recipes:
-            return _makers()[key].make(size, params, self.finish)
+            return MAKERS[key].make(size, params, self.finish)
         own = self.assets[key].size
-        return scaled(self._imported(key), tuple(s / o for s, o in zip(size, own)))
+        return scaled(self._imported(key), (size[0] / own[0], size[1] / own[1], size[2] / own[2]))
 
     def finish(self, material_key: str) -> Finish:
         """The finish of a procedural material; its maps are written to the cache on first use."""
-        return importlib.import_module("assets.materials").finish(material_key, self.cache)
+        return materials.finish(material_key, self.cache)
 
 
 def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
@@ -129,11 +145,10 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    classes = read_json(DATA / "classes.json")
-    check_classes("classes.json", classes)
-    rows, licences = read_json(DATA / "catalogue.json"), read_json(DATA / "packs.json")
-    assets, recipes = read_models("catalogue.json", rows, classes, licences)
-    assets |= {key: maker.asset for key, maker in sorted(_makers().items())}
+    classes = check_classes("classes.json", read_json(DATA / "classes.json"))
+    licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
+    assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
+    assets |= {key: maker.asset for key, maker in MAKERS.items()}
     models: dict[str, OwnModel] = {}
     for folder in own:
         more, more_recipes, more_models = read_own(Path(folder), classes)
@@ -141,11 +156,3 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
     return Catalogue(assets, recipes, cache or default_cache(), packs, models)
-
-
-def _makers() -> Mapping:
-    """The makers of built things by key."""
-    try:
-        return getattr(importlib.import_module("assets.built"), "MAKERS", {})
-    except ModuleNotFoundError:
-        return {}

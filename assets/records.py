@@ -1,4 +1,4 @@
-"""The asset records: what a thing is, how it looks, where it may stand."""
+"""The asset records: what a thing is, how it looks, where it may stand, how a model is imported."""
 
 from __future__ import annotations
 
@@ -39,6 +39,10 @@ SUPPORTS = ("floor", "against_wall", "corner", "surface", "wall", "ceiling")
 floor in a corner, on another object's support surface, hung on a wall, hung from the ceiling.
 What goes in a corner has its back (+y) to one wall and, by its tag, its left side ('corner_left',
 -x) or its right side ('corner_right', +x) to the other."""
+
+
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+"""The row-major 3x3 rotation that turns nothing."""
 
 
 @dataclass(frozen=True)
@@ -133,3 +137,30 @@ class Asset:
     pack: str = ""
     creator: str = ""
     licence: str = ""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that decides what an import gives, beside the pack itself."""
+
+    key: str
+    size: tuple[float, float, float]
+    """Width, depth, height, metres."""
+    yaw: float = 0.0
+    """Degrees counter-clockwise that bring the model's front to -y."""
+    rotation: tuple[float, ...] = IDENTITY
+    two_sided: tuple[str, ...] = ()
+    """Materials whose faces are also seen from behind: leaves, sheets; '*' is all of them."""
+    flipped: tuple[str, ...] = ()
+    """Materials whose faces the pack winds inside out."""
+    glow: tuple[str, ...] = ()
+    """Materials that glow when the lamp is on."""
+    emits: tuple[float, float, float] | None = None
+    dropped: tuple[str, ...] = ()
+    """Materials that are left out: shadows painted on the floor, helper planes."""
+    looks: tuple[tuple[str, str], ...] = ()
+    """Material and the reviewer's words for it (assets.importing.mtl_finish.corrected)."""
+    faces: int = 0
+    """Face budget; 0 takes FACE_BUDGETS."""
+    model: str = ""
+    """The model that this one is a variant of, where it is one."""

@@ -11,16 +11,14 @@ from assets.built.maker import (
     PORCELAIN,
     FinishOf,
     Look,
-    Maker,
+    Size,
     carcass,
     front,
     handle,
-    maker,
     material,
     metal,
     parts_of,
     plain,
-    surface,
 )
 from assets.built.primitives import (
     Shape,
@@ -44,7 +42,7 @@ BATH = {"bathroom": 1.0, "toilet": 0.4}
 BASINS = ("bathroom vanity", "washbasin", "wall washbasin", "double vanity")
 
 
-def vanity(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A drawer cabinet hung off the floor, a ceramic top with an oval basin, a mixer tap."""
     w, d, h = size
     tap = 0.14
@@ -81,7 +79,7 @@ def vanity(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def shower(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def shower(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A corner shower: tray, two glass screens (one with a way in), mixer, rail and head on the back wall."""
     w, d, h = size
     rim, t = 0.045, 0.05
@@ -151,7 +149,7 @@ def _draped(w: float, h: float, d: float, *, rng: np.random.Generator) -> Shape:
     return sheet(np.stack([xx, yy, z[:, None] + 0 * xx], -1), 0.006)
 
 
-def towel_rail(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def towel_rail(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A rail on two posts with a towel over it."""
     w, d, h = size
     y, z = -d * 0.1, h - 0.035
@@ -175,7 +173,7 @@ def towel_rail(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     )
 
 
-def hanging_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def hanging_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A towel on a hook: gathered above, falling in folds."""
     w, d, h = size
     rows, cols = 16, 30
@@ -193,12 +191,12 @@ def hanging_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     return parts_of((CHROME, hook), (material(look, "cloth", finish, "terry/0"), cloth))
 
 
-def towels(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def towels(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Folded towels on one another."""
     return parts_of((material(look, "cloth", finish, "terry/0"), layers(size, int(look.get("layers", 3)), rng=rng)))
 
 
-def bath_mat(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bath_mat(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A thick terry mat with a flat hem."""
     w, d, h = size
     hem = [box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.55], 0.003)]
@@ -206,7 +204,7 @@ def bath_mat(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     return parts_of((material(look, "cloth", finish, "terry/0"), [*hem, pile]))
 
 
-def toilet_brush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def toilet_brush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
     r = w / 2
     cup = lathe([(0, 0), (r, 0), (r, h * 0.42), (r * 0.86, h * 0.42), (r * 0.84, h * 0.1), (0, h * 0.1)], 24)
@@ -219,7 +217,7 @@ def toilet_brush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of((metal(look, finish, "white"), cup), (CHROME, [stick, lid]))
 
 
-def soap_dispenser(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def soap_dispenser(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     r = min(w, d) * 0.5
     body = lathe(
@@ -251,7 +249,7 @@ def soap_dispenser(size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     return parts_of((colour, body), (CHROME if look.get("colour") != "black" else plain((0.1, 0.1, 0.1), 0.4), pump))
 
 
-def toothbrush_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def toothbrush_cup(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
     r, cup = w / 2, h * 0.5
     body = lathe([(0, 0), (r * 0.9, 0), (r * 0.97, cup), (r * 0.87, cup), (r * 0.8, 0.008), (0, 0.008)], 22)
@@ -268,7 +266,7 @@ def toothbrush_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     return parts_of((PORCELAIN, body), *brushes)
 
 
-def paper_roll(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def paper_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A toilet roll on a wall bracket, its end hanging."""
     w, d, h = size
     r = min(h * 0.42, d * 0.42)
@@ -292,7 +290,7 @@ def paper_roll(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), (CHROME, [arm, plate]))
 
 
-def bin_(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bin_(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A round bin: open waste basket, or pedal bin where look['lid'] is 1."""
     w, d, h = size
     r = w / 2
@@ -310,7 +308,7 @@ def bin_(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return parts_of((main, [shell, lid]), (plain((0.06, 0.06, 0.06), 0.5), pedal))
 
 
-def laundry_basket(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def laundry_basket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Wickerwork with a rolled rim and clothes looking out."""
     w, d, h = size
     body = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.06).buffer(0.06, quad_segs=4)
@@ -346,251 +344,3 @@ def laundry_basket(size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         (material(look, "skin", finish, "wicker/0"), [*lay, bottom, rim]),
         (material(look, "cloth", finish, "cotton/3"), heap),
     )
-
-
-def bath_makers() -> list[Maker]:
-    made = []
-    for name, wood, colour, metal_name in (
-        ("oak", "oak/0", "brown", "black"),
-        ("white", "lacquer_white/0", "white", "steel"),
-        ("walnut", "walnut/0", "dark brown", "brass"),
-        ("navy", "lacquer_navy_blue/0", "blue", "brass"),
-    ):
-        made.append(
-            maker(
-                f"vanity_{name}",
-                "bathroom vanity",
-                f"{name} vanity with a basin",
-                (0.8, 0.48, 0.99),
-                vanity,
-                support="against_wall",
-                rooms=BATH,
-                clearance=0.7,
-                synonyms=("washbasin", "sink", "basin"),
-                colours=(colour, "white"),
-                materials=("wood", "ceramic"),
-                surfaces=(
-                    surface("rim_left", 0.85, 0.14, 0.44, x=-0.33),
-                    surface("rim_right", 0.85, 0.14, 0.44, x=0.33),
-                ),
-                look={"front": wood, "metal": metal_name, "style": "shaker" if name == "navy" else "flat"},
-            )
-        )
-    made.append(
-        maker(
-            "shower",
-            "shower",
-            "glass shower",
-            (0.9, 0.9, 2.05),
-            shower,
-            support="corner",
-            rooms={"bathroom": 1.0},
-            clearance=0.6,
-            synonyms=("shower cubicle",),
-            colours=("white",),
-            materials=("glass",),
-        )
-    )
-    for i, colour in enumerate(("white", "grey", "blue", "sand", "green", "pink", "navy blue")):
-        cloth, words = {"cloth": f"terry/{i}"}, {"colours": (colour.split()[-1],), "materials": ("terry", "fabric")}
-        stem = colour.replace(" ", "_")
-        made.append(
-            maker(
-                f"towel_rail_{stem}",
-                "towel rail",
-                f"rail with a {colour} towel",
-                (0.6, 0.11, 0.55),
-                towel_rail,
-                support="wall",
-                elevation=0.75,
-                rooms=BATH,
-                synonyms=("towel holder",),
-                look=cloth,
-                **words,
-            )
-        )
-        made.append(
-            maker(
-                f"hanging_towel_{stem}",
-                "hanging towel",
-                f"{colour} towel on a hook",
-                (0.30, 0.12, 0.75),
-                hanging_towel,
-                support="wall",
-                elevation=0.85,
-                rooms=BATH,
-                synonyms=("towel",),
-                look=cloth,
-                **words,
-            )
-        )
-        made.append(
-            maker(
-                f"towels_{stem}",
-                "towel",
-                f"folded {colour} towels",
-                (0.34, 0.26, 0.16),
-                towels,
-                on=(
-                    *BASINS,
-                    "shelving unit",
-                    "cupboard",
-                    "stool",
-                    "bathtub",
-                    "washing machine",
-                    "tumble dryer",
-                    "open wall shelf",
-                    "storage shelf",
-                ),
-                rooms={**BATH, "laundry_room": 1.0},
-                synonyms=("towels",),
-                look=cloth,
-                **words,
-            )
-        )
-        if i < 5:
-            made.append(
-                maker(
-                    f"bath_mat_{stem}",
-                    "bath mat",
-                    f"{colour} bath mat",
-                    (0.75, 0.5, 0.018),
-                    bath_mat,
-                    support="floor",
-                    rooms={"bathroom": 1.0},
-                    synonyms=("mat",),
-                    tags=("flat",),
-                    look=cloth,
-                    **words,
-                )
-            )
-    made.append(
-        maker(
-            "toilet_brush_white",
-            "toilet brush",
-            "white toilet brush",
-            (0.10, 0.10, 0.38),
-            toilet_brush,
-            support="floor",
-            rooms={"toilet": 1.0, "bathroom": 1.0},
-            colours=("white",),
-            materials=("plastic",),
-            look={"metal": "white"},
-        )
-    )
-    made.append(
-        maker(
-            "toilet_brush_steel",
-            "toilet brush",
-            "steel toilet brush",
-            (0.09, 0.09, 0.38),
-            toilet_brush,
-            support="floor",
-            rooms={"toilet": 1.0, "bathroom": 1.0},
-            colours=("silver",),
-            materials=("steel",),
-            look={"metal": "steel"},
-        )
-    )
-    made.append(
-        maker(
-            "toilet_paper",
-            "toilet paper holder",
-            "toilet roll on its holder",
-            (0.14, 0.13, 0.16),
-            paper_roll,
-            support="wall",
-            elevation=0.62,
-            rooms={"toilet": 1.0, "bathroom": 1.0},
-            synonyms=("toilet roll",),
-            colours=("white",),
-            materials=("metal", "paper"),
-        )
-    )
-    for colour in ("white", "black", "amber", "green"):
-        made.append(
-            maker(
-                f"soap_dispenser_{colour}",
-                "soap dispenser",
-                f"{colour} soap dispenser",
-                (0.07, 0.075, 0.17),
-                soap_dispenser,
-                on=(*BASINS, "kitchen sink"),
-                rooms={**BATH, "kitchen": 0.3},
-                synonyms=("soap",),
-                colours=(colour.replace("amber", "brown"),),
-                materials=("ceramic",),
-                look={"colour": colour},
-            )
-        )
-    made.append(
-        maker(
-            "toothbrush_cup",
-            "toothbrush cup",
-            "cup with toothbrushes",
-            (0.085, 0.085, 0.19),
-            toothbrush_cup,
-            on=BASINS,
-            rooms={"bathroom": 1.0},
-            synonyms=("toothbrushes",),
-            colours=("white",),
-            materials=("ceramic",),
-        )
-    )
-    for name, extra, colour in (
-        ("white", {"metal": "white"}, "white"),
-        ("black", {"metal": "black"}, "black"),
-        ("wicker", {"skin": "wicker/0"}, "beige"),
-    ):
-        made.append(
-            maker(
-                f"waste_bin_{name}",
-                "waste bin",
-                f"{name} waste bin",
-                (0.26, 0.26, 0.30),
-                bin_,
-                support="floor",
-                rooms={"study": 1.0, "bathroom": 0.6, "bedroom": 0.5, "kids_room": 0.6, "main_bedroom": 0.4},
-                synonyms=("bin", "wastebasket"),
-                colours=(colour,),
-                materials=("metal" if name != "wicker" else "wicker",),
-                look=extra,
-            )
-        )
-    for name, extra, size in (
-        ("steel", {"skin": "brushed_steel/0"}, (0.30, 0.30, 0.62)),
-        ("white", {"metal": "white"}, (0.22, 0.22, 0.30)),
-        ("black", {"metal": "black"}, (0.30, 0.30, 0.60)),
-    ):
-        made.append(
-            maker(
-                f"pedal_bin_{name}",
-                "trash can",
-                f"{name} pedal bin",
-                size,
-                bin_,
-                support="floor",
-                rooms={"kitchen": 1.0, "bathroom": 0.6},
-                synonyms=("bin", "garbage can", "pedal bin"),
-                colours=(name.replace("steel", "silver"),),
-                materials=("steel",),
-                look={"lid": 1.0, **extra},
-            )
-        )
-    for i, name in enumerate(("natural", "dark", "white")):
-        made.append(
-            maker(
-                f"laundry_basket_{name}",
-                "laundry basket",
-                f"{name} wicker laundry basket",
-                (0.48, 0.36, 0.42),
-                laundry_basket,
-                support="floor",
-                rooms={"laundry_room": 1.0, "bathroom": 0.6, "main_bedroom": 0.3},
-                synonyms=("hamper", "washing basket"),
-                colours=("beige", "brown", "white")[i : i + 1],
-                materials=("wicker",),
-                look={"skin": f"wicker/{i}", "cloth": ("cotton/3", "cotton/0", "cotton/2")[i]},
-            )
-        )
-    return made

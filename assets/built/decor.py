@@ -15,8 +15,7 @@ from assets.built.maker import (
     WHITE,
     FinishOf,
     Look,
-    Maker,
-    maker,
+    Size,
     material,
     metal,
     parts_of,
@@ -24,7 +23,6 @@ from assets.built.maker import (
     whole_image,
 )
 from assets.built.primitives import Shape, ball, box, cylinder, flat, lathe, moved, quads, scaled, sheet, tube, turned
-from assets.materials import MATERIALS
 from assets.records import MeshPart
 
 LIVING = {
@@ -43,7 +41,7 @@ LIVING = {
 FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 
-def picture(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Framed art: a moulded frame, a mat where look['mat'] > 0, the picture, glass over paper."""
     w, d, h = size
     name = str(look.get("frame", "oak/0"))
@@ -91,14 +89,14 @@ def _inset(corners, by: float) -> list[tuple[float, float]]:
     return [(x0 + by, z0 + by), (x1 - by, z0 + by), (x1 - by, z1 - by), (x0 + by, z1 - by)]
 
 
-def canvas(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def canvas(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A painting on a stretched canvas without a frame."""
     w, d, h = size
     art = material(look, "art", finish, "art_brushwork/0")
     return parts_of((art, whole_image(box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002), art, -w / 2, w / 2, 0, h)))
 
 
-def poster(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def poster(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Unframed paper on the wall, its corners coming off a little."""
     w, d, h = size
     x, z = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(0, h, 9))
@@ -108,7 +106,7 @@ def poster(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     return parts_of((art, whole_image(sheet(np.stack([x, y, z], -1), 0.0004), art, -w / 2, w / 2, 0, h)))
 
 
-def mirror(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def mirror(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A looking-glass in a slim frame; round where look['round'] is 1."""
     w, d, h = size
     y0, f = -d / 2, float(look.get("width", 0.016))
@@ -154,7 +152,7 @@ def _faces_front(shape: Shape) -> bool:
     return float(np.cross(b - a, c - a)[1]) < 0
 
 
-def wall_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def wall_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A round case with a printed dial behind glass."""
     w, d, h = size
     case = lathe([(0, 0), (0.5, 0), (0.5, 0.7 * d), (0.485, d), (0.455, d), (0.45, 0.75 * d), (0.45, 0.72 * d)], 40)
@@ -167,7 +165,7 @@ def wall_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return parts_of((metal(look, finish, "black"), case), (face, disc))
 
 
-def vase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A turned vase, with dry branches where look['branches'] is 1."""
     w, _, h = size
     branches = bool(look.get("branches"))
@@ -219,139 +217,3 @@ def vase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return parts_of(
         (clay, lathe(profile, 28, 0.9)), (plain((0.32, 0.23, 0.16), 0.9), twigs), (plain((0.86, 0.80, 0.72), 0.9), buds)
     )
-
-
-def decor_makers() -> list[Maker]:
-    made = []
-    frames = (("oak/0", "oak"), ("black", "black"), ("white", "white"), ("walnut/0", "walnut"), ("brass", "golden"))
-    halls = {**LIVING, "corridor": 1.0, "hall": 1.0, "kids_room": 0.4}
-    art = [m for m in MATERIALS.values() if m.family == "art"]
-    for i, m in enumerate(art):
-        stem = m.key.replace("/", "_")
-        frame, word = frames[i % 5]
-        words = {"support": "wall", "rooms": halls, "elevation": 1.2, "colours": m.colours, "materials": m.materials}
-        if m.materials == ("canvas",):
-            made.append(
-                maker(
-                    stem,
-                    "painting",
-                    m.name,
-                    (0.9, 0.035, 0.7),
-                    canvas if i % 2 else picture,
-                    synonyms=("picture",),
-                    look={
-                        "art": m.key,
-                        "frame": "brass" if i % 3 == 0 else frame,
-                        "width": 0.045 if i % 3 == 0 else 0.02,
-                    },
-                    **words,
-                )
-            )
-        else:
-            made.append(
-                maker(
-                    stem,
-                    "picture",
-                    f"{m.name} in a {word} frame",
-                    (0.6, 0.025, 0.8),
-                    picture,
-                    synonyms=("framed picture", "print"),
-                    look={"art": m.key, "frame": frame, "mat": 0.10 if i % 2 else 0.0},
-                    **words,
-                )
-            )
-        if "poster" in stem:
-            made.append(
-                maker(
-                    f"paper_{stem}",
-                    "poster",
-                    m.name,
-                    (0.5, 0.012, 0.7),
-                    poster,
-                    look={"art": m.key},
-                    **{**words, "rooms": {"kids_room": 1.0, "bedroom": 0.5, "study": 0.4, "gym": 0.6}},
-                )
-            )
-    for name, frame, is_round, size in (
-        ("black", "black", 0, (0.6, 0.025, 0.9)),
-        ("oak", "oak/0", 0, (0.7, 0.03, 1.1)),
-        ("brass", "brass", 0, (0.6, 0.03, 0.9)),
-        ("round", "black", 1, (0.7, 0.03, 0.7)),
-        ("round_brass", "brass", 1, (0.6, 0.03, 0.6)),
-        ("white", "white", 0, (0.6, 0.03, 0.8)),
-    ):
-        made.append(
-            maker(
-                f"mirror_{name}",
-                "mirror",
-                ("round " if is_round else "") + f"mirror in a {frame.split('/')[0].replace('brass', 'golden')} frame",
-                size,
-                mirror,
-                support="wall",
-                elevation=1.2,
-                rooms={"bathroom": 1.0, "hall": 0.8, "main_bedroom": 0.6, "bedroom": 0.4, "toilet": 0.8, "closet": 0.6},
-                colours=(frame.split("/")[0],),
-                materials=("glass",),
-                tags=("round",) if is_round else (),
-                look={"frame": frame, "round": is_round},
-            )
-        )
-    for i, (name, rim) in enumerate((("white", "black"), ("black", "black"), ("cream", "brass"))):
-        made.append(
-            maker(
-                f"wall_clock_{name}",
-                "wall clock",
-                f"{name} wall clock",
-                (0.3, 0.045, 0.3),
-                wall_clock,
-                support="wall",
-                elevation=1.8,
-                rooms={"kitchen": 1.0, "living_room": 0.5, "study": 0.6, "hall": 0.4},
-                synonyms=("clock",),
-                colours=(name,),
-                materials=("metal",),
-                look={"face": f"clock_face/{i}", "metal": rim},
-            )
-        )
-    for glaze in ("white", "blue", "green", "terracotta", "black"):
-        spots = (
-            "sideboard",
-            "dining table",
-            "coffee table",
-            "bookcase",
-            "console",
-            "dresser",
-            "side table",
-            "fireplace",
-            "cupboard",
-        )
-        made.append(
-            maker(
-                f"vase_{glaze}",
-                "vase",
-                f"{glaze} vase",
-                (0.14, 0.14, 0.26),
-                vase,
-                on=spots,
-                rooms=LIVING,
-                colours=(glaze,),
-                materials=("ceramic",),
-                look={"glaze": glaze},
-            )
-        )
-        if glaze in ("white", "black", "terracotta"):
-            made.append(
-                maker(
-                    f"vase_branches_{glaze}",
-                    "vase",
-                    f"{glaze} vase with branches",
-                    (0.34, 0.34, 0.75),
-                    vase,
-                    on=spots,
-                    rooms=LIVING,
-                    colours=(glaze,),
-                    materials=("ceramic",),
-                    look={"glaze": glaze, "branches": 1.0},
-                )
-            )
-    return made

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from assets.built.maker import FinishOf, Look, Maker, maker, material, metal, parts_of, plain
+from assets.built.maker import FinishOf, Look, Size, material, metal, parts_of, plain
 from assets.built.primitives import Shape, ball, bar, box, extruded, joined, lathe, moved, scaled, sheet, tube, turned
 from assets.records import MeshPart
 
 
-def shoes(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def shoes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A pair of low shoes, one a little askew."""
     w, d, h = size
     colour = {
@@ -70,7 +70,7 @@ def _sole(outline: np.ndarray, y: np.ndarray) -> Shape:
     return extruded(shapely.Polygon(ring).buffer(0), 0, 0.026)
 
 
-def coat_hooks(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def coat_hooks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A board with hooks, some of them with coats, a bag or a scarf."""
     w, d, h = size
     top = h - 0.10
@@ -121,7 +121,7 @@ def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
     return joined(body, *sleeves, collar)
 
 
-def umbrella_stand(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def umbrella_stand(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A tall pot with two umbrellas."""
     w, _, h = size
     r, pot = w / 2, h * 0.58
@@ -148,108 +148,8 @@ def umbrella_stand(size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     )
 
 
-def doormat(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def doormat(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     edge = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.6], 0.002)
     mat = box([-w / 2 + 0.02, -d / 2 + 0.02, 0], [w / 2 - 0.02, d / 2 - 0.02, h], 0.004)
     return parts_of((plain((0.06, 0.06, 0.06), 0.8), edge), (material(look, "skin", finish, "sisal/0"), mat))
-
-
-def entry_makers() -> list[Maker]:
-    made = []
-    for colour in ("black", "brown", "white", "blue"):
-        made.append(
-            maker(
-                f"shoes_{colour}",
-                "shoes",
-                f"pair of {colour} shoes",
-                (0.22, 0.29, 0.11),
-                shoes,
-                support="floor",
-                rooms={"hall": 1.0, "closet": 1.0, "bedroom": 0.2, "main_bedroom": 0.2},
-                synonyms=("pair of shoes",),
-                colours=(colour,),
-                materials=("leather",),
-                look={"colour": colour},
-            )
-        )
-    for k, wood in enumerate(("oak/0", "lacquer_white/0", "walnut/0")):
-        made.append(
-            maker(
-                f"coat_hooks_{k}",
-                "coat hooks",
-                "coat hooks with coats",
-                (0.9, 0.28, 1.1),
-                coat_hooks,
-                support="wall",
-                elevation=0.68,
-                rooms={"hall": 1.0, "closet": 0.4},
-                synonyms=("coat rack", "coats"),
-                colours=("brown", "white", "dark brown")[k : k + 1],
-                materials=("wood", "fabric"),
-                look={"wood": wood, "coats": 3 - k % 2, "seed": k, "metal": "black" if k else "brass"},
-            )
-        )
-    made.append(
-        maker(
-            "umbrella_stand",
-            "umbrella stand",
-            "stand with two umbrellas",
-            (0.24, 0.24, 0.85),
-            umbrella_stand,
-            support="floor",
-            rooms={"hall": 1.0},
-            synonyms=("umbrellas",),
-            colours=("black",),
-            materials=("metal",),
-        )
-    )
-    made.append(
-        maker(
-            "doormat",
-            "doormat",
-            "brown doormat",
-            (0.75, 0.45, 0.016),
-            doormat,
-            support="floor",
-            rooms={"hall": 1.0},
-            synonyms=("mat",),
-            colours=("brown",),
-            materials=("coir",),
-            tags=("flat",),
-        )
-    )
-    made.append(
-        maker(
-            "doormat_grey",
-            "doormat",
-            "grey doormat",
-            (0.80, 0.50, 0.016),
-            doormat,
-            support="floor",
-            rooms={"hall": 1.0},
-            synonyms=("mat",),
-            colours=("grey",),
-            materials=("coir",),
-            tags=("flat",),
-            look={"skin": "sisal/1"},
-        )
-    )
-    dict.fromkeys(
-        (
-            "living_room",
-            "kitchen",
-            "dining_room",
-            "main_bedroom",
-            "bedroom",
-            "kids_room",
-            "bathroom",
-            "hall",
-            "corridor",
-            "study",
-            "guest_room",
-            "toilet",
-        ),
-        1.0,
-    )
-    return made

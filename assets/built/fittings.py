@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import BLACK, WHITE, FinishOf, Look, Maker, maker, material, parts_of, plain
+from assets.built.maker import BLACK, WHITE, FinishOf, Look, Size, material, parts_of, plain
 from assets.built.primitives import box, cylinder, lathe, moved, tube, turned
 from assets.records import MeshPart
 
 
-def switch(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def switch(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     plate = box([-w / 2, -d * 0.1, 0], [w / 2, d / 2, h], 0.002)
     rocker = turned(box([-w * 0.33, -d * 0.35, -h * 0.33], [w * 0.33, d * 0.2, h * 0.33], 0.0015), 0.05, "x")
     return parts_of((WHITE, [plate, moved(rocker, 0, -d * 0.1, h / 2)]))
 
 
-def socket(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def socket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     plate = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002)
     ring = moved(
@@ -35,7 +35,7 @@ def socket(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     return parts_of((WHITE, [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), (BLACK, holes))
 
 
-def radiator(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Panel radiator with ribs, grille and valve; or columns where look['kind'] is 'columns'."""
     w, d, h = size
     made = []
@@ -72,73 +72,3 @@ def radiator(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
         (plain((0.35, 0.35, 0.35), 0.6), grille),
         (WHITE, knob),
     )
-
-
-def fittings_makers() -> list[Maker]:
-    made = []
-    everywhere = dict.fromkeys(
-        (
-            "living_room",
-            "kitchen",
-            "dining_room",
-            "main_bedroom",
-            "bedroom",
-            "kids_room",
-            "bathroom",
-            "hall",
-            "corridor",
-            "study",
-            "guest_room",
-            "toilet",
-        ),
-        1.0,
-    )
-    made.append(
-        maker(
-            "light_switch",
-            "light switch",
-            "white light switch",
-            (0.08, 0.012, 0.08),
-            switch,
-            support="wall",
-            elevation=1.06,
-            rooms=everywhere,
-            synonyms=("switch",),
-            colours=("white",),
-            materials=("plastic",),
-        )
-    )
-    made.append(
-        maker(
-            "wall_socket",
-            "wall socket",
-            "white wall socket",
-            (0.08, 0.010, 0.08),
-            socket,
-            support="wall",
-            elevation=0.26,
-            rooms=everywhere,
-            synonyms=("power outlet", "socket"),
-            colours=("white",),
-            materials=("plastic",),
-        )
-    )
-    warm = {**everywhere, "library": 1.0, "playroom": 1.0, "family_room": 1.0}
-    for kind, size in (("panel", (1.0, 0.10, 0.55)), ("panel", (0.6, 0.10, 0.6)), ("columns", (0.8, 0.12, 0.6))):
-        made.append(
-            maker(
-                f"radiator_{kind}_{round(size[0] * 100)}",
-                "radiator",
-                "white radiator",
-                size,
-                radiator,
-                support="wall",
-                elevation=0.1,
-                rooms=warm,
-                synonyms=("heater",),
-                colours=("white",),
-                materials=("metal",),
-                look={"kind": kind},
-            )
-        )
-    return made

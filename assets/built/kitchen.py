@@ -14,16 +14,14 @@ from assets.built.maker import (
     WHITE,
     FinishOf,
     Look,
-    Maker,
+    Size,
     carcass,
     front,
     handle,
-    maker,
     material,
     metal,
     parts_of,
     plain,
-    surface,
 )
 from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube
 from assets.records import MeshPart
@@ -32,16 +30,6 @@ TOP = 0.038
 """Thickness of the worktop, metres."""
 PLINTH = (0.10, 0.06)
 """Height of the plinth and how far it stands back, metres."""
-
-SETS = (
-    ("white", "white", ("white",), "lacquer_white/0", "oak_worktop/0", "flat", "bar", "steel"),
-    ("oak", "oak", ("brown", "white"), "oak/0", "quartz/0", "flat", "bar", "black"),
-    ("sage", "sage green", ("green",), "lacquer_sage_green/0", "marble/0", "shaker", "knob", "brass"),
-    ("navy", "navy blue", ("blue",), "lacquer_navy_blue/0", "oak_worktop/0", "shaker", "cup", "brass"),
-    ("grey", "grey", ("grey",), "lacquer_grey/0", "granite/0", "flat", "bar", "steel"),
-    ("cream", "cream", ("cream", "beige"), "lacquer_cream/0", "beech_worktop/0", "shaker", "knob", "steel"),
-    ("anthracite", "anthracite", ("black", "grey"), "lacquer_anthracite/0", "quartz/1", "flat", "bar", "black"),
-)
 
 
 def _base(
@@ -61,7 +49,7 @@ def _base(
     )
 
 
-def base(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def base(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Doors, or drawers where look['drawers'] > 0, under a worktop."""
     w, d, h = size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
@@ -84,7 +72,7 @@ def base(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return _base(size, look, finish, doors, grips, None)
 
 
-def corner(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def corner(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A blind corner unit: one door, one fixed filler."""
     w, d, h = size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
@@ -94,7 +82,7 @@ def corner(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     return _base(size, look, finish, doors, grips, None)
 
 
-def sink(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def sink(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A base unit with a steel basin let into the worktop, and a mixer tap behind it."""
     w, d, h = size
     tap_rise = 0.30
@@ -158,7 +146,7 @@ def _facing_up(shape: Shape) -> Shape:
     return quads(np.array(done))
 
 
-def cooker(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Built-in oven with a glass door under a ceramic hob in the worktop."""
     w, d, h = size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
@@ -196,7 +184,7 @@ def _knob() -> Shape:
     return Shape(m, t.faces, n, t.uv)
 
 
-def wall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Doors on a box; glazed where look['glazed'] is 1."""
     w, d, h = size
     y = -d / 2 + 0.002
@@ -235,7 +223,7 @@ def wall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     )
 
 
-def tall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Larder unit: a tall door over a short one."""
     w, d, h = size
     y = -d / 2 + 0.002
@@ -251,7 +239,7 @@ def tall_cabinet(size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of((material(look, "front", finish, "lacquer_white/0"), [*doors, side]), (metal(look, finish), grips))
 
 
-def island(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def island(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Cabinets on one side, a panelled back, a thick overhanging top for stools."""
     w, d, h = size
     bw, back = w - 0.06, d / 2 - min(0.28, d * 0.3)
@@ -279,7 +267,7 @@ def island(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def hood(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def hood(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Chimney hood: a flat canopy, a slope, a shaft up the wall."""
     w, d, h = size
     rim, slope = 0.05, min(0.16, h * 0.3)
@@ -301,139 +289,6 @@ def hood(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
         (plain((0.95, 0.93, 0.88), 0.3), lamps),
     )
-
-
-def kitchen_makers() -> list[Maker]:
-    made = []
-    kitchen = {"kitchen": 1.0}
-    for name, word, colours, fronts, top, style, grip, metal_name in SETS:
-        look = {"front": fronts, "worktop": top, "style": style, "handle": grip, "metal": metal_name}
-        tags = (f"line_built_{name}",)
-        words = {"colours": colours, "materials": ("wood",), "tags": tags, "look": look}
-        stand = {"support": "against_wall", "rooms": kitchen, "clearance": 0.9, **words}
-        made += [
-            maker(
-                f"base_cabinet_{name}",
-                "base cabinet",
-                f"{word} base cabinet",
-                (0.6, 0.6, 0.9),
-                base,
-                surfaces=(surface("top", 0.9, 0.6, 0.6),),
-                synonyms=("counter", "kitchen cabinet"),
-                **stand,
-            ),
-            maker(
-                f"drawer_cabinet_{name}",
-                "drawer cabinet",
-                f"{word} kitchen drawers",
-                (0.6, 0.6, 0.9),
-                base,
-                surfaces=(surface("top", 0.9, 0.6, 0.6),),
-                synonyms=("counter",),
-                **{**stand, "look": {**look, "drawers": 3}},
-            ),
-            maker(
-                f"kitchen_sink_{name}",
-                "kitchen sink",
-                f"{word} sink unit",
-                (0.6, 0.6, 1.2),
-                sink,
-                synonyms=("sink",),
-                **stand,
-            ),
-            maker(
-                f"cooker_{name}",
-                "cooker",
-                f"{word} cooker with hob",
-                (0.6, 0.6, 0.908),
-                cooker,
-                synonyms=("stove", "oven"),
-                **stand,
-            ),
-            maker(
-                f"corner_base_{name}",
-                "corner base cabinet",
-                f"{word} corner cabinet",
-                (0.9, 0.6, 0.9),
-                corner,
-                surfaces=(surface("top", 0.9, 0.9, 0.6),),
-                **stand,
-            ),
-            maker(
-                f"wall_cabinet_{name}",
-                "wall cabinet",
-                f"{word} wall cabinet",
-                (0.6, 0.35, 0.7),
-                wall_cabinet,
-                support="wall",
-                elevation=1.45,
-                rooms=kitchen,
-                synonyms=("kitchen cabinet",),
-                **words,
-            ),
-            maker(
-                f"tall_cabinet_{name}", "tall cabinet", f"{word} larder cabinet", (0.6, 0.6, 2.1), tall_cabinet, **stand
-            ),
-            maker(
-                f"island_{name}",
-                "kitchen island",
-                f"{word} kitchen island",
-                (1.8, 0.95, 0.92),
-                island,
-                surfaces=(surface("top", 0.92, 1.8, 0.95),),
-                support="floor",
-                rooms=kitchen,
-                clearance=0.9,
-                **words,
-            ),
-        ]
-        if style == "shaker":
-            made.append(
-                maker(
-                    f"glass_cabinet_{name}",
-                    "glass-door cabinet",
-                    f"{word} glass-door cabinet",
-                    (0.6, 0.35, 0.7),
-                    wall_cabinet,
-                    support="wall",
-                    elevation=1.45,
-                    rooms=kitchen,
-                    **{**words, "look": {**look, "glazed": 1.0}},
-                )
-            )
-    made.append(
-        maker(
-            "range_hood",
-            "range hood",
-            "steel chimney hood",
-            (0.6, 0.48, 0.75),
-            hood,
-            support="wall",
-            elevation=1.55,
-            rooms=kitchen,
-            synonyms=("cooker hood", "extractor"),
-            colours=("silver",),
-            materials=("steel",),
-            tags=tuple(f"line_built_{s[0]}" for s in SETS),
-        )
-    )
-    made.append(
-        maker(
-            "range_hood_black",
-            "range hood",
-            "black chimney hood",
-            (0.9, 0.48, 0.75),
-            hood,
-            support="wall",
-            elevation=1.55,
-            rooms=kitchen,
-            synonyms=("cooker hood", "extractor"),
-            colours=("black",),
-            materials=("steel",),
-            look={"metal": "black"},
-        )
-    )
-    return made
 
 
 def _on_door(style: str) -> str:

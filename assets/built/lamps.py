@@ -6,12 +6,12 @@ import numpy as np
 
 from assets.built.maker import (
     BULB,
+    LIGHTS,
     SHADE,
     WHITE,
     FinishOf,
     Look,
-    Maker,
-    maker,
+    Size,
     material,
     metal,
     parts_of,
@@ -39,7 +39,7 @@ def _cloth(look: Look, finish: FinishOf) -> Finish:
     return tinted(material(look, "shade", finish, "linen/1"), SHADE)
 
 
-def pendant(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def pendant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Canopy, cord and a shade: 'dome', 'drum', 'globe' or 'cone'."""
     w, _, h = size
     r, kind = w / 2, str(look.get("kind", "dome"))
@@ -75,7 +75,7 @@ def pendant(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> 
     )
 
 
-def flush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A flat bowl of opal glass, or a fabric drum with a diffuser, under the ceiling."""
     w, _, h = size
     r = w / 2
@@ -88,7 +88,7 @@ def flush(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> li
     return parts_of((metal(look, finish, "steel"), base), (OPAL, bowl))
 
 
-def panel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def panel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A square LED panel in a slim frame."""
     w, d, h = size
     f = 0.02
@@ -99,21 +99,21 @@ def panel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> li
         box([-w / 2 + f, d / 2 - f, 0], [w / 2 - f, d / 2, h], 0.002),
     ]
     glass = box([-w / 2 + f, -d / 2 + f, 0.004], [w / 2 - f, d / 2 - f, h])
-    return parts_of((WHITE, rim), (plain((0.97, 0.96, 0.93), 0.4, emission=(6.0, 5.6, 5.0)), glass))
+    return parts_of((WHITE, rim), (plain((0.97, 0.96, 0.93), 0.4, emission=LIGHTS["panel"]), glass))
 
 
-def downlight(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def downlight(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A recessed spotlight: a ring and a glowing disc."""
     w, _, h = size
     r = w / 2
     ring = lathe([(r * 0.72, h * 0.7), (r * 0.75, 0.001), (r * 0.9, 0), (r, h * 0.5), (r, h), (0, h)], 24, 0.5)
     disc = lathe([(0, h * 0.55), (r * 0.74, h * 0.55), (r * 0.74, h * 0.7), (0, h * 0.7)], 24)
     return parts_of(
-        (metal(look, finish, "white"), ring), (plain((1.0, 0.97, 0.92), 0.3, emission=(26.0, 22.5, 18.0)), disc)
+        (metal(look, finish, "white"), ring), (plain((1.0, 0.97, 0.92), 0.3, emission=LIGHTS["downlight"]), disc)
     )
 
 
-def sconce(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def sconce(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A wall lamp: plate, arm and a fabric shade or an opal globe."""
     w, d, h = size
     r = min(w / 2, d * 0.4)
@@ -131,7 +131,7 @@ def sconce(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def standing(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def standing(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Foot, stem or tripod, and a fabric shade: floor lamps and table lamps alike."""
     w, _, h = size
     r, kind = w / 2, str(look.get("kind", "stem"))
@@ -200,7 +200,7 @@ def standing(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     )
 
 
-def desk_lamp(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def desk_lamp(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Weighted foot, two arms, a metal head that looks down."""
     w, d, h = size
     foot = moved(cylinder(min(0.09, d * 0.45), 0, 0.022, 0.006, 24), -w * 0.22, 0, 0)
@@ -220,180 +220,3 @@ def desk_lamp(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
         (plain((0.93, 0.92, 0.88), 0.4), place[1]),
         (GLOW, place[2]),
     )
-
-
-def lamps_makers() -> list[Maker]:
-    living = {
-        "living_room": 1.0,
-        "dining_room": 1.0,
-        "kitchen": 0.6,
-        "bedroom": 0.6,
-        "main_bedroom": 0.6,
-        "hall": 0.5,
-        "family_room": 0.8,
-    }
-    anywhere = {
-        **living,
-        "corridor": 1.0,
-        "bathroom": 1.0,
-        "toilet": 1.0,
-        "laundry_room": 1.0,
-        "closet": 1.0,
-        "study": 0.8,
-        "stairwell": 1.0,
-        "pantry": 1.0,
-    }
-    made = []
-    for kind, metal_name, colour, size in (
-        ("dome", "black", "black", (0.40, 0.40, 0.90)),
-        ("dome", "white", "white", (0.38, 0.38, 0.85)),
-        ("cone", "brass", "golden", (0.30, 0.30, 0.90)),
-        ("globe", "brass", "white", (0.28, 0.28, 0.80)),
-        ("drum", "white", "white", (0.50, 0.50, 0.75)),
-        ("drum", "black", "grey", (0.45, 0.45, 0.80)),
-    ):
-        made.append(
-            maker(
-                f"pendant_{kind}_{metal_name}",
-                "pendant lamp",
-                f"{colour} {kind} pendant lamp",
-                size,
-                pendant,
-                support="ceiling",
-                rooms=living,
-                synonyms=("hanging lamp", "lamp"),
-                colours=(colour,),
-                materials=("metal",) if kind != "drum" else ("fabric",),
-                emits=BULB,
-                look={"kind": kind, "metal": metal_name, "shade": "linen/2" if colour == "grey" else "linen/1"},
-            )
-        )
-    for kind, size in (("bowl", (0.36, 0.36, 0.11)), ("drum", (0.48, 0.48, 0.16))):
-        made.append(
-            maker(
-                f"ceiling_lamp_{kind}",
-                "ceiling lamp",
-                "glass ceiling lamp" if kind == "bowl" else "fabric ceiling lamp",
-                size,
-                flush,
-                support="ceiling",
-                rooms=anywhere,
-                synonyms=("ceiling light", "lamp"),
-                colours=("white",),
-                materials=("glass",) if kind == "bowl" else ("fabric",),
-                emits=SHADE,
-                look={"kind": kind},
-            )
-        )
-    made.append(
-        maker(
-            "ceiling_panel",
-            "ceiling lamp",
-            "square ceiling lamp",
-            (0.42, 0.42, 0.04),
-            panel,
-            support="ceiling",
-            rooms={**anywhere, "garage": 0.6, "gym": 1.0, "workshop": 0.6},
-            synonyms=("ceiling light",),
-            colours=("white",),
-            materials=("plastic",),
-            emits=(6.0, 5.6, 5.0),
-        )
-    )
-    made.append(
-        maker(
-            "downlight",
-            "downlight",
-            "recessed spotlight",
-            (0.09, 0.09, 0.03),
-            downlight,
-            support="ceiling",
-            rooms={"bathroom": 0.6, "kitchen": 0.6, "corridor": 0.4},
-            synonyms=("spotlight",),
-            colours=("white",),
-            materials=("metal",),
-            emits=(26.0, 22.5, 18.0),
-        )
-    )
-    for kind, rim, size in (("shade", "brass", (0.18, 0.22, 0.28)), ("globe", "black", (0.16, 0.20, 0.26))):
-        made.append(
-            maker(
-                f"wall_lamp_{kind}",
-                "wall lamp",
-                f"{kind} wall lamp",
-                size,
-                sconce,
-                support="wall",
-                elevation=1.65,
-                rooms={"hall": 1.0, "corridor": 1.0, "living_room": 0.6, "main_bedroom": 0.5},
-                synonyms=("sconce",),
-                colours=("white",),
-                materials=("metal",),
-                emits=SHADE,
-                look={"kind": kind, "metal": rim},
-            )
-        )
-    for name, kind, extra, colour in (
-        ("brass", "stem", {"metal": "brass"}, "golden"),
-        ("black", "stem", {"metal": "black", "shade": "linen/0"}, "black"),
-        ("tripod", "tripod", {"body": "oak/0"}, "brown"),
-    ):
-        made.append(
-            maker(
-                f"floor_lamp_{name}",
-                "floor lamp",
-                f"{colour} floor lamp with a fabric shade",
-                (0.46, 0.46, 1.55),
-                standing,
-                support="floor",
-                rooms={"living_room": 1.0, "study": 0.6, "main_bedroom": 0.4, "library": 0.8, "family_room": 0.8},
-                synonyms=("standing lamp", "lamp"),
-                colours=(colour,),
-                materials=("metal" if name != "tripod" else "wood", "fabric"),
-                tags=("floor_lamp",),
-                emits=SHADE,
-                look={"kind": kind, **extra},
-            )
-        )
-    tables = ("bedside table", "side table", "sideboard", "dresser", "console", "desk")
-    for name, extra, colour in (
-        ("ceramic", {"kind": "ceramic", "body": "paint_dusty_blue/0"}, "blue"),
-        ("ceramic_white", {"kind": "ceramic", "body": "lacquer_white/0"}, "white"),
-        ("brass", {"metal": "brass", "shade": "linen/0"}, "golden"),
-        ("black", {"metal": "black"}, "black"),
-        ("tripod", {"kind": "tripod", "body": "oak/0"}, "brown"),
-    ):
-        made.append(
-            maker(
-                f"table_lamp_{name}",
-                "table lamp",
-                f"{colour} table lamp with a fabric shade",
-                (0.27, 0.27, 0.44),
-                standing,
-                on=tables,
-                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "living_room": 0.8, "guest_room": 1.0},
-                synonyms=("bedside lamp", "lamp"),
-                colours=(colour,),
-                materials=("ceramic" if "ceramic" in name else "metal", "fabric"),
-                emits=SHADE,
-                look=extra,
-            )
-        )
-    for colour in ("black", "white", "brass"):
-        made.append(
-            maker(
-                f"desk_lamp_{colour}",
-                "desk lamp",
-                f"{colour} desk lamp",
-                (0.42, 0.2, 0.46),
-                desk_lamp,
-                on=("desk", "office table", "workbench"),
-                rooms={"study": 1.0, "kids_room": 0.6},
-                synonyms=("lamp",),
-                colours=(colour,),
-                materials=("metal",),
-                emits=BULB,
-                look={"metal": colour},
-            )
-        )
-    return made

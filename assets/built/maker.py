@@ -1,10 +1,9 @@
-"""Maker: an asset that code builds, and the helpers that all makers share."""
+"""Maker: an asset that code builds; finishes, cabinet work and other things that builders share."""
 
 from __future__ import annotations
 
-import functools
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,8 @@ import numpy as np
 from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, tube, turned
 from assets.records import Asset, Finish, MeshPart, SupportSurface
 
+Size = tuple[float, float, float]
+"""Width, depth, height, metres."""
 FinishOf = Callable[[str], Finish]
 Look = Mapping[str, str | float]
 Build = Callable[..., list[MeshPart]]
@@ -31,6 +32,8 @@ BULB = (16.0, 13.4, 10.2)
 """Linear radiance of a bare warm bulb."""
 SHADE = (5.0, 4.0, 2.9)
 """Linear radiance of a lit fabric shade."""
+LIGHTS = {"bulb": BULB, "shade": SHADE, "panel": (6.0, 5.6, 5.0), "downlight": (26.0, 22.5, 18.0)}
+"""What lamps emit, by name: linear relative radiance."""
 METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "white": WHITE}
 
 
@@ -44,59 +47,22 @@ class Maker:
     """The parameters it takes, with the values they have where nobody names others."""
 
 
-def maker(
-    key: str,
-    object_class: str,
-    name: str,
-    size: tuple[float, float, float],
-    build: Build,
-    *,
-    support: str = "surface",
-    rooms: Mapping[str, float] | None = None,
-    on: tuple[str, ...] = (),
-    synonyms: tuple[str, ...] = (),
-    colours: tuple[str, ...] = (),
-    materials: tuple[str, ...] = (),
-    surfaces: tuple[SupportSurface, ...] = (),
-    tags: tuple[str, ...] = (),
-    elevation: float = 0.0,
-    clearance: float = 0.0,
-    emits: tuple[float, float, float] | None = None,
-    look: Look | None = None,
-) -> Maker:
-    """A maker under 'built/<key>'; `look` are the build's arguments where the params name no others."""
-    asset = Asset(
-        f"built/{key}",
-        object_class,
-        name,
-        size,
-        support,
-        dict(rooms or {}),
-        synonyms,
-        colours,
-        materials,
-        on,
-        elevation,
-        clearance,
-        surfaces,
-        tags,
-        emits,
-        "built",
-        "",
-        "Apache-2.0",
-    )
-    values = dict(look or {})
-    return Maker(asset, functools.partial(_run, asset.key, build, values), {"seed": 0.0, **values})
+def made(
+    key: str, build: Build, look: Look, size: Size, params: Sequence[tuple[str, str | float]], finish: FinishOf
+) -> tuple[MeshPart, ...]:
+    """The thing `key` at `size`, `params` laid over its `look`; what is drawn depends on the key and the look's seed.
 
-
-def _run(key: str, build: Build, defaults: dict, size, params, finish: FinishOf) -> tuple[MeshPart, ...]:
-    look = {**defaults, **dict(params)}
+    Raises:
+      ValueError: a length that is not positive.
+    """
     if min(size) <= 0:
         raise ValueError(f"{key} cannot be made {size} m large; all three lengths must be positive")
-    text = f"{key}|{look.get('seed', 0)}"
+    told = {**look, **dict(params)}
+    text = f"{key}|{told.get('seed', 0)}"
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
-    return fitted(build(tuple(float(s) for s in size), look, finish, rng=rng), size)
+    x, y, z = size
+    return fitted(build((float(x), float(y), float(z)), told, finish, rng=rng), size)
 
 
 def plain(color, roughness: float = 0.5, metallic: float = 0.0, emission=None, specular: float = 0.5) -> Finish:

@@ -13,8 +13,7 @@ from assets.built.maker import (
     STEEL,
     FinishOf,
     Look,
-    Maker,
-    maker,
+    Size,
     material,
     parts_of,
     plain,
@@ -82,7 +81,7 @@ def _book(w: float, d: float, h: float, *, rng: np.random.Generator) -> tuple[Sh
     return cover, pages, band
 
 
-def book_row(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def book_row(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Books side by side, of many heights and colours; the last ones may lean."""
     w, d, h = size
     by_color: dict[int, list[Shape]] = {}
@@ -111,7 +110,7 @@ def book_row(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     )
 
 
-def book_stack(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def book_stack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Books lying on one another, each turned a little; one book where look['count'] is 1."""
     w, d, h = size
     count = int(look.get("count", 3))
@@ -132,7 +131,7 @@ def book_stack(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return parts_of(*made, (PAPER, pages))
 
 
-def magazine(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def magazine(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A magazine lying flat, its leaves rising a little at the open side."""
     w, d, h = size
     x, y = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(-d / 2, d / 2, 5))
@@ -153,7 +152,7 @@ def magazine(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     return parts_of((cover, top), (PAPER, [edge, base]))
 
 
-def papers(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def papers(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Sheets of paper in a loose pile."""
     w, d, h = size
     leaves = []
@@ -171,7 +170,7 @@ def papers(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     return parts_of((PAPER, leaves))
 
 
-def photo_frame(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def photo_frame(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A small standing frame with a photograph."""
     w, _, h = size
     f, tilt = 0.016, 0.22
@@ -192,14 +191,12 @@ def photo_frame(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     )
     back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
     leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
-    frame = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak")), None) or finish(
-        "oak/0"
-    )
+    frame = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak"))) or finish("oak/0")
     lean = [turned(s, -tilt, "x") for s in (joined(*boards), image, back)]
     return parts_of((frame, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
 
 
-def alarm_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def alarm_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A round bedside clock on two feet, with bells."""
     w, d, h = size
     r = w * 0.46
@@ -222,7 +219,7 @@ def alarm_clock(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     return parts_of((skin, [case, *bells, *feet]), (face, disc))
 
 
-def remote(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def remote(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     body = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.88], h * 0.25)
     keys = [
@@ -238,7 +235,7 @@ def remote(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def keys(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def keys(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A ring with three keys fanned out and a leather tag."""
     _, d, h = size
     ring = moved(
@@ -261,7 +258,7 @@ def keys(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return parts_of((STEEL, [ring, made[0], made[2]]), (BRASS, made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
 
 
-def tissue_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def tissue_box(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     top = h * 0.62
     x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
@@ -275,7 +272,7 @@ def tissue_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     )
 
 
-def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def pencil_cup(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
     r, high = w / 2, h * 0.55
     tints = ((0.80, 0.60, 0.16), (0.18, 0.32, 0.55), (0.68, 0.17, 0.15), (0.10, 0.10, 0.11), (0.22, 0.45, 0.28))
@@ -293,210 +290,3 @@ def pencil_cup(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         ),
         *pens,
     )
-
-
-def papers_makers() -> list[Maker]:
-    study = {
-        "study": 1.0,
-        "library": 1.0,
-        "living_room": 0.8,
-        "family_room": 0.7,
-        "bedroom": 0.6,
-        "kids_room": 0.5,
-        "main_bedroom": 0.4,
-    }
-    living = {
-        "living_room": 1.0,
-        "dining_room": 0.7,
-        "hall": 0.5,
-        "study": 0.6,
-        "bedroom": 0.5,
-        "main_bedroom": 0.5,
-        "family_room": 0.8,
-        "kitchen": 0.5,
-        "sun_room": 1.0,
-    }
-    made = []
-    for k in range(14):
-        made.append(
-            maker(
-                f"book_row_{k}",
-                "row of books",
-                "row of books",
-                ((0.30, 0.22, 0.45, 0.36, 0.18, 0.55, 0.27)[k % 7], (0.18, 0.16)[k % 2], (0.25, 0.22, 0.28)[k % 3]),
-                book_row,
-                on=SHELVES,
-                rooms=study,
-                synonyms=("books",),
-                colours=("coloured",),
-                materials=("paper",),
-                look={"seed": k},
-            )
-        )
-    for k in range(4):
-        made.append(
-            maker(
-                f"book_stack_{k}",
-                "stack of books",
-                "stack of books",
-                (0.20, 0.26, (0.09, 0.12, 0.07, 0.15)[k]),
-                book_stack,
-                on=SHELVES,
-                rooms=study,
-                synonyms=("books", "pile of books"),
-                colours=("coloured",),
-                materials=("paper",),
-                look={"seed": k, "count": (3, 4, 2, 5)[k]},
-            )
-        )
-        made.append(
-            maker(
-                f"book_{k}",
-                "book",
-                "book",
-                (0.15, 0.22, (0.025, 0.035, 0.018, 0.03)[k]),
-                book_stack,
-                on=SHELVES,
-                rooms={**study, "main_bedroom": 1.0, "bedroom": 1.0},
-                colours=(("green", "red", "blue", "brown")[k],),
-                materials=("paper",),
-                look={"seed": k, "count": 1},
-            )
-        )
-    for k, colour in enumerate(("blue", "red", "green")):
-        made.append(
-            maker(
-                f"magazine_{colour}",
-                "magazine",
-                f"{colour} magazine",
-                (0.21, 0.28, 0.008),
-                magazine,
-                on=("coffee table", "side table", "sofa", "desk", "bedside table", "toilet"),
-                rooms=living,
-                colours=(colour,),
-                materials=("paper",),
-                look={"cover": f"magazine_cover/{k}"},
-            )
-        )
-    made.append(
-        maker(
-            "paper_stack",
-            "stack of paper",
-            "stack of paper",
-            (0.23, 0.31, 0.02),
-            papers,
-            on=("desk", "office table", "printer", "filing cabinet"),
-            rooms={"study": 1.0},
-            synonyms=("papers",),
-            colours=("white",),
-            materials=("paper",),
-        )
-    )
-    for k, (frame, art) in enumerate(
-        (("oak", "art_sea/0"), ("black", "art_hills/3"), ("brass", "art_hills/1"), ("white", "art_botanical/1"))
-    ):
-        made.append(
-            maker(
-                f"photo_frame_{frame}",
-                "photo frame",
-                f"photograph in a {frame} frame",
-                ((0.15, 0.13)[k % 2], 0.09, (0.20, 0.18)[k % 2]),
-                photo_frame,
-                on=("sideboard", "dresser", "bedside table", "bookcase", "desk", "console", "fireplace"),
-                rooms=living,
-                synonyms=("framed photo", "photograph"),
-                colours=(frame.replace("oak", "brown").replace("brass", "gold"),),
-                materials=("wood",),
-                look={"frame": frame, "art": art},
-            )
-        )
-    for name in ("brass", "black", "chrome"):
-        made.append(
-            maker(
-                f"alarm_clock_{name}",
-                "alarm clock",
-                f"{name} alarm clock",
-                (0.11, 0.06, 0.14),
-                alarm_clock,
-                on=("bedside table", "dresser"),
-                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "kids_room": 0.7, "guest_room": 1.0},
-                synonyms=("clock",),
-                colours=(name,),
-                materials=("metal",),
-                look={"metal": name},
-            )
-        )
-    made.append(
-        maker(
-            "remote_control",
-            "remote control",
-            "black remote control",
-            (0.045, 0.17, 0.02),
-            remote,
-            on=("coffee table", "sofa", "tv stand", "side table", "bed"),
-            rooms={"living_room": 1.0, "family_room": 1.0, "main_bedroom": 0.3},
-            synonyms=("remote",),
-            colours=("black",),
-            materials=("plastic",),
-        )
-    )
-    made.append(
-        maker(
-            "keys",
-            "keys",
-            "bunch of keys",
-            (0.09, 0.09, 0.012),
-            keys,
-            on=("console", "sideboard", "dresser", "coffee table", "desk", "base cabinet"),
-            rooms={"hall": 1.0, "living_room": 0.4, "kitchen": 0.4},
-            synonyms=("key",),
-            colours=("silver",),
-            materials=("metal",),
-        )
-    )
-    for k, colour in ((3, "blue"), (4, "pink"), (5, "green")):
-        made.append(
-            maker(
-                f"tissue_box_{colour}",
-                "tissue box",
-                f"{colour} box of tissues",
-                (0.23, 0.12, 0.14),
-                tissue_box,
-                on=("bedside table", "desk", "coffee table", "bathroom vanity", "side table"),
-                rooms={"bedroom": 1.0, "main_bedroom": 1.0, "bathroom": 0.5, "study": 0.5, "living_room": 0.4},
-                synonyms=("tissues",),
-                colours=(colour,),
-                materials=("paper",),
-                look={"skin": f"cotton/{k}"},
-            )
-        )
-    made.append(
-        maker(
-            "pencil_cup_black",
-            "pencil holder",
-            "black cup of pencils",
-            (0.085, 0.085, 0.19),
-            pencil_cup,
-            on=("desk", "office table", "child table"),
-            rooms={"study": 1.0, "kids_room": 0.8},
-            synonyms=("pencil cup", "pencils"),
-            colours=("black",),
-            materials=("metal",),
-        )
-    )
-    made.append(
-        maker(
-            "pencil_cup_leather",
-            "pencil holder",
-            "leather cup of pencils",
-            (0.09, 0.09, 0.19),
-            pencil_cup,
-            on=("desk", "office table"),
-            rooms={"study": 1.0},
-            synonyms=("pencil cup", "pencils"),
-            colours=("brown",),
-            materials=("leather",),
-            look={"skin": "leather/2"},
-        )
-    )
-    return made

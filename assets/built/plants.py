@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import SOIL, FinishOf, Look, Maker, maker, parts_of, plain
+from assets.built.maker import SOIL, FinishOf, Look, Size, parts_of, plain
 from assets.built.primitives import Shape, lathe, sheet, tube, turned, two_sided
 from assets.records import MeshPart
 
 
-def plant(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A pot with leaves: 'broad', 'grass', 'trailing' or 'rubber'."""
     w, _, h = size
     kind = str(look.get("kind", "broad"))
@@ -96,74 +96,3 @@ def _blade(angle: float, reach: float, z0: float, z1: float, width: float, droop
     half = width / 2 * (1 - s**2.5) + 0.0005
     p = np.stack([np.stack([out, half, up], 1), np.stack([out, -half, up], 1)])
     return two_sided(turned(sheet(p), angle))
-
-
-def plants_makers() -> list[Maker]:
-    living = {
-        "living_room": 1.0,
-        "dining_room": 0.7,
-        "hall": 0.5,
-        "study": 0.6,
-        "bedroom": 0.5,
-        "main_bedroom": 0.5,
-        "family_room": 0.8,
-        "kitchen": 0.5,
-        "sun_room": 1.0,
-    }
-    made = []
-    windowsill = (
-        "sideboard",
-        "desk",
-        "bookcase",
-        "side table",
-        "console",
-        "dresser",
-        "coffee table",
-        "shelving unit",
-        "plant stand",
-        "base cabinet",
-        "bathroom vanity",
-    )
-    for kind, pot, size in (
-        ("broad", "white", (0.30, 0.30, 0.38)),
-        ("grass", "grey", (0.28, 0.28, 0.36)),
-        ("trailing", "terracotta", (0.32, 0.32, 0.26)),
-        ("broad", "terracotta", (0.24, 0.24, 0.30)),
-    ):
-        made.append(
-            maker(
-                f"small_plant_{kind}_{pot}",
-                "small plant",
-                f"small plant in a {pot} pot",
-                size,
-                plant,
-                on=windowsill,
-                rooms=living,
-                synonyms=("plant", "pot plant", "houseplant"),
-                colours=("green",),
-                materials=("plant",),
-                look={"kind": kind, "pot": pot},
-            )
-        )
-    for kind, pot, size in (
-        ("rubber", "white", (0.60, 0.60, 1.35)),
-        ("rubber", "black", (0.55, 0.55, 1.1)),
-        ("broad", "grey", (0.75, 0.75, 1.0)),
-        ("grass", "terracotta", (0.6, 0.6, 0.9)),
-    ):
-        made.append(
-            maker(
-                f"potted_plant_{kind}_{pot}",
-                "potted plant",
-                f"tall plant in a {pot} pot",
-                size,
-                plant,
-                support="floor",
-                rooms={**living, "sun_room": 2.0},
-                synonyms=("plant", "houseplant"),
-                colours=("green",),
-                materials=("plant",),
-                look={"kind": kind, "pot": pot},
-            )
-        )
-    return made

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import WHITE, FinishOf, Look, Maker, maker, material, metal, parts_of, plain, whole_image
+from assets.built.maker import WHITE, FinishOf, Look, Size, material, metal, parts_of, plain, whole_image
 from assets.built.primitives import (
     Shape,
     ball,
@@ -22,7 +22,6 @@ from assets.built.primitives import (
     tube,
     turned,
 )
-from assets.materials import MATERIALS
 from assets.records import MeshPart
 
 LIVING = {
@@ -38,7 +37,7 @@ LIVING = {
 }
 
 
-def rug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def rug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A rectangular rug with its pattern; fringes at the short ends where look['fringe'] is 1."""
     w, d, h = size
     name = str(look.get("pattern", "rug_bordered/0"))
@@ -70,7 +69,7 @@ def rug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list
     return parts_of((pattern, body), (plain((0.80, 0.75, 0.64), 0.95, specular=0.05), tassels))
 
 
-def round_rug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def round_rug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A round (or oval) rug."""
     w, d, h = size
     pattern = material(look, "pattern", finish, "rug_rings/0")
@@ -79,7 +78,7 @@ def round_rug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     return parts_of((pattern, whole_image(disc, pattern, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)))
 
 
-def curtain(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def curtain(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A pair of curtains drawn back to the sides of a window, on a rod with rings and finials."""
     w, d, h = size
     cloth = material(look, "cloth", finish, "linen/0")
@@ -114,7 +113,7 @@ def curtain(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> 
     return parts_of((cloth, parts), (metal(look, finish, "black"), [rod, *ends, *brackets, *hooks]))
 
 
-def sheer(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def sheer(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """One light curtain over the whole window."""
     w, d, h = size
     grid = folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=rng, rows=5)
@@ -122,7 +121,7 @@ def sheer(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> li
     return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), sheet(grid, 0.001)), (WHITE, rail))
 
 
-def roller_blind(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def roller_blind(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Cloth from a roll, a bar at its foot, a bead chain."""
     w, d, h = size
     r = min(d / 2, 0.028)
@@ -141,7 +140,7 @@ def roller_blind(size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of((material(look, "cloth", finish, "linen/1"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
 
 
-def cushion(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def cushion(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A cushion lying flat, dented by use."""
     w, d, h = size
     cells = 14
@@ -155,7 +154,7 @@ def cushion(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> 
     return parts_of((cloth, moved(shifted_uv(pillow(w, d, h, cells, 0.36, waves), *rng.random(2)), 0, 0, h / 2)))
 
 
-def throw(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def throw(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A blanket folded to a stack of soft layers, fringe at one side."""
     return parts_of((material(look, "cloth", finish, "tweed/0"), layers(size, int(look.get("layers", 4)), rng=rng)))
 
@@ -200,156 +199,3 @@ def layers(size, count: int, *, rng: np.random.Generator) -> list[Shape]:
         low_side = sheet(low)
         made += [sheet(top), Shape(low_side.vertices, low_side.faces[:, ::-1], -low_side.normals, low_side.uv), *mid]
     return [shifted_uv(s, *rng.random(2)) for s in made]
-
-
-def soft_makers() -> list[Maker]:
-    made = []
-    for m in MATERIALS.values():
-        if m.family == "rug" and not m.key.startswith("rug_rings"):
-            fringe = 1.0 if m.key.startswith(("rug_oriental", "rug_kilim")) else 0.0
-            made.append(
-                maker(
-                    m.key.replace("/", "_"),
-                    "rug",
-                    m.name,
-                    (2.4, 1.6, 0.012),
-                    rug,
-                    support="floor",
-                    rooms=LIVING,
-                    synonyms=("carpet",),
-                    colours=m.colours,
-                    materials=m.materials,
-                    tags=("flat",),
-                    look={"pattern": m.key, "fringe": fringe},
-                )
-            )
-        elif m.family == "rug":
-            made.append(
-                maker(
-                    m.key.replace("/", "_"),
-                    "round rug",
-                    m.name,
-                    (1.6, 1.6, 0.012),
-                    round_rug,
-                    support="floor",
-                    rooms={**LIVING, "kids_room": 1.0},
-                    synonyms=("rug", "carpet"),
-                    colours=m.colours,
-                    materials=m.materials,
-                    tags=("flat", "round"),
-                    look={"pattern": m.key},
-                )
-            )
-    made.append(
-        maker(
-            "rug",
-            "rug",
-            "beige rug",
-            (2.0, 1.4, 0.012),
-            rug,
-            support="floor",
-            rooms=LIVING,
-            synonyms=("carpet",),
-            colours=("beige",),
-            materials=("wool",),
-            tags=("flat",),
-        )
-    )
-    for i, m in enumerate(
-        m
-        for m in MATERIALS.values()
-        if "curtain" in m.roles and m.key.split("/")[0] in ("linen", "cotton", "velvet", "printed_cotton")
-    ):
-        made.append(
-            maker(
-                f"curtain_{m.key.replace('/', '_')}",
-                "curtain",
-                f"{m.name} curtains",
-                (2.2, 0.14, 2.3),
-                curtain,
-                support="wall",
-                rooms=LIVING,
-                synonyms=("drapes",),
-                colours=m.colours,
-                materials=m.materials,
-                look={"cloth": m.key, "metal": ("black", "brass", "steel")[i % 3]},
-            )
-        )
-    made.append(
-        maker(
-            "sheer_curtain",
-            "curtain",
-            "sheer white curtain",
-            (2.0, 0.09, 2.3),
-            sheer,
-            support="wall",
-            rooms=LIVING,
-            synonyms=("net curtain",),
-            colours=("white",),
-            materials=("fabric",),
-        )
-    )
-    for name, cloth in (("white", "cotton/0"), ("beige", "linen/11"), ("grey", "linen/2"), ("blue", "cotton/3")):
-        made.append(
-            maker(
-                f"roller_blind_{name}",
-                "window blind",
-                f"{name} roller blind",
-                (1.2, 0.06, 1.0),
-                roller_blind,
-                support="wall",
-                rooms={"kitchen": 1.0, "bathroom": 1.0, "study": 0.7, "kids_room": 0.5},
-                synonyms=("blind", "roller blind"),
-                colours=(name,),
-                materials=("fabric",),
-                look={"cloth": cloth},
-            )
-        )
-    seats = ("sofa", "bed", "armchair", "lounge chair", "day bed", "bench", "corner sofa", "sofa bed")
-    for m in MATERIALS.values():
-        if m.key in (
-            "linen/0",
-            "linen/4",
-            "linen/6",
-            "linen/7",
-            "linen/8",
-            "linen/9",
-            "velvet/0",
-            "velvet/1",
-            "velvet/4",
-            "velvet/6",
-            "tweed/0",
-            "printed_cotton/2",
-        ):
-            made.append(
-                maker(
-                    f"cushion_{m.key.replace('/', '_')}",
-                    "cushion",
-                    f"{m.name} cushion",
-                    (0.45, 0.45, 0.15),
-                    cushion,
-                    on=seats,
-                    rooms=LIVING,
-                    synonyms=("pillow",),
-                    colours=m.colours,
-                    materials=m.materials,
-                    look={"cloth": m.key},
-                )
-            )
-        if m.key in ("tweed/0", "tweed/1", "linen/0", "velvet/5", "cotton/2"):
-            made.append(
-                maker(
-                    f"blanket_{m.key.replace('/', '_')}",
-                    "blanket",
-                    f"folded {m.name} blanket",
-                    (0.45, 0.35, 0.09),
-                    throw,
-                    on=(*seats, "chest", "wardrobe", "laundry basket"),
-                    rooms=LIVING,
-                    synonyms=("throw",),
-                    colours=m.colours,
-                    materials=m.materials,
-                    look={"cloth": m.key},
-                )
-            )
-    return made

@@ -12,11 +12,10 @@ from assets.built.maker import (
     STEEL,
     FinishOf,
     Look,
-    Maker,
+    Size,
     carcass,
     front,
     handle,
-    maker,
     material,
     metal,
     parts_of,
@@ -28,7 +27,7 @@ from assets.records import MeshPart, SupportSurface
 BOARD = 0.022
 
 
-def shelf(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def shelf(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A board on two brackets."""
     w, d, h = size
     plank = box([-w / 2, -d / 2, h - 0.028], [w / 2, d / 2, h], 0.003)
@@ -47,7 +46,7 @@ def _levels(h: float, count: int) -> np.ndarray:
     return np.linspace(0.06, h - BOARD, count + 1)
 
 
-def bookcase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bookcase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Sides, boards, a plinth and a thin back."""
     w, d, h = size
     z = _levels(h, int(look.get("shelves", 5)))
@@ -61,9 +60,10 @@ def bookcase(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     return parts_of((material(look, "wood", finish, "oak/0"), [*sides, *boards, plinth, back]))
 
 
-def shelf_surfaces(w: float, d: float, h: float, count: int) -> tuple[SupportSurface, ...]:
+def shelf_surfaces(size: Size, look: Look) -> tuple[SupportSurface, ...]:
     """Support surfaces of `bookcase`, from below, and its top."""
-    z = _levels(h, count)
+    w, d, h = size
+    z = _levels(h, int(look.get("shelves", 5)))
     inner = [
         surface(f"shelf_{k + 1}", float(a + BOARD), w - 2 * BOARD, d - 0.008, float(b - a - BOARD), 0.008)
         for k, (a, b) in enumerate(itertools.pairwise(z))
@@ -71,7 +71,7 @@ def shelf_surfaces(w: float, d: float, h: float, count: int) -> tuple[SupportSur
     return (*inner, surface("top", h, w, d, 9.0 if h < 1.9 else 0.5))
 
 
-def wardrobe(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def wardrobe(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Hinged doors over a plinth, with long handles; one leaf a mirror where look['mirror'] is 1."""
     w, d, h = size
     y, low = -d / 2 + 0.002, 0.07
@@ -97,7 +97,7 @@ def wardrobe(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) ->
     )
 
 
-def storage_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def storage_box(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A box with a lid and a label holder."""
     w, d, h = size
     body = box([-w / 2 + 0.004, -d / 2 + 0.004, 0], [w / 2 - 0.004, d / 2 - 0.004, h * 0.85], 0.004)
@@ -106,166 +106,7 @@ def storage_box(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     return parts_of((material(look, "skin", finish, "linen/2"), [body, lid]), (STEEL, label))
 
 
-def bean_bag(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bean_bag(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A floor cushion, thick and round."""
     w, d, h = size
     return parts_of((material(look, "cloth", finish, "linen/9"), moved(pillow(w, d, h, 16, 0.28), 0, 0, h / 2)))
-
-
-def storage_makers() -> list[Maker]:
-    made = []
-    living = {
-        "living_room": 1.0,
-        "study": 1.0,
-        "library": 2.0,
-        "family_room": 0.8,
-        "kids_room": 0.7,
-        "bedroom": 0.6,
-        "guest_room": 0.4,
-    }
-    for wood, colour in (
-        ("oak/0", "brown"),
-        ("walnut/0", "dark brown"),
-        ("lacquer_white/0", "white"),
-        ("lacquer_black/0", "black"),
-        ("pine/0", "yellow"),
-    ):
-        stem = wood.split("/")[0].replace("lacquer_", "")
-        look = {"wood": wood}
-        words = {"colours": (colour,), "materials": ("wood",)}
-        made.append(
-            maker(
-                f"shelf_{stem}",
-                "open wall shelf",
-                f"{stem} wall shelf",
-                (0.9, 0.22, 0.18),
-                shelf,
-                support="wall",
-                elevation=1.4,
-                rooms={**living, "kitchen": 0.6, "bathroom": 0.4},
-                synonyms=("shelf",),
-                surfaces=(surface("top", 0.18, 0.9, 0.22, 0.8),),
-                look=look,
-                **words,
-            )
-        )
-        for name, size, count in (
-            ("tall", (0.8, 0.30, 2.02), 6),
-            ("low", (1.0, 0.32, 0.90), 2),
-            ("wide", (1.4, 0.32, 1.90), 5),
-            ("slim", (0.42, 0.28, 1.95), 6),
-        ):
-            made.append(
-                maker(
-                    f"bookcase_{name}_{stem}",
-                    "bookcase",
-                    f"{name} {stem} bookcase",
-                    size,
-                    bookcase,
-                    support="against_wall",
-                    rooms=living,
-                    clearance=0.6,
-                    synonyms=("bookshelf", "shelves"),
-                    surfaces=shelf_surfaces(*size, count),
-                    tags=(name,),
-                    look={**look, "shelves": count},
-                    **words,
-                )
-            )
-    beds = {"bedroom": 1.0, "main_bedroom": 1.0, "guest_room": 1.0, "closet": 1.0, "kids_room": 0.6}
-    for name, fronts, colour, style, grip, metal_name in (
-        ("white", "lacquer_white/0", "white", "flat", "bar", "steel"),
-        ("oak", "oak/0", "brown", "flat", "bar", "black"),
-        ("sage", "lacquer_sage_green/0", "green", "shaker", "knob", "brass"),
-        ("walnut", "walnut/0", "dark brown", "flat", "knob", "brass"),
-        ("cream", "lacquer_cream/0", "cream", "shaker", "knob", "steel"),
-    ):
-        for width in (1.0, 1.5, 2.0):
-            made.append(
-                maker(
-                    f"wardrobe_{name}_{round(width * 100)}",
-                    "wardrobe",
-                    f"{name} wardrobe",
-                    (width, 0.6, 2.1),
-                    wardrobe,
-                    support="against_wall",
-                    rooms=beds,
-                    clearance=0.8,
-                    synonyms=("closet", "cupboard"),
-                    colours=(colour,),
-                    materials=("wood",),
-                    tags=("wide",) if width > 1.6 else (),
-                    look={
-                        "front": fronts,
-                        "style": style,
-                        "handle": grip,
-                        "metal": metal_name,
-                        "mirror": float(width == 2.0 and style == "flat"),
-                    },
-                )
-            )
-    for name, skin, colour in (
-        ("grey", "linen/2", "grey"),
-        ("natural", "wicker/0", "beige"),
-        ("white", "lacquer_white/0", "white"),
-        ("blue", "cotton/3", "blue"),
-        ("leather", "leather/2", "brown"),
-    ):
-        made.append(
-            maker(
-                f"storage_box_{name}",
-                "storage box",
-                f"{name} storage box",
-                (0.32, 0.36, 0.20),
-                storage_box,
-                on=("bookcase", "shelving unit", "wardrobe", "storage shelf", "cupboard", "open wall shelf"),
-                rooms={
-                    "closet": 1.0,
-                    "study": 0.7,
-                    "kids_room": 1.0,
-                    "laundry_room": 0.8,
-                    "pantry": 0.6,
-                    "garage": 0.4,
-                    "bedroom": 0.4,
-                    "playroom": 1.0,
-                },
-                synonyms=("box",),
-                colours=(colour,),
-                materials=("fabric",),
-                look={"skin": skin},
-            )
-        )
-    dict.fromkeys(
-        (
-            "living_room",
-            "kitchen",
-            "dining_room",
-            "main_bedroom",
-            "bedroom",
-            "kids_room",
-            "bathroom",
-            "hall",
-            "corridor",
-            "study",
-            "guest_room",
-            "toilet",
-        ),
-        1.0,
-    )
-    for name, cloth in (("teal", "linen/9"), ("mustard", "linen/7"), ("grey", "tweed/0")):
-        made.append(
-            maker(
-                f"floor_cushion_{name}",
-                "floor cushion",
-                f"{name} floor cushion",
-                (0.65, 0.65, 0.22),
-                bean_bag,
-                support="floor",
-                rooms={"kids_room": 1.0, "playroom": 1.0, "living_room": 0.3, "library": 0.4},
-                synonyms=("cushion", "pouffe"),
-                colours=(name,),
-                materials=("fabric",),
-                look={"cloth": cloth},
-            )
-        )
-    return made

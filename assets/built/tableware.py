@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Maker, maker, material, parts_of, plain
+from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Size, material, parts_of, plain
 from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, moved, scaled, tube, turned
 from assets.records import MeshPart
 
@@ -30,7 +30,7 @@ def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
     )
 
 
-def mug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def mug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A mug with a handle, coffee inside where look['coffee'] is 1."""
     w, d, h = size
     r = d / 2
@@ -57,7 +57,7 @@ def mug(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list
     return parts_of((color, [moved(cup(r, h), cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink))
 
 
-def tumbler(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def tumbler(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A drinking glass, with water where look['water'] is 1."""
     w, _, h = size
     r = w / 2
@@ -65,7 +65,7 @@ def tumbler(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> 
     return parts_of((GLASS, cup(r, h, 0.84, 0.0025)), (plain((0.75, 0.85, 0.88), 0.03), drink))
 
 
-def plates(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def plates(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Plates piled up (look['count'])."""
     w, _, h = size
     r, count = w / 2, int(look.get("count", 5))
@@ -94,7 +94,7 @@ def plates(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     return parts_of((color, [moved(one, 0, 0, k * step) for k in range(count)]))
 
 
-def bowl(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bowl(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A bowl, with fruit where look['fruit'] is 1."""
     w, _, h = size
     r = w / 2
@@ -119,7 +119,7 @@ def bowl(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> lis
     return parts_of((skin, shell), *heap)
 
 
-def bottle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def bottle(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A bottle with a label and a cap."""
     w, _, h = size
     r = w / 2
@@ -155,7 +155,7 @@ def bottle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def candle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def candle(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A pillar candle on a saucer, its rim melted."""
     w, _, h = size
     r, top = w / 2, h * 0.93
@@ -178,7 +178,7 @@ def candle(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> l
     )
 
 
-def paper_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def paper_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
     r = w / 2
     foot, rod = (
@@ -192,7 +192,7 @@ def paper_towel(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     )
 
 
-def board(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A chopping board with a grip hole, lying flat."""
 
     w, d, h = size
@@ -201,7 +201,7 @@ def board(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> li
     return parts_of((material(look, "wood", finish, "beech/0"), extruded(plate.difference(hole), 0, h)))
 
 
-def knife_block(size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def knife_block(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A leaning block of wood with knife handles standing out."""
     w, d, h = size
     lean = 0.32
@@ -221,248 +221,3 @@ def knife_block(size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
             )
     foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
     return parts_of((material(look, "wood", finish, "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))
-
-
-def tableware_makers() -> list[Maker]:
-    kitchen = {"kitchen": 1.0, "dining_room": 0.6}
-    living = {
-        "living_room": 1.0,
-        "dining_room": 0.7,
-        "hall": 0.5,
-        "study": 0.6,
-        "bedroom": 0.5,
-        "main_bedroom": 0.5,
-        "family_room": 0.8,
-        "kitchen": 0.5,
-        "sun_room": 1.0,
-    }
-    made = []
-    for colour in ("white", "blue", "green", "red", "yellow", "black"):
-        made.append(
-            maker(
-                f"mug_{colour}",
-                "mug",
-                f"{colour} mug",
-                (0.12, 0.085, 0.095),
-                mug,
-                on=(*KITCHEN_TOPS, "desk", "coffee table", "side table", "bedside table", "workbench"),
-                rooms={**kitchen, "study": 0.6, "living_room": 0.5},
-                synonyms=("cup",),
-                colours=(colour,),
-                materials=("ceramic",),
-                look={"colour": colour, "coffee": float(colour in ("white", "blue", "black"))},
-            )
-        )
-    made.append(
-        maker(
-            "glass",
-            "glass",
-            "drinking glass",
-            (0.075, 0.075, 0.115),
-            tumbler,
-            on=(*TABLES, *KITCHEN_TOPS, "bedside table"),
-            rooms={**kitchen, "bedroom": 0.3},
-            synonyms=("tumbler",),
-            colours=("transparent",),
-            materials=("glass",),
-        )
-    )
-    made.append(
-        maker(
-            "glass_water",
-            "glass",
-            "glass of water",
-            (0.072, 0.072, 0.13),
-            tumbler,
-            on=(*TABLES, "bedside table", "desk"),
-            rooms={**kitchen, "bedroom": 0.5, "study": 0.4},
-            synonyms=("tumbler",),
-            colours=("transparent",),
-            materials=("glass",),
-            look={"water": 1.0},
-        )
-    )
-    for colour in ("white", "blue", "sand"):
-        made.append(
-            maker(
-                f"plates_{colour}",
-                "stack of plates",
-                f"stack of {colour} plates",
-                (0.26, 0.26, 0.07),
-                plates,
-                on=(*KITCHEN_TOPS, "sideboard"),
-                rooms=kitchen,
-                synonyms=("plates",),
-                colours=(colour,),
-                materials=("ceramic",),
-                look={"colour": colour},
-            )
-        )
-        made.append(
-            maker(
-                f"plate_{colour}",
-                "plate",
-                f"{colour} plate",
-                (0.26, 0.26, 0.022),
-                plates,
-                on=TABLES,
-                rooms=kitchen,
-                colours=(colour,),
-                materials=("ceramic",),
-                look={"colour": colour, "count": 1},
-            )
-        )
-    made.append(
-        maker(
-            "bowl_wood",
-            "bowl",
-            "wooden bowl",
-            (0.26, 0.26, 0.09),
-            bowl,
-            on=(*TABLES, *KITCHEN_TOPS),
-            rooms=kitchen,
-            colours=("brown",),
-            materials=("wood",),
-            look={"skin": "walnut/0"},
-        )
-    )
-    made.append(
-        maker(
-            "bowl_white",
-            "bowl",
-            "white bowl",
-            (0.20, 0.20, 0.08),
-            bowl,
-            on=(*TABLES, *KITCHEN_TOPS),
-            rooms=kitchen,
-            colours=("white",),
-            materials=("ceramic",),
-        )
-    )
-    made.append(
-        maker(
-            "fruit_bowl_wood",
-            "fruit bowl",
-            "wooden bowl of fruit",
-            (0.28, 0.28, 0.14),
-            bowl,
-            on=(*TABLES, *KITCHEN_TOPS),
-            rooms=kitchen,
-            colours=("brown", "red"),
-            materials=("wood",),
-            look={"skin": "oak/0", "fruit": 1.0},
-        )
-    )
-    made.append(
-        maker(
-            "fruit_bowl_white",
-            "fruit bowl",
-            "white bowl of fruit",
-            (0.27, 0.27, 0.15),
-            bowl,
-            on=(*TABLES, *KITCHEN_TOPS),
-            rooms=kitchen,
-            colours=("white", "orange"),
-            materials=("ceramic",),
-            look={"fruit": 1.0, "seed": 3},
-        )
-    )
-    for name, cls, colour, size, spots, rooms in (
-        ("wine", "wine bottle", "green", (0.076, 0.076, 0.31), (*KITCHEN_TOPS, "sideboard"), kitchen),
-        ("oil", "oil bottle", "brown", (0.065, 0.065, 0.27), KITCHEN_TOPS, {"kitchen": 1.0}),
-        (
-            "water",
-            "water bottle",
-            "blue",
-            (0.075, 0.075, 0.24),
-            ("desk", "bedside table", "dining table", "treadmill"),
-            {"study": 0.7, "gym": 1.0, "bedroom": 0.4},
-        ),
-        (
-            "shampoo",
-            "shampoo bottle",
-            "white",
-            (0.07, 0.07, 0.20),
-            ("bathtub", "bathroom vanity", "washbasin", "shelving unit"),
-            {"bathroom": 1.0},
-        ),
-    ):
-        made.append(
-            maker(
-                f"bottle_{name}",
-                cls,
-                f"{colour} {cls}",
-                size,
-                bottle,
-                on=spots,
-                rooms=rooms,
-                synonyms=("bottle",),
-                colours=(colour,),
-                materials=("glass" if name in ("wine", "oil") else "plastic",),
-                look={"colour": colour, "neck": 0.36 if name in ("wine", "oil") else 0.55},
-            )
-        )
-    for dish, size in (("brass", (0.11, 0.11, 0.13)), ("black", (0.10, 0.10, 0.18))):
-        made.append(
-            maker(
-                f"candle_{dish}",
-                "candle",
-                "candle on a saucer",
-                size,
-                candle,
-                on=(*TABLES, "bathtub", "console", "fireplace", "bookcase", "side table"),
-                rooms=living,
-                colours=("white",),
-                materials=("wax",),
-                look={"dish": dish},
-            )
-        )
-    for name, wood in (("steel", 0.0), ("wood", 1.0)):
-        made.append(
-            maker(
-                f"paper_towel_{name}",
-                "paper towel holder",
-                f"kitchen roll on a {name} stand",
-                (0.15, 0.15, 0.31),
-                paper_towel,
-                on=KITCHEN_TOPS,
-                rooms={"kitchen": 1.0},
-                synonyms=("kitchen roll", "paper towels"),
-                colours=("white",),
-                materials=("paper", name),
-                look={"wood": wood},
-            )
-        )
-    for wood in ("beech", "walnut", "oak"):
-        made.append(
-            maker(
-                f"chopping_board_{wood}",
-                "chopping board",
-                f"{wood} chopping board",
-                (0.38, 0.25, 0.022),
-                board,
-                on=KITCHEN_TOPS,
-                rooms={"kitchen": 1.0},
-                synonyms=("cutting board",),
-                colours=("brown",),
-                materials=("wood", wood),
-                look={"wood": f"{wood}/0"},
-            )
-        )
-    for wood in ("beech", "walnut"):
-        made.append(
-            maker(
-                f"knife_block_{wood}",
-                "knife block",
-                f"{wood} knife block",
-                (0.11, 0.17, 0.30),
-                knife_block,
-                on=KITCHEN_TOPS,
-                rooms={"kitchen": 1.0},
-                synonyms=("knives",),
-                colours=("brown",),
-                materials=("wood",),
-                look={"wood": f"{wood}/0"},
-            )
-        )
-    return made

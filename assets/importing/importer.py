@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -16,48 +17,27 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
-from assets.importing.obj import Material, MeshError, parse_mtl, parse_obj
-from assets.importing.sh3f import IDENTITY, Pack, PackError
-from assets.records import Finish, MeshPart
+from assets.importing.obj import Material, MeshError, libraries, parse_mtl, parse_obj
+from assets.importing.sh3f import Pack, PackError
+from assets.records import Finish, MeshPart, Recipe
 
 VERSION = 3
 """Part of every cache key; raise it when the import changes."""
+FORMATS = ("PNG", "JPEG", "BMP", "TGA")
+"""What textures are opened as. Pillow knows many more; some of them start other programs (PostScript)."""
 MAX_TEXTURE = 512
 MAX_PIXELS = 64_000_000
 FACE_BUDGETS = ((0.3, 3_000), (0.8, 6_000), (30.0, 10_000))
 """Faces a model keeps, by its longest side in metres."""
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """All that decides what an import gives, beside the pack itself."""
-
-    key: str
-    size: tuple[float, float, float]
-    """Width, depth, height, metres."""
-    yaw: float = 0.0
-    """Degrees counter-clockwise that bring the model's front to -y."""
-    rotation: tuple[float, ...] = IDENTITY
-    two_sided: tuple[str, ...] = ()
-    """Materials whose faces are also seen from behind: leaves, sheets; '*' is all of them."""
-    flipped: tuple[str, ...] = ()
-    """Materials whose faces the pack winds inside out."""
-    glow: tuple[str, ...] = ()
-    """Materials that glow when the lamp is on."""
-    emits: tuple[float, float, float] | None = None
-    dropped: tuple[str, ...] = ()
-    """Materials that are left out: shadows painted on the floor, helper planes."""
-    looks: tuple[tuple[str, str], ...] = ()
-    """Material and the reviewer's words for it (assets.importing.mtl_finish.corrected)."""
-    faces: int = 0
-    """Face budget; 0 takes FACE_BUDGETS."""
-    model: str = ""
-    """The model that this one is a variant of, where it is one."""
+Reader = Callable[[str], bytes]
+"""The bytes of a file by its name; PackError or FileNotFoundError where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +80,11 @@ def cached(recipe: Recipe, source: str, cache: Path, read: Callable[[], tuple[Ra
     return parts
 
 
-def read_obj(read: Callable[[str], bytes], name: str, where: str) -> tuple[RawPart, ...]:
+def read_obj(read: Reader, name: str, where: str, remedy: str = "install the pack again") -> tuple[RawPart, ...]:
     """The parts of the OBJ file `name`, with its MTL and textures read by `read`.
+
+    Args:
+      remedy: what to do about a texture that cannot be read.
 
     Raises:
       MeshError, PackError: damaged or missing files.
@@ -110,10 +93,7 @@ def read_obj(read: Callable[[str], bytes], name: str, where: str) -> tuple[RawPa
     obj = parse_obj(read(name).decode("latin-1"), where)
     materials: dict[str, Material] = {}
     for library in obj.libraries:
-        try:
-            materials |= parse_mtl(read(str(folder / library)).decode("latin-1"))
-        except (PackError, FileNotFoundError):
-            continue
+        materials |= parse_mtl((_read_if_there(read, str(folder / library)) or b"").decode("latin-1"))
     images: dict[str, Image.Image | None] = {}
     parts = []
     for group in obj.groups:
@@ -121,13 +101,35 @@ def read_obj(read: Callable[[str], bytes], name: str, where: str) -> tuple[RawPa
         image = None
         if material.texture and (group.uv_corners >= 0).all():
             if material.texture not in images:
-                images[material.texture] = _image(read, str(folder / material.texture.replace("\\", "/")))
+                images[material.texture] = _image(read, _texture_name(folder, material.texture), remedy)
             image = images[material.texture]
         uv = obj.uvs[group.uv_corners] if image is not None else None
         parts.append(
             RawPart(group.material, obj.vertices, group.corners, uv, finish_of(material, image is not None), image)
         )
     return tuple(parts)
+
+
+def obj_files(read: Reader, name: str) -> tuple[str, ...]:
+    """The MTL files and textures that the OBJ file `name` names, whether they are there or not."""
+    folder, found = PurePosixPath(name).parent, []
+    for library in libraries(read(name).decode("latin-1")):
+        found.append(str(folder / library))
+        materials = parse_mtl((_read_if_there(read, found[-1]) or b"").decode("latin-1"))
+        found += [_texture_name(folder, m.texture) for m in materials.values() if m.texture]
+    return tuple(dict.fromkeys(found))
+
+
+def _texture_name(folder: PurePosixPath, texture: str) -> str:
+    return str(folder / texture.replace("\\", "/"))
+
+
+def _read_if_there(read: Reader, name: str) -> bytes | None:
+    """The bytes of a file that models may do without; None where it is lost."""
+    try:
+        return read(name)
+    except (PackError, FileNotFoundError):
+        return None
 
 
 def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPart, Image.Image | None]]:
@@ -193,7 +195,9 @@ def _placed(raw: tuple[RawPart, ...], recipe: Recipe) -> list[np.ndarray]:
     return [((v - centre) * scale)[:, [0, 2, 1]] * [1.0, -1.0, 1.0] @ spin for v in turned]
 
 
-def _part(part: RawPart, points, faces, uv, recipe: Recipe) -> tuple[MeshPart, Image.Image | None]:
+def _part(
+    part: RawPart, points: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, recipe: Recipe
+) -> tuple[MeshPart, Image.Image | None]:
     vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
     finish = part.finish
     if part.name in recipe.glow and recipe.emits:
@@ -210,27 +214,31 @@ def _to_size(parts: list, size: tuple[float, float, float]) -> list:
     return [(replace(p, vertices=(p.vertices - origin) * stretch), image) for p, image in parts]
 
 
-def _image(read: Callable[[str], bytes], name: str) -> Image.Image | None:
+def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
     """The texture `name` at most MAX_TEXTURE wide, or None where the pack lost it."""
-    try:
-        data = read(str(PurePosixPath(name)))
-    except (PackError, FileNotFoundError):
+    data = _read_if_there(read, name)
+    if data is None:
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         try:
-            image = Image.open(io.BytesIO(data))
-            if image.width * image.height > MAX_PIXELS:
-                raise PackError(f"texture {name} has {image.width} x {image.height} pixels; do not use this pack")
-            clear = image.mode in ("RGBA", "LA") or "transparency" in image.info
-            image = image.convert("RGBA" if clear else "RGB")
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as e:
-            raise PackError(f"texture {name} cannot be read ({e}); install the pack again") from e
-    if clear and image.getextrema()[3][0] > 250:
+            with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
+                if opened.width * opened.height > MAX_PIXELS:
+                    raise PackError(f"texture {name} has {opened.width} x {opened.height} pixels; make it smaller")
+                clear = opened.mode in ("RGBA", "LA") or "transparency" in opened.info
+                image = opened.convert("RGBA" if clear else "RGB")
+        except UnidentifiedImageError as e:
+            raise PackError(f"texture {name} cannot be read: it is none of {', '.join(FORMATS)}; {remedy}") from e
+        except PackError:
+            raise
+        except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as e:
+            raise PackError(f"texture {name} cannot be read ({e}); {remedy}") from e
+    if clear and image.getchannel("A").getextrema()[0] > 250:
         image = image.convert("RGB")
     scale = MAX_TEXTURE / max(image.size)
     if scale < 1.0:
-        image = image.resize([max(1, round(s * scale)) for s in image.size], Image.LANCZOS)
+        width, height = (max(1, round(s * scale)) for s in image.size)
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
     return image
 
 

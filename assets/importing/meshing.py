@@ -9,6 +9,13 @@ from scipy.spatial import cKDTree
 CREASE = np.radians(42.0)
 """Faces that meet at less than this angle share a smooth normal."""
 
+MANY = 256
+"""Faces around one vertex above which they are taken together by direction; furniture has up to some 100."""
+PAIRS = 4_000_000
+"""Pairs of corners compared at a time."""
+CELLS = 8
+"""Cells of directions per unit: some 800 on the sphere, 7 degrees wide."""
+
 WORKING_SIZE, AGGRESSIVENESS = 50.0, 5.0
 """The simplifier's error thresholds are absolute, so parts are brought to this extent for it: at
 their size in metres it would take every collapse of a small thing for free."""
@@ -45,31 +52,66 @@ def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> np.ndarray:
     """(m, 3, 3) unit normal of every corner: the mean, weighted by angle and area, over the faces
     around the vertex that turn from the corner's own face by less than `crease`. The areas keep
-    large flat panels flat beside their small bevels."""
+    large flat panels flat beside their small bevels.
+
+    Time and memory grow with the number of corners: at a vertex where more than MANY faces meet,
+    they are taken together by direction (`_hub_sums`).
+    """
     unit = face_normals(vertices, faces)
     area = np.linalg.norm(unit, axis=1, keepdims=True)
     unit /= np.maximum(area, 1e-30)
     weight = (corner_angles(vertices, faces) * area).reshape(-1)
     weight /= max(float(weight.max(initial=0.0)), 1e-30)
     corner_vertex = faces.reshape(-1)
-    corner_face = np.repeat(np.arange(len(faces)), 3)
-    order = np.argsort(corner_vertex, kind="stable")
-    counts = np.bincount(corner_vertex, minlength=len(vertices))
-    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
-    mine = np.repeat(np.arange(len(corner_vertex)), counts[corner_vertex])
-    rank = np.arange(len(mine)) - np.repeat(
-        np.cumsum(counts[corner_vertex]) - counts[corner_vertex], counts[corner_vertex]
-    )
-    other = order[starts[corner_vertex[mine]] + rank]
-    cosine = np.einsum("ij,ij->i", unit[corner_face[mine]], unit[corner_face[other]])
-    smooth = cosine > np.cos(crease)
-    normal = np.zeros((len(corner_vertex), 3))
-    for axis in range(3):
-        contribution = unit[corner_face[other[smooth]], axis] * weight[other[smooth]]
-        normal[:, axis] = np.bincount(mine[smooth], contribution, minlength=len(corner_vertex))
+    normal = np.empty((len(corner_vertex), 3))
+    around = _Around(corner_vertex, np.argsort(corner_vertex, kind="stable"), len(vertices))
+    few = np.flatnonzero(around.counts[corner_vertex] <= MANY)
+    pairs = np.cumsum(around.counts[corner_vertex[few]])
+    for chunk in np.split(few, np.searchsorted(pairs, np.arange(PAIRS, pairs[-1] if len(few) else 0, PAIRS))):
+        normal[chunk] = _corner_sums(chunk, around, unit, weight, np.cos(crease))
+    for hub in np.flatnonzero(around.counts > MANY):
+        corners = around.order[around.starts[hub] : around.starts[hub] + around.counts[hub]]
+        normal[corners] = _hub_sums(unit[corners // 3], weight[corners], np.cos(crease))
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.where(length > 1e-15, normal / np.maximum(length, 1e-15), unit[corner_face])
+    normal = np.where(length > 1e-15, normal / np.maximum(length, 1e-15), np.repeat(unit, 3, axis=0))
     return normal.reshape(-1, 3, 3)
+
+
+class _Around:
+    """The corners (face * 3 + k) at each vertex: `order[starts[v] : starts[v] + counts[v]]`."""
+
+    def __init__(self, corner_vertex: np.ndarray, order: np.ndarray, vertices: int) -> None:
+        self.vertex, self.order = corner_vertex, order
+        self.counts = np.bincount(corner_vertex, minlength=vertices)
+        self.starts = np.cumsum(self.counts) - self.counts
+
+
+def _corner_sums(
+    corners: np.ndarray, around: _Around, unit: np.ndarray, weight: np.ndarray, least: float
+) -> np.ndarray:
+    """(c, 3) weighted sums of face normals around `corners` (c,), over the faces whose cosine is over `least`."""
+    counts = around.counts[around.vertex[corners]]
+    mine = np.repeat(np.arange(len(corners)), counts)
+    rank = np.arange(len(mine)) - np.repeat(np.cumsum(counts) - counts, counts)
+    other = around.order[around.starts[around.vertex[corners[mine]]] + rank]
+    cosine = np.einsum("ij,ij->i", unit[corners[mine] // 3], unit[other // 3])
+    mine, other = mine[cosine > least], other[cosine > least]
+    sums = [np.bincount(mine, unit[other // 3, k] * weight[other], minlength=len(corners)) for k in range(3)]
+    return np.stack(sums, axis=1)
+
+
+def _hub_sums(unit: np.ndarray, weight: np.ndarray, least: float) -> np.ndarray:
+    """As `_corner_sums` for the k corners of one vertex: normals (k, 3) that fall into the same small
+    cell count as one direction, so that no more than some hundreds are compared with one another."""
+    _, cell = np.unique(np.round(unit * CELLS).astype(np.int64), axis=0, return_inverse=True)
+    cell = cell.reshape(-1)
+    sums = np.stack([np.bincount(cell, unit[:, k] * weight) for k in range(3)], axis=1)
+    middle = np.stack([np.bincount(cell, unit[:, k]) for k in range(3)], axis=1)
+    middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-30)
+    smooth = np.concatenate(
+        [(rows @ middle.T > least) @ sums for rows in np.array_split(middle, 1 + len(middle) // 512)]
+    )
+    return smooth[cell]
 
 
 def corner_angles(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -94,9 +136,9 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, tar
       vertices, faces and the corners' uv of the smaller mesh. Texture coordinates are read back
       from the nearest original triangle, so seams may lie anywhere.
     """
-    points, small = _collapse(vertices, faces, np.empty((0, 3)), np.empty((0, 3), int), target, keep_rims=True)
+    points, small = _collapse(vertices, faces, (np.empty((0, 3)), np.empty((0, 3), int)), target, keep_rims=True)
     if len(small) > 1.5 * target:
-        points, small = _collapse(vertices, faces, *border_fins(vertices, faces), target, keep_rims=False)
+        points, small = _collapse(vertices, faces, border_fins(vertices, faces), target, keep_rims=False)
     keep = sound_faces(points, small) if len(small) else np.zeros(0, dtype=bool)
     small = small[keep]
     if not len(small) or not np.isfinite(points).all():
@@ -104,11 +146,13 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, tar
     return points, small, None if uv is None else project_uv(vertices, faces, uv, points, small)
 
 
-def _collapse(vertices, faces, fins, fin_faces, target: int, keep_rims: bool) -> tuple[np.ndarray, np.ndarray]:
+def _collapse(
+    vertices: np.ndarray, faces: np.ndarray, fins: tuple[np.ndarray, np.ndarray], target: int, keep_rims: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Edge collapses down to about `target` faces, the fins left out of the result."""
     extent = max(float(np.ptp(vertices[np.unique(faces)], axis=0).max()), 1e-9)
-    fenced = np.concatenate([vertices, fins]) * (WORKING_SIZE / extent)
-    fenced_faces = np.concatenate([faces, fin_faces]).astype(np.int32)
+    fenced = np.concatenate([vertices, fins[0]]) * (WORKING_SIZE / extent)
+    fenced_faces = np.concatenate([faces, fins[1]]).astype(np.int32)
     _, _, collapses = fast_simplification.simplify(
         fenced,
         fenced_faces,
@@ -153,7 +197,9 @@ def border_fins(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
     )
 
 
-def project_uv(vertices, faces, uv, points, small) -> np.ndarray:
+def project_uv(
+    vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray, points: np.ndarray, small: np.ndarray
+) -> np.ndarray:
     """(k, 3, 2) corners' uv of the mesh (points, small) taken from the mesh (vertices, faces, uv)."""
     rows = np.repeat(np.arange(len(faces)), 7)
     bary = np.tile(

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 MAX_FACES = 2_000_000
+MAX_CORNERS = 20_000
+"""Of one polygon."""
 
 
 class MeshError(ValueError):
@@ -89,6 +91,12 @@ def parse_obj(text: str, where: str) -> Obj:
     return Obj(points, coords, groups, tuple(dict.fromkeys(libraries)))
 
 
+def libraries(text: str) -> tuple[str, ...]:
+    """The names of the MTL files that an OBJ file wants, without reading its mesh."""
+    found = [line.lstrip().partition(" ") for line in text.replace("\\\n", " ").splitlines()]
+    return tuple(dict.fromkeys(rest.strip() for head, _, rest in found if head == "mtllib"))
+
+
 def parse_mtl(text: str) -> dict[str, Material]:
     """The materials of an MTL file by name; lines it does not know are ignored."""
     materials: dict[str, Material] = {}
@@ -155,6 +163,10 @@ def _group(name: str, polygons: list[list[str]], points: np.ndarray, uv_count: i
     except (ValueError, IndexError) as e:
         raise MeshError(f"{where} has a face with a bad index ({e}); the model is damaged") from e
     corners, uv_corners = [np.empty((0, 3), np.int64)], [np.empty((0, 3), np.int64)]
+    if max(by_size, default=0) > MAX_CORNERS:
+        raise MeshError(
+            f"{where} has a polygon of {max(by_size)} corners, at most {MAX_CORNERS} are read; simplify the model"
+        )
     for n in sorted(by_size):
         rows = np.array(by_size[n], dtype=np.int64)
         polygon, order = _split(rows[:, :n], points)
@@ -219,35 +231,68 @@ def _triangles(p: np.ndarray) -> list[tuple[int, int, int]]:
 
 
 def _ears(p: np.ndarray) -> list[tuple[int, int, int]]:
-    """Ear clipping of a simple counter-clockwise polygon (n, 2)."""
-    left = list(range(len(p)))
+    """Ear clipping of a simple counter-clockwise polygon (n, 2): always the first ear, or where there is
+    none the least bad corner. A corner that is no ear is looked at again only when that can have changed it."""
+    ring = _Ring(p)
     out = []
-    while len(left) > 3:
-        best, best_score = 0, -np.inf
-        for i in range(len(left)):
-            a, b, c = left[i - 1], left[i], left[(i + 1) % len(left)]
-            area = _cross(p[a], p[b], p[c])
-            if area <= 0:
-                score = area - 1e6
-            elif any(_inside(p[q], p[a], p[b], p[c]) for q in left):
-                score = -1e9
-            else:
-                best = i
-                break
-            if score > best_score:
-                best, best_score = i, score
-        out.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
-        del left[best]
-    out.append(tuple(left))
-    return out
+    while ring.count > 3:
+        corner = ring.first_ear()
+        out.append((int(ring.before[corner]), corner, int(ring.after[corner])))
+        ring.cut(corner)
+    a, b, c = np.flatnonzero(ring.left).tolist()
+    return [*out, (a, b, c)]
 
 
-def _cross(a, b, c) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+class _Ring:
+    """The corners that are left of a polygon while its ears are cut, and what is known about each."""
 
+    def __init__(self, p: np.ndarray) -> None:
+        self.p, self.x, self.y = p, np.ascontiguousarray(p[:, 0]), np.ascontiguousarray(p[:, 1])
+        self.count = len(p)
+        self.left = np.ones(len(p), dtype=bool)
+        self.before, self.after = np.roll(np.arange(len(p)), 1), np.roll(np.arange(len(p)), -1)
+        self.hopeful = np.ones(len(p), dtype=bool)
+        """Corners that are ears or have not been looked at since something changed."""
+        self.ear = np.zeros(len(p), dtype=bool)
+        self.score = np.full(len(p), -np.inf)
+        self.blocker = np.full(len(p), -1)
+        """The corner inside the triangle of one that is no ear."""
 
-def _inside(q, a, b, c) -> bool:
-    """Whether q is in the triangle, its corners (which keyhole polygons visit twice) apart."""
-    if any((q == x).all() for x in (a, b, c)):
-        return False
-    return _cross(a, b, q) >= 0 and _cross(b, c, q) >= 0 and _cross(c, a, q) >= 0
+    def first_ear(self) -> int:
+        """The first corner whose triangle holds no other corner, or the best one where there is no such."""
+        while self.hopeful[corner := int(np.argmax(self.hopeful))]:
+            if not self.ear[corner]:
+                self._look(corner)
+            if self.ear[corner]:
+                return corner
+        return int(np.argmax(self.score))
+
+    def cut(self, corner: int) -> None:
+        """Take a corner out; its neighbours, and those it kept from being ears, may be ears now."""
+        a, b = self.before[corner], self.after[corner]
+        self.after[a], self.before[b] = b, a
+        self.count -= 1
+        self.ear[[a, b]] = False
+        self.hopeful[[a, b]] = True
+        self.hopeful |= self.blocker == corner
+        self.left[corner] = self.hopeful[corner] = False
+        self.score[corner], self.blocker[corner] = -np.inf, -1
+
+    def _look(self, corner: int) -> None:
+        (ax, ay), (bx, by), (cx, cy) = self.p[[self.before[corner], corner, self.after[corner]]].tolist()
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        self.hopeful[corner], self.blocker[corner] = False, -1
+        if area <= 0:
+            self.score[corner] = area - 1e6
+            return
+        x, y = self.x, self.y
+        inside = self.left & ((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0)
+        inside &= (cx - bx) * (y - by) - (cy - by) * (x - bx) >= 0
+        within = np.flatnonzero(inside & ((ax - cx) * (y - cy) - (ay - cy) * (x - cx) >= 0))
+        # Its own corners apart, which keyhole polygons visit twice.
+        corners = ((ax, ay), (bx, by), (cx, cy))
+        blocker = next((q for q in within[::-1].tolist() if (x[q], y[q]) not in corners), -1)
+        if blocker >= 0:
+            self.score[corner], self.blocker[corner] = -1e9, blocker
+        else:
+            self.ear[corner] = self.hopeful[corner] = True

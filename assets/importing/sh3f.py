@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from assets.cache import digest
+from assets.records import IDENTITY
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
 MAX_ENTRY = 64 * 2**20
@@ -22,7 +23,6 @@ MAX_ENTRY = 64 * 2**20
 MAX_RATIO = 200
 """Unpacked over packed size above which a large entry is taken for a bomb; text packs 8 to 1."""
 MAX_ENTRIES = 20_000
-IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class PackError(ValueError):

@@ -1,0 +1,117 @@
+"""The table of built things, assets/data/built.json, read into Makers. docs/assets.md says what a row may hold."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from assets.built import bath, decor, entry, fittings, kitchen, lamps, papers, plants, soft, storage, tableware
+from assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
+from assets.materials import MATERIALS
+from assets.records import SupportSurface
+from assets.rows import FIELDS, WORD, CatalogueError, Field, Row, asset_of, check_row, is_number, is_text, merged
+
+MODULES = (bath, decor, entry, fittings, kitchen, lamps, papers, plants, soft, storage, tableware)
+BUILDS: Mapping[str, Build] = MappingProxyType(
+    {
+        f"{module.__name__.rpartition('.')[2]}.{name}": build
+        for module in MODULES
+        for name, build in vars(module).items()
+        if callable(build) and getattr(build, "__module__", "") == module.__name__ and not name.startswith("_")
+    }
+)
+"""Every builder by '<module>.<function>'."""
+SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxyType(
+    {"shelves": storage.shelf_surfaces}
+)
+"""Support surfaces that follow from size and look."""
+SURFACE_NUMBERS = {"z", "width", "depth", "headroom", "margin", "x", "y"}
+
+
+def _is_surfaces(value: object) -> bool:
+    if isinstance(value, str):
+        return value in SURFACES
+    return isinstance(value, list) and all(
+        isinstance(s, dict)
+        and is_text(s.get("name"))
+        and {"z", "width", "depth"} <= set(s)
+        and set(s) <= {"name", *SURFACE_NUMBERS}
+        and all(is_number(s[n]) for n in set(s) & SURFACE_NUMBERS)
+        for s in value
+    )
+
+
+def _is_look(value: object) -> bool:
+    return isinstance(value, dict) and all(is_text(v) or is_number(v) for v in value.values())
+
+
+BUILT_FIELDS = {
+    **{
+        name: FIELDS[name]
+        for name in ("class", "name", "size", "support", "on", "elevation", "clearance", "rooms")
+        + ("synonyms", "colours", "materials", "tags")
+    },
+    "build": Field(f"one of {', '.join(sorted(BUILDS))}", lambda v: v in BUILDS),
+    "surfaces": Field(
+        f"a list of {{name, z, width, depth, headroom, margin, x, y}}, or one of {sorted(SURFACES)}", _is_surfaces
+    ),
+    "emits": Field(f"one of {sorted(LIGHTS)}", lambda v: v in LIGHTS),
+    "after": WORD,
+    "set": WORD,
+    "look": Field("an object of words and numbers", _is_look),
+}
+SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": WORD}
+
+
+def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
+    """The makers of a table {"sets": {...}, "groups": [...]} by key 'built/<name>', keys sorted.
+
+    Args:
+      where: name of the file, for error messages.
+
+    Raises:
+      CatalogueError: a field that is unknown or holds what it should not, a key twice.
+    """
+    sets = {name: check_row(f"{where}: set {name!r}", row, SET_FIELDS) for name, row in table["sets"].items()}
+    makers: dict[str, Maker] = {}
+    for group in table["groups"]:
+        shared = {name: value for name, value in group.items() if name != "rows"}
+        for name, row in group["rows"].items():
+            thing, key = f"{where}: {name!r}", f"built/{name}"
+            if key in makers:
+                raise CatalogueError(f"{thing} stands there twice; give one of them another name")
+            makers[key] = _maker(thing, key, _whole(thing, shared, row, sets))
+    return MappingProxyType(dict(sorted(makers.items())))
+
+
+def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
+    """A row over its set over what its group shares, with the words of the material it is made after."""
+    check_row(where, {**shared, **row}, BUILT_FIELDS)
+    chosen: Row = {}
+    word = ""
+    if "set" in row:
+        if row["set"] not in sets:
+            raise CatalogueError(f"{where} names the unknown set {row['set']!r}; use one of {sorted(sets)}")
+        chosen = {name: value for name, value in sets[row["set"]].items() if name != "word"}
+        word = sets[row["set"]]["word"]
+    out = merged(shared, chosen, row, deep=("look",))
+    if "after" in out:
+        key = out.get("look", {}).get(out["after"])
+        if key not in MATERIALS:
+            raise CatalogueError(f"{where}: the look's {out['after']!r} should be a material's key, got {key!r}")
+        made_of = MATERIALS[key]
+        word = made_of.name
+        out = {"colours": list(made_of.colours), "materials": list(made_of.materials)} | out
+    return out | {"name": out.get("name", out["class"]).replace("{}", word)}
+
+
+def _maker(where: str, key: str, row: Row) -> Maker:
+    look: Look = row.get("look", {})
+    plain = {name: value for name, value in row.items() if name not in ("surfaces", "emits")}
+    asset = asset_of(where, key, plain | {"licence": "Apache-2.0"})
+    given = row.get("surfaces", [])
+    surfaces = SURFACES[given](asset.size, look) if isinstance(given, str) else tuple(surface(**s) for s in given)
+    asset = dataclasses.replace(asset, surfaces=surfaces, emits=LIGHTS[row["emits"]] if "emits" in row else None)
+    return Maker(asset, functools.partial(made, key, BUILDS[row["build"]], look), {"seed": 0.0, **look})
