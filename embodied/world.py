@@ -94,6 +94,7 @@ class World:
             "nodes": digest(self.graph.positions.tolist()),
             "mujoco": importlib.metadata.version("mujoco"),
             "code": code_digest(),
+            "own": self.catalogue.own_digests(p.asset for p in self.house.placements),
         }
 
     @functools.cached_property
