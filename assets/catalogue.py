@@ -80,7 +80,8 @@ class Catalogue:
           CatalogueError: unknown key.
           PackError, MeshError: the model's pack is missing or damaged.
         """
-        x, y, z = self._asset(key).size if size is None else size
+        own = self._asset(key).size
+        x, y, z = own if size is None else size
         return self._scaled(key, (x, y, z), tuple(params))
 
     def parameters(self, key: str) -> Mapping[str, str | float]:

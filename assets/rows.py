@@ -1,4 +1,4 @@
-"""Rows of the reviewed tables in assets/data and of users' catalogue.json: read, checked, turned into Assets and Recipes."""
+"""Rows of the tables in assets/data and of users' catalogue.json: read, checked, made Assets and Recipes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _is_looks(value: object) -> bool:
     return isinstance(value, dict) and all(is_text(k) and is_text(v) for k, v in value.items())
 
 
-TEXT = Field("one line of text", is_text)
+TEXT = Field("one line of text of at most 200 characters", is_text)
 WORD = Field("a word or more", lambda v: is_text(v) and bool(v.strip()))
 WORDS = Field("a list of words", lambda v: is_list(v, is_text))
 LENGTH = Field("a length from 0 to 30 metres", lambda v: is_number(v, 0.0, 30.0))

@@ -85,6 +85,9 @@ class HandCatalogue:
     def parameters(self, key: str) -> dict[str, float | str]:
         return {}
 
+    def own_digests(self, keys) -> dict[str, str]:
+        return {}
+
     def finish(self, key: str) -> Finish:
         return Finish({"oak_planks/0": (0.72, 0.55, 0.38, 1.0)}.get(key, (0.93, 0.92, 0.9, 1.0)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import tomllib
 from pathlib import Path
 
@@ -91,6 +92,29 @@ def test_only_the_command_line_composes_agents_and_viz():
             top_level = [n for n in ast.parse(path.read_text()).body if isinstance(n, (ast.Import, ast.ImportFrom))]
             names = [a.name for n in top_level for a in n.names] + [getattr(n, "module", "") or "" for n in top_level]
             assert not {n.split(".")[0] for n in names} & {"agents", "viz"}, f"{where} must import agents and viz late"
+
+
+def modules_within(package: str) -> dict[str, set[str]]:
+    """Module of `package` -> the modules of it that it imports."""
+    files = {p.relative_to(ROOT).as_posix()[:-3].replace("/", ".").removesuffix(".__init__"): p for p in sources()}
+    arrows: dict[str, set[str]] = {}
+    for module, path in files.items():
+        if module.split(".")[0] == package:
+            nodes = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom) and n.module]
+            whole = [(n.module, f"{n.module}.{a.name}") for n in nodes for a in n.names]
+            arrows[module] = {name if name in files else home for home, name in whole} & set(files)
+    return arrows
+
+
+def test_assets_has_no_circle():
+    """Counted by module: records, cache and rows lie below assets.importing and assets.built, the catalogue above
+    them. Counted by folder, assets and its own folders would import one another."""
+    order = list(graphlib.TopologicalSorter(modules_within("assets")).static_order())
+    assert order.index("assets.records") < order.index("assets.rows") < order.index("assets.importing.own")
+    assert order.index("assets.importing.own") < order.index("assets.catalogue")
+    assert (
+        order.index("assets.materials.registry") < order.index("assets.built.table") < order.index("assets.catalogue")
+    )
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
+from handmade_models import CUBE, write_own, write_pack
 
 from assets.attribution import attribution
-from assets.catalogue import DATA, load_catalogue
-from assets.importing.importer import Recipe, bounds, finish_parts, read_obj
+from assets.catalogue import load_catalogue
+from assets.importing.importer import bounds, finish_parts, read_obj
 from assets.importing.obj import MeshError, parse_obj
 from assets.importing.packs import find_packs
 from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from assets.importing.support_surfaces import contact, find_surfaces
-from assets.records import ROOM_KINDS, SUPPORTS
-from assets.rows import CatalogueError
+from assets.records import ROOM_KINDS, SUPPORTS, Recipe
+from assets.rows import DATA, CatalogueError
 
 SOME = (
     "scopia/bed1",
@@ -34,11 +34,6 @@ SOME = (
 )
 """A handful of models to import; every one would take minutes."""
 
-CUBE = "\n".join(
-    [f"v {x} {y} {z}" for z in (0, 1) for y in (0, 1) for x in (0, 1)]
-    + ["f 1 3 4 2", "f 5 6 8 7", "f 1 2 6 5", "f 3 7 8 4", "f 1 5 7 3", "f 2 4 8 6"]
-)
-
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory) -> Path:
@@ -49,24 +44,6 @@ def cache(tmp_path_factory) -> Path:
 def catalogue(cache):
     assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
     return load_catalogue(cache)
-
-
-def write_pack(path: Path, entries: dict[str, str | bytes], model: str = "mine/box/box.obj") -> Path:
-    rows = (
-        f"license=CC0-1.0\nid#1=box\nname#1=Box\nmodel#1=/{model}\nwidth#1=40\ndepth#1=30\nheight#1=20\ncreator#1=Me\n"
-    )
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as z:
-        z.writestr("PluginFurnitureCatalog.properties", rows)
-        for name, data in entries.items():
-            z.writestr(name, data)
-    return path
-
-
-def write_own(folder: Path, models: dict, classes: dict | None = None) -> Path:
-    folder.mkdir(exist_ok=True)
-    body = {"pack": "mine", "creator": "Me", "licence": "CC0-1.0", "classes": classes or {}, "models": models}
-    (folder / "catalogue.json").write_text(json.dumps(body))
-    return folder
 
 
 # the reviewed catalogue
@@ -290,73 +267,3 @@ def test_a_file_that_is_no_pack_is_refused(tmp_path):
         z.writestr("readme.txt", "hello")
     with pytest.raises(PackError, match="PluginFurnitureCatalog"):
         open_pack(tmp_path / "b.sh3f")
-
-
-# a user's own models
-
-
-def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
-    row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
-    own = write_own(
-        tmp_path / "own",
-        {
-            "a": {"file": "a.obj", **row},
-            "b": {"file": "b.glb", **row},
-            "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"},
-        },
-        {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}},
-    )
-    (own / "a.obj").write_text(CUBE)
-    trimesh.creation.box((2, 2, 2)).export(own / "b.glb")
-    write_pack(own / "c.sh3f", {"mine/box/box.obj": CUBE})
-    catalogue = load_catalogue(tmp_path, own=[own])
-    assert len(catalogue.of_class("garden gnome")) == 3
-    for name in "abc":
-        low, high = bounds(catalogue.mesh(f"mine/{name}"))
-        np.testing.assert_allclose(high - low, (0.4, 0.3, 0.2), atol=1e-4)
-    assert catalogue.assets["mine/a"].creator == "Me" and catalogue.assets["mine/a"].licence == "CC0-1.0"
-
-
-def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
-    base = {
-        "file": "a.obj",
-        "class": "side table",
-        "size": [0.4, 0.3, 0.2],
-        "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]],
-    }
-    red = {"of": "a", "class": "coffee table", "size": [0.8, 0.3, 0.1], "looks": {"": "#ff0000"}}
-    own = write_own(tmp_path / "own", {"a": base, "red": red})
-    (own / "a.obj").write_text(CUBE)
-    catalogue = load_catalogue(tmp_path, own=[own])
-    (part,) = catalogue.mesh("mine/red")
-    assert part.finish.color[:3] == (0.92, 0.0, 0.0) and catalogue.assets["mine/red"].object_class == "coffee table"
-    np.testing.assert_allclose(np.ptp(part.vertices, axis=0), (0.8, 0.3, 0.1), atol=1e-5)
-    (top,) = catalogue.assets["mine/red"].surfaces
-    assert (top.x0, top.x1, top.z) == pytest.approx((-0.4, 0.4, 0.1))
-
-
-@pytest.mark.parametrize(
-    ("row", "match"),
-    [
-        ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
-        ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
-        ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
-        ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
-        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "of": "nothing"}, "variant"),
-        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
-        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "support. should be one of"),
-        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
-    ],
-)
-def test_a_wrong_own_catalogue_says_what_is_wrong(tmp_path, row, match):
-    own = write_own(tmp_path / "own", {"box": row})
-    (own / "box.obj").write_text(CUBE)
-    with pytest.raises(CatalogueError, match=match):
-        load_catalogue(tmp_path, own=[own])
-
-
-def test_a_broken_glb_is_refused(tmp_path):
-    own = write_own(tmp_path / "own", {"box": {"file": "box.glb", "class": "mug", "size": [1, 1, 1]}})
-    (own / "box.glb").write_bytes(b"glTF" + b"\1" * 40)
-    with pytest.raises(MeshError, match="cannot be read"):
-        load_catalogue(tmp_path, own=[own]).mesh("mine/box")

@@ -98,7 +98,7 @@ def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
             rgb = [int(word[i : i + 2], 16) / 255 for i in (1, 3, 5)]
             change = {"color": (*(round(min(c, WHITEST), 4) for c in rgb), finish.color[3])}
             keep = False
-        elif re.fullmatch(r"alpha=[0-9.]+", word):
+        elif re.fullmatch(r"alpha=(0?\.[0-9]+|[01](\.0*)?)", word):
             change = {"color": (*finish.color[:3], float(word[6:]))}
         else:
             raise ValueError(f"unknown look {word!r}; use {sorted(LOOKS)}, '#rrggbb' or 'alpha=0.3'")

@@ -1,0 +1,440 @@
+"""A user's own models: read at their size, imported again when a file of theirs changes, refused for a reason."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import pickle
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from conftest import two_rooms
+from handmade_models import CUBE, write_own, write_pack
+from PIL import Image
+
+from assets.catalogue import load_catalogue
+from assets.importing import importer
+from assets.importing.importer import bounds
+from assets.importing.meshing import crease_normals
+from assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
+from assets.importing.sh3f import PackError
+from assets.rows import CatalogueError
+from embodied.house.house import Placement
+from embodied.navigation.graph import graph_of
+from embodied.world import open_world
+
+MUG = {"class": "mug", "size": [0.1, 0.1, 0.1]}
+PAINTED = "\n".join(
+    ["mtllib a.mtl", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "usemtl paint"]
+    + [
+        " ".join(["f", *(f"{v}/{k + 1}" for k, v in enumerate(line.split()[1:]))]) if line.startswith("f") else line
+        for line in CUBE.splitlines()
+    ]
+)
+
+
+def painted(folder: Path, colour: str = "red") -> Path:
+    """A folder with the cube `mine/box`, its .mtl and a texture of one colour."""
+    own = write_own(folder, {"box": {"file": "a.obj", **MUG}})
+    (own / "a.obj").write_text(PAINTED)
+    (own / "a.mtl").write_text("newmtl paint\nKd 0.2 0.4 0.6\nmap_Kd a.png\n")
+    Image.new("RGB", (8, 8), colour).save(own / "a.png")
+    return own
+
+
+def glb(header: dict, body: bytes = b"") -> bytes:
+    """A binary glTF file of a header and a binary chunk."""
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    body += b"\0" * (-len(body) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(body), 0x004E4942) + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def triangle(**changes) -> dict:
+    """The header of a .glb with one triangle of 36 bytes; `changes` replace its lists."""
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36}],
+    } | changes
+
+
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]], dtype="<f4").tobytes()
+
+
+def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
+    row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
+    own = write_own(
+        tmp_path / "own",
+        {
+            "a": {"file": "a.obj", **row},
+            "b": {"file": "b.glb", **row},
+            "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"},
+        },
+        {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}},
+    )
+    (own / "a.obj").write_text(CUBE)
+    trimesh.creation.box((2, 2, 2)).export(own / "b.glb")
+    write_pack(own / "c.sh3f", {"mine/box/box.obj": CUBE})
+    catalogue = load_catalogue(tmp_path, own=[own])
+    assert len(catalogue.of_class("garden gnome")) == 3
+    for name in "abc":
+        low, high = bounds(catalogue.mesh(f"mine/{name}"))
+        np.testing.assert_allclose(high - low, (0.4, 0.3, 0.2), atol=1e-4)
+    assert catalogue.assets["mine/a"].creator == "Me" and catalogue.assets["mine/a"].licence == "CC0-1.0"
+
+
+def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
+    base = {
+        "file": "a.obj",
+        "class": "side table",
+        "size": [0.4, 0.3, 0.2],
+        "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]],
+    }
+    red = {"of": "a", "class": "coffee table", "size": [0.8, 0.3, 0.1], "looks": {"": "#ff0000"}}
+    own = write_own(tmp_path / "own", {"a": base, "red": red})
+    (own / "a.obj").write_text(CUBE)
+    catalogue = load_catalogue(tmp_path, own=[own])
+    (part,) = catalogue.mesh("mine/red")
+    assert part.finish.color[:3] == (0.92, 0.0, 0.0) and catalogue.assets["mine/red"].object_class == "coffee table"
+    np.testing.assert_allclose(np.ptp(part.vertices, axis=0), (0.8, 0.3, 0.1), atol=1e-5)
+    (top,) = catalogue.assets["mine/red"].surfaces
+    assert (top.x0, top.x1, top.z) == pytest.approx((-0.4, 0.4, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("row", "match"),
+    [
+        ({"file": "../box.obj", "class": "mug", "size": [1, 1, 1]}, "inside"),
+        ({"file": "missing.obj", "class": "mug", "size": [1, 1, 1]}, "not in"),
+        ({"file": "box.obj", "class": "unicorn", "size": [1, 1, 1]}, "unknown class"),
+        ({"file": "box.obj", "class": "mug"}, "size of three lengths"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "of": "nothing"}, "variant"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "wings": 2}, "unknown fields"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "support": "magic"}, "support. should be one of"),
+        ({"file": "box.obj", "class": "mug", "size": [1, 1, 1], "rooms": {"dungeon": 1}}, "room kinds"),
+    ],
+)
+def test_a_wrong_own_catalogue_says_what_is_wrong(tmp_path, row, match):
+    own = write_own(tmp_path / "own", {"box": row})
+    (own / "box.obj").write_text(CUBE)
+    with pytest.raises(CatalogueError, match=match):
+        load_catalogue(tmp_path, own=[own])
+
+
+def test_a_broken_glb_is_refused(tmp_path):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.glb", "class": "mug", "size": [1, 1, 1]}})
+    (own / "box.glb").write_bytes(b"glTF" + b"\1" * 40)
+    with pytest.raises(MeshError, match="cannot be read"):
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+
+
+# files that change
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.mtl", "a.png"])
+def test_a_model_is_imported_again_when_any_of_its_files_has_changed(tmp_path, name):
+    own = painted(tmp_path / "own")
+
+    def read() -> tuple:
+        catalogue = load_catalogue(tmp_path / "cache", own=[own])
+        (part,) = catalogue.mesh("mine/box")
+        colour = None if part.finish.texture is None else Image.open(part.finish.texture).getpixel((0, 0))
+        return catalogue.own_digests(["mine/box", "built/rug"]), colour, part.finish.color, len(part.faces)
+
+    first, again = read(), read()
+    assert first == again and set(first[0]) == {"mine/box"}
+    if name == "a.obj":
+        (own / name).write_text(PAINTED.rpartition("\n")[0])
+    elif name == "a.mtl":
+        (own / name).write_text("newmtl paint\nKd 0.9 0.1 0.1\n")
+    else:
+        Image.new("RGB", (8, 8), "blue").save(own / name)
+    after = read()
+    assert after[0] != first[0] and after[1:] != first[1:]
+    if name != "a.obj":
+        (own / name).unlink()
+        assert read()[0] not in (first[0], after[0]), "a file that is gone is a change, too"
+
+
+def test_a_model_that_is_gone_since_the_catalogue_was_read_is_named(tmp_path):
+    own = painted(tmp_path / "own")
+    catalogue = load_catalogue(tmp_path, own=[own])
+    (own / "a.obj").unlink()
+    with pytest.raises(MeshError, match=r"a\.obj cannot be read.*put it back"):
+        catalogue.own_digests(["mine/box"])
+    with pytest.raises(MeshError, match=r"a\.obj cannot be read.*put it back"):
+        catalogue.mesh("mine/box")
+
+
+def test_a_world_does_not_believe_what_was_seen_before_a_model_changed(tmp_path):
+    own = painted(tmp_path / "own")
+    thing = Placement("mug_1", "mine/box", "mug", "living_room_1", (2.5, 2.5, 0.0), 0.0, MUG["size"])
+    house = dataclasses.replace(two_rooms(), placements=(thing,))
+    graph = graph_of(np.array([[2.5, 2.6, 1.5]]), np.empty((0, 2), int), ("a",), ("living_room_1",))
+
+    def path() -> Path:
+        catalogue = load_catalogue(tmp_path / "cache", own=[own])
+        with open_world(house, catalogue, tmp_path / "cache", graph=graph, size=64) as world:
+            return world.path
+
+    first = path()
+    assert path() == first
+    Image.new("RGB", (8, 8), "blue").save(own / "a.png")
+    assert path() != first
+
+
+# damaged and hostile files
+
+
+@pytest.mark.parametrize(
+    ("picture", "why"),
+    [
+        (b"\x89PNG\r\n\x1a\nbroken", "it is none of PNG, JPEG, BMP, TGA"),
+        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 8 8\nshowpage\n", "it is none of PNG, JPEG, BMP, TGA"),
+        ("cut", "cannot be read"),
+    ],
+)
+def test_a_damaged_texture_says_what_its_owner_can_do(tmp_path, picture, why, monkeypatch):
+    monkeypatch.setattr(subprocess, "check_call", lambda *a, **k: pytest.fail(f"another program was started: {a}"))
+    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: pytest.fail(f"another program was started: {a}"))
+    own = painted(tmp_path / "own")
+    if picture == "cut":
+        buffer = io.BytesIO()
+        Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)).save(buffer, "PNG")
+        picture = buffer.getvalue()[:2000]
+    (own / "a.png").write_bytes(picture)
+    with pytest.raises(PackError, match=why) as caught:
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    assert "save it again" in str(caught.value) and "install the pack" not in str(caught.value)
+
+
+def test_a_damaged_texture_of_a_pack_still_says_to_install_it_again(tmp_path):
+    with pytest.raises(PackError, match="install the pack again"):
+        importer.read_obj(
+            {"a.obj": PAINTED.encode(), "a.mtl": b"newmtl paint\nmap_Kd a.png\n", "a.png": b"no"}.__getitem__,
+            "a.obj",
+            "a",
+        )
+
+
+NO_BUFFER = {"componentType": 5126, "type": "VEC3"}
+BROKEN = {
+    "a view beyond the file": triangle(bufferViews=[{"buffer": 0, "byteLength": 10**6}]),
+    "a view of words": triangle(bufferViews=[{"buffer": 0, "byteLength": "many"}]),
+    "a view that is not there": triangle(
+        accessors=[{"bufferView": 7, "componentType": 5126, "count": 3, "type": "VEC3"}]
+    ),
+    "no accessors": triangle(accessors=None),
+    "more vertices than any memory": triangle(accessors=[{**NO_BUFFER, "count": 10**15}]),
+    "fewer than none": triangle(accessors=[{**NO_BUFFER, "count": -3}]),
+    "many large accessors": triangle(accessors=[{**NO_BUFFER, "count": 5_000_000}] * 40),
+    "a picture of PostScript": triangle(images=[{"bufferView": 0, "mimeType": "image/png"}]),
+    "a picture in another file": triangle(images=[{"uri": "../../etc/passwd"}]),
+    "a mesh of lists": triangle(meshes=[[]]),
+    "vertices that are no numbers": triangle(
+        accessors=[{"bufferView": 0, "componentType": 5126, "count": 9, "type": "X"}]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_an_impossible_glb_is_refused(tmp_path, name):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.glb", **MUG}})
+    (own / "box.glb").write_bytes(
+        glb(BROKEN[name], TRIANGLE if "Post" not in name else b"%!PS-Adobe-3.0 EPSF-3.0\n" * 2)
+    )
+    with pytest.raises(MeshError, match="export it again as binary glTF 2.0"):
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+
+
+def test_the_glb_that_the_others_are_broken_from_is_whole(tmp_path):
+    own = write_own(tmp_path / "own", {"box": {"file": "box.GLB", **MUG}})
+    (own / "box.GLB").write_bytes(glb(triangle(), TRIANGLE))
+    (part,) = load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    assert len(part.faces) == 1
+
+
+LONG = "9" * 400
+WRONG_ROWS = [
+    ("models", "null", "object of models"),
+    ("models", "7", "object of models"),
+    ("models", '{"box": null}', "should be an object"),
+    ("models", '{"box": 3}', "should be an object"),
+    ("classes", '{"mug": []}', "should be an object"),
+    ("classes", "[1]", "object of classes"),
+    ("classes", '{"mug": {"on": 3}}', "list of words"),
+    ("classes", '{"mug": {"clearance": -1}}', "length from 0"),
+    ("pack", "3", "word without"),
+    ("pack", '"../up"', "word without"),
+    ("licence", "{}", "line of text"),
+    *(
+        ("models", f'{{"box": {{"file": "a.obj", "class": "mug", "size": [1, 1, 1], {more}}}}}', why)
+        for more, why in (
+            (f'"size": [{LONG}, 1, 1]', "three lengths"),
+            ('"size": [1e-9, 1, 1]', "three lengths"),
+            ('"size": [true, 1, 1]', "three lengths"),
+            ('"looks": 3', "'looks' should be"),
+            ('"looks": {"paint": 3}', "'looks' should be"),
+            ('"looks": {"paint": "shiny"}', "unknown look 'shiny'"),
+            ('"looks": {"paint": "alpha=1.2.3"}', "unknown look"),
+            ('"rooms": {"hall": -1}', "weights from 0"),
+            ('"rooms": ["hall"]', "weights from 0"),
+            ('"surfaces": [["top"]]', "'surfaces' should be"),
+            ('"surfaces": 3', "'surfaces' should be"),
+            ('"surfaces": [["top", 0, 1, 1, 0, 0, 9]]', "x0 < x1"),
+            ('"of": []', "'of' should be"),
+            ('"emits": ["red", "green", "blue"]', "three numbers"),
+            ('"emits": [1, 2]', "three numbers"),
+            ('"elevation": NaN', "length from 0"),
+            ('"clearance": -0.5', "length from 0"),
+            ('"name": 7', "'name' should be"),
+            ('"synonyms": "cup"', "list of words"),
+            ('"colours": [1]', "list of words"),
+            ('"file": {}', "'file' should be"),
+            ('"file": "a.obj\\u0000"', "'file' should be"),
+            (f'"file": "{"a" * 300}.obj"', "at most 200 characters"),
+            ('"yaw": "left"', "number of degrees"),
+            ('"faces": 1.5', "whole number"),
+            ('"name": "\\ud800"', "'name' should be"),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("field", "value", "match"), WRONG_ROWS)
+def test_a_catalogue_of_wrong_types_says_what_it_should_hold(tmp_path, field, value, match):
+    (tmp_path / "a.obj").write_text(CUBE)
+    (tmp_path / "catalogue.json").write_text(f'{{"{field}": {value}}}')
+    with pytest.raises(CatalogueError, match=match) as caught:
+        load_catalogue(tmp_path / "cache", own=[tmp_path])
+    assert "catalogue.json" in str(caught.value) and len(str(caught.value)) < 1500
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [("[" * 100_000, "nested too deeply"), (f'{{"models": {"9" * 5000}}}', "not JSON"), ("\xff", "not JSON")],
+)
+def test_a_catalogue_that_no_parser_takes_is_refused(tmp_path, text, match):
+    (tmp_path / "catalogue.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(CatalogueError, match=match):
+        load_catalogue(tmp_path / "cache", own=[tmp_path])
+
+
+def test_a_symbolic_link_to_itself_is_refused(tmp_path):
+    own = write_own(tmp_path / "own", {"box": {"file": "a.obj", **MUG}})
+    (own / "a.obj").symlink_to("a.obj")
+    with pytest.raises(CatalogueError, match="inside"):
+        load_catalogue(tmp_path, own=[own])
+    (own / "catalogue.json").unlink()
+    (own / "catalogue.json").symlink_to("catalogue.json")
+    with pytest.raises(CatalogueError, match="cannot be read"):
+        load_catalogue(tmp_path, own=[own])
+
+
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
+    own = painted(tmp_path / "own")
+    (tmp_path / "secret.mtl").write_text("newmtl paint\nKd 1 0 0\n")
+    (own / "a.mtl").unlink()
+    (own / "a.mtl").symlink_to(tmp_path / "secret.mtl")
+    (part,) = load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    assert part.finish.color[:3] == (0.8, 0.8, 0.8)
+
+
+# large polygons
+
+
+def star(corners: int) -> np.ndarray:
+    """(corners, 2) a polygon of spikes, concave at every other corner."""
+    angle = np.arange(corners) / corners * 2 * np.pi
+    return np.stack([np.cos(angle), np.sin(angle)], 1) * np.random.default_rng(0).uniform(0.3, 1.0, (corners, 1))
+
+
+def test_a_polygon_of_ten_thousand_corners_is_filled_quickly_and_exactly():
+    points = star(10_000)
+    text = "\n".join([*(f"v {x:.12f} 0 {-y:.12f}" for x, y in points), "f " + " ".join(map(str, range(1, 10_001)))])
+    start = time.monotonic()
+    (group,) = parse_obj(text, "star").groups
+    assert time.monotonic() - start < 60, "0.6 s on an idle core; minutes mean that it is quadratic or worse again"
+    a, b, c = points[group.corners].transpose(1, 0, 2)
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    x, y = points.T
+    assert len(group.corners) == 9_998 and (area > -1e-9).all()
+    assert area.sum() == pytest.approx((x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+
+def test_a_polygon_of_more_corners_than_are_read_is_refused():
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf " + "1 2 3 " * (MAX_CORNERS // 3 + 1)
+    with pytest.raises(MeshError, match=f"at most {MAX_CORNERS} are read"):
+        parse_obj(text, "large")
+
+
+def fan(faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """A cone of 45 degrees around one tip."""
+    angle = np.arange(faces) / faces * 2 * np.pi
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(faces)], axis=1)
+    k = np.arange(faces)
+    return np.concatenate([[[0.0, 0.0, 1.0]], rim]), np.stack(
+        [np.zeros(faces, int), 1 + k, 1 + (k + 1) % faces], axis=1
+    )
+
+
+def test_normals_around_one_vertex_take_time_and_memory_like_the_number_of_faces():
+    start = time.monotonic()
+    normals = crease_normals(*fan(200_000))
+    assert time.monotonic() - start < 30, "the square of 200,000 pairs would not fit into memory"
+    assert np.allclose(
+        normals[:, 1], fan(200_000)[0][1:] @ np.diag([1, 1, 0]) / np.sqrt(2) + [0, 0, np.sqrt(0.5)], atol=1e-3
+    )
+
+
+@pytest.mark.parametrize("faces", [200, 300, 4000])
+def test_normals_at_the_tip_of_a_cone_do_not_depend_on_how_they_are_summed(faces):
+    """The mean over the faces within the crease of each: the same cone in 200 (all pairs) and more (by direction)."""
+    few, many = crease_normals(*fan(200))[:, 0], crease_normals(*fan(faces))[:, 0]
+    assert np.abs(many[0] - few[0]).max() < 0.03 and np.abs(many[faces // 4] - few[50]).max() < 0.03
+    flat = np.array([1.0, 1.0, 0.0]) * fan(faces)[0]
+    assert np.allclose(crease_normals(flat, fan(faces)[1]), [0.0, 0.0, 1.0])
+
+
+# other processes
+
+
+def extent(catalogue, key: str) -> list[float]:
+    return [float(v) for v in np.ptp(np.concatenate([p.vertices for p in catalogue.mesh(key)]), axis=0)]
+
+
+class Models:
+    """A data set, as a learner has them: it holds a catalogue and is sent to the loader's workers."""
+
+    def __init__(self, catalogue) -> None:
+        self.catalogue = catalogue
+
+    def __len__(self) -> int:
+        return 2
+
+    def __getitem__(self, i: int) -> list[float]:
+        return extent(self.catalogue, ("mine/box", "built/vase_white")[i])
+
+
+def test_a_catalogue_goes_to_the_spawned_workers_of_a_data_loader(tmp_path):
+    from torch.utils.data import DataLoader
+
+    catalogue = load_catalogue(tmp_path, own=[painted(tmp_path / "own")])
+    copy = pickle.loads(pickle.dumps(catalogue))
+    assert dict(copy.assets) == dict(catalogue.assets) and copy.cache == catalogue.cache
+    loader = DataLoader(Models(catalogue), batch_size=None, num_workers=1, multiprocessing_context="spawn")
+    sizes = [[float(v) for v in row] for row in loader]
+    assert sizes == [extent(catalogue, "mine/box"), extent(catalogue, "built/vase_white")]
