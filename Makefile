@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test setup lint wheel clean
+.PHONY: help demo test setup lint docs wheel clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -9,6 +9,7 @@ help:
 	@echo 'make test    the whole test suite'
 	@echo 'make setup   only the set-up: system packages, .venv, Python packages'
 	@echo 'make lint    ruff'
+	@echo 'make docs    API pages from the docstrings, in docs/api'
 	@echo 'make wheel   build the wheel into dist/'
 
 setup:
@@ -23,8 +24,12 @@ test: setup
 lint: setup
 	@.venv/bin/ruff check .
 
+docs: setup
+	@.venv/bin/python -c 'import pdoc' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt -e '.[docs]'
+	@.venv/bin/python docs/build_api.py
+
 wheel: setup
 	@.venv/bin/python -m pip wheel -q --no-deps -w dist .
 
 clean:
-	rm -rf .venv build dist out *.egg-info
+	rm -rf .venv build dist out docs/api *.egg-info

@@ -1,0 +1,45 @@
+"""The Gymnasium loop: somebody who understands nothing asks for help as often as it may.
+
+    python examples/gymnasium_loop.py --kind HANNA --episodes 3
+
+Observations are arrays (`embodied.gym.spaces` says which), the action is a number, and `action_mask` says which numbers
+are possible now. Without `data=` a small flat is generated.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import gymnasium
+import numpy as np
+
+import embodied  # noqa: F401 - registers embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0
+from embodied.gym.spaces import text_of
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kind", default="HANNA", choices=("Find", "VLN", "VNLA", "HANNA", "HARI"))
+    parser.add_argument("--episodes", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+
+    env = gymnasium.make(f"embodied/{args.kind}-v0", seed=args.seed)
+    rng = np.random.default_rng(args.seed)
+    for episode in range(args.episodes):
+        observation, info = env.reset(seed=args.seed + episode)
+        heard, total, ended = text_of(observation["instruction"]), 0.0, False
+        print(f"{info['task']}: “{heard}”")
+        while not ended:
+            possible = np.flatnonzero(observation["action_mask"])
+            observation, reward, terminated, truncated, info = env.step(int(rng.choice(possible)))
+            total, ended = total + float(reward), terminated or truncated
+            if (said := text_of(observation["instruction"])) != heard:
+                print(f"    now: “{said}”")
+                heard = said
+        print(f"    reward {total:.2f}, success {info['success']:.0f}, {info['steps']:.0f} steps")
+    env.close()
+
+
+if __name__ == "__main__":
+    main()

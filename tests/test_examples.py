@@ -1,0 +1,71 @@
+"""The scripts of examples/ run as a newcomer runs them, and do what they say."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+
+
+@pytest.fixture(scope="module")
+def flats(tmp_path_factory) -> Path:
+    """Where the data set of two examples goes; whichever runs first builds it."""
+    return tmp_path_factory.mktemp("examples") / "flats"
+
+
+def run(name: str, folder: Path, *words: str) -> str:
+    """What an example prints, run in `folder`."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    script = [sys.executable, str(EXAMPLES / name), *words]
+    done = subprocess.run(script, cwd=folder, env=env, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def test_every_example_is_run_here_and_shown_in_the_readme_of_examples():
+    here, listed = Path(__file__).read_text(), (EXAMPLES / "README.md").read_text()
+    for script in sorted(EXAMPLES.glob("*.py")):
+        assert f'run("{script.name}"' in here and script.name in listed, script.name
+
+
+@pytest.mark.slow
+def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
+    said = run("generate_and_look.py", tmp_path, "--out", "look")
+    assert "digest" in said
+    assert cv2.imread(str(tmp_path / "look" / "panorama.png")).std() > 20
+    assert cv2.imread(str(tmp_path / "look" / "view.png")).shape == (480, 640, 3)
+    assert {p.name for p in (tmp_path / "look").iterdir()} >= {"house.json", "plan.png"}
+
+
+@pytest.mark.slow
+def test_own_policy_stands_in_the_table_beside_the_baselines(tmp_path, flats):
+    said = run("own_policy.py", tmp_path, "--data", str(flats))
+    assert re.search(r"\| least tried \|.*\n.*random walk", said) and "| shortest | test_unseen | 100.0" in said
+
+
+@pytest.mark.slow
+def test_the_gymnasium_loop_hears_help(tmp_path):
+    said = run("gymnasium_loop.py", tmp_path, "--episodes", "2")
+    assert said.count("“find ") >= 2 and said.count("reward") == 2
+
+
+@pytest.mark.slow
+def test_own_furniture_stands_in_a_house_and_is_seen(tmp_path):
+    run("own_furniture.py", tmp_path, "--out", "out")
+    blue, green, red = cv2.split(cv2.imread(str(tmp_path / "out" / "table.png")).astype(int))
+    assert ((red > 100) & (green < 60) & (blue < 60)).mean() > 0.01, "the red table is in the picture"
+
+
+@pytest.mark.slow
+def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
+    said = run("dataset_to_torch.py", tmp_path, "--data", str(flats))
+    right, guess = map(float, re.search(r"training: (\d+) % .* right, (\d+) %", said).groups())
+    assert right > guess + 15
