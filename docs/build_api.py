@@ -36,7 +36,9 @@ def build(folder: Path) -> list[str]:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         warnings.filterwarnings("ignore", "The module specification .* already been added")  # packages bring theirs
-        warnings.filterwarnings("ignore", "Error parsing type annotation ForwardRef")  # what NamedTuple makes of its fields
+        warnings.filterwarnings(
+            "ignore", "Error parsing type annotation ForwardRef"
+        )  # what NamedTuple makes of its fields
         pdoc.pdoc(*modules(), output_directory=folder)
     return [f"{w.filename}:{w.lineno}: {w.message}" for w in said if issubclass(w.category, UserWarning)]
 

@@ -69,13 +69,17 @@ FLOW = (
 """From, to, and the word on the arrow."""
 
 FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
-    ("ground", GROUND, (("seeds", "streams"), ("geometry", "angles"), ("errors", ""), ("gl", "EGL"), ("locks", ""))),
+    (
+        "ground",
+        GROUND,
+        (("seeds", "streams"), ("geometry", "angles"), ("errors", ""), ("gl", "EGL"), ("locks", "one writer")),
+    ),
+    ("ground", PLAY, (("interface", "the nouns of play"),)),
     ("place", PLACE, (("house", "the record"),)),
     ("place", PLACE, (("navigation", "graph, floor"), ("scene", "MjModel"))),
     ("place", PLACE, (("generate", "seed to house"), ("render", "pixels"))),
     ("place", PLACE, (("light", "baked once"), ("mattersim", "Matterport's API"))),
     ("place", PLACE, (("world", "all of a place"),)),
-    ("play", PLAY, (("interface", "the nouns, read first"),)),
     ("play", PLAY, (("action_spaces", "moves"), ("language", "words"))),
     ("play", PLAY, (("teachers", "labels"), ("records", "JSON"))),
     ("play", PLAY, (("tasks", "who wants what"),)),

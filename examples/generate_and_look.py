@@ -2,7 +2,7 @@
 
     python examples/generate_and_look.py --seed 7 --out out/look
 
-With `--quality baked` the flat is lit first, which takes a few minutes once.
+With `--quality normal` the flat is lit first, which takes a few minutes once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--out", type=Path, default=Path("out/look"))
-    parser.add_argument("--quality", default="unlit", choices=("unlit", "baked"))
+    parser.add_argument("--quality", default="unlit", choices=("unlit", "fast", "normal"))
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
 
