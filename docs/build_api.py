@@ -3,7 +3,7 @@
     python docs/build_api.py [folder]
 
 pdoc, because it reads the code as it is: Markdown docstrings, sentences below fields and constants, source beside the
-text; it needs no second tree of stub pages, and almost nothing that the development tools do not have already. A warning
+text; it needs no second tree of stub pages, and little that the development tools do not have already. A warning
 of pdoc (an annotation that does not resolve, a name of `__all__` that is not there) ends the build with status 1.
 """
 

@@ -64,3 +64,14 @@ def test_no_document_is_cited_that_the_repository_does_not_have():
 
 def test_a_document_that_is_not_there_is_noticed():
     assert documents("see docs/nothing.md and NOTES.md, not table.md") == {"docs/nothing.md", "NOTES.md"}
+
+
+def test_every_link_between_pages_leads_somewhere():
+    broken = [
+        f"{name}: {target}"
+        for name, text in texts()
+        if name.endswith(".md")
+        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text)
+        if "://" not in target and not (ROOT / name).parent.joinpath(target).exists()
+    ]
+    assert not broken, "\n".join(broken)

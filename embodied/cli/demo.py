@@ -23,7 +23,7 @@ SEED = 3
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=SEED, help="which house (default: %(default)s)")
-    parser.add_argument("--task", type=int, default=3, help="which of the house's tasks (default: %(default)s)")
+    parser.add_argument("--task", type=int, default=0, help="which of the house's tasks (default: %(default)s)")
     parser.add_argument(
         "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
