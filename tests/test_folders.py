@@ -18,6 +18,9 @@ from test_datasets import build
 from embodied import mattersim
 from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, subgoal_words
 from embodied.datasets.matterport import scan_name
+from embodied.evaluation import metrics
+from embodied.evaluation.evaluate import agent
+from embodied.evaluation.rollout import play
 
 KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "iliad-nav": "vln"}
 
@@ -215,6 +218,29 @@ def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(folders):
                 assert set(item["instructions"][0].split()) <= set(words)
 
 
+def forward_ten(lists: dict, item: dict) -> list[str]:
+    """HANNA's Forward10: ten times the first action of the list, then stop; at once where there is none."""
+    viewpoint, heading = item["paths"][0][0], round(item["heading"] / (math.pi / 6)) % 12
+    walked = [viewpoint]
+    for _ in range(10):
+        actions = lists[f"{item['scan']}_{viewpoint}_{heading}"]
+        if len(actions) == 1:
+            break
+        viewpoint, heading = actions[1]["nextViewpointId"], actions[1]["absViewIndex"] % 12
+        walked.append(viewpoint)
+    return walked
+
+
+def test_hannas_forward_ten_walks_through_the_folder_as_ours_walks_through_the_data_set(data_sets, folders):
+    data, home = data_sets["hanna"], folders / "hanna" / "data"
+    lists = read(home / "hanna/panoramic_action_space.json")
+    for split in ("train", "val_unseen", "test_unseen"):
+        episodes = play(data.environment(split), agent("hanna", "forward 10"), data.tasks(split), seed=0)
+        for item, episode in zip(read(home / f"hanna/hanna_{split}.json"), episodes, strict=True):
+            ids = data.place(episode.task.world).graph.ids
+            assert forward_ten(lists, item) == [ids[v] for v in metrics.without_repeats(episode.nodes)]
+
+
 # VNLA --------------------------------------------------------------------------------------------
 
 
@@ -291,6 +317,54 @@ def test_room_to_room_reads_three_instructions_and_hides_the_paths_of_its_test(f
     hidden, whole = (read(root / f"tasks/R2R/data/R2R_{s}.json") for s in ("test", "test_unseen"))
     assert [i["path"] for i in hidden] == [i["path"][:1] for i in whole] and "distance" not in hidden[0]
     assert all((root / "tasks/R2R" / d).is_dir() for d in ("results", "snapshots", "plots"))
+
+
+def shortest_action(state, graph: nx.Graph, goal: str) -> tuple[int, float, float]:
+    """Room-to-Room's teacher: turn and tilt towards the next viewpoint until it is ahead, then go; (0, 0, 0) stops."""
+    here = state.location.viewpointId
+    if here == goal:
+        return 0, 0, 0
+    following = nx.dijkstra_path(graph, here, goal)[1]
+    for k, v in enumerate(state.navigableLocations):
+        if v.viewpointId != following:
+            continue
+        if abs(v.rel_heading) > math.pi / 6:
+            return 0, math.copysign(1, v.rel_heading), 0
+        if v.rel_elevation > math.pi / 6 and state.viewIndex // 12 < 2:
+            return 0, 0, 1
+        if v.rel_elevation < -math.pi / 6 and state.viewIndex // 12 > 0:
+            return 0, 0, -1
+        return k, 0, 0
+    if state.viewIndex // 12 != 1:
+        return 0, 0, 1 - state.viewIndex // 12
+    offset = graph.nodes[following]["position"][:2] - graph.nodes[here]["position"][:2]
+    turn = math.remainder(math.pi / 2 - math.atan2(offset[1], offset[0]) - state.heading, 2 * math.pi)
+    return 0, math.copysign(1, turn), 0
+
+
+def test_room_to_rooms_teacher_reaches_every_goal_in_the_simulator(folders):
+    root = folders / "r2r"
+    graphs = program_graphs(root / "connectivity")
+    for scan, graph in graphs.items():
+        for node in read(root / "connectivity" / f"{scan}_connectivity.json"):
+            graph.nodes[node["image_id"]]["position"] = np.array([node["pose"][k] for k in (3, 7, 11)])
+    items = read(root / "tasks/R2R/data/R2R_train.json") + read(root / "tasks/R2R/data/R2R_val_unseen.json")
+    sim = mattersim.module("upstream").Simulator()
+    sim.setRenderingEnabled(False)
+    sim.setDiscretizedViewingAngles(True)
+    sim.setCameraResolution(640, 480)
+    sim.setCameraVFOV(math.radians(60))
+    sim.setNavGraphPath(str(root / "connectivity"))
+    sim.setBatchSize(len(items))
+    sim.initialize()
+    sim.newEpisode(
+        [i["scan"] for i in items], [i["path"][0] for i in items], [i["heading"] for i in items], [0] * len(items)
+    )
+    for _ in range(60):
+        states = sim.getState()
+        actions = [shortest_action(s, graphs[i["scan"]], i["path"][-1]) for s, i in zip(states, items, strict=True)]
+        sim.makeAction(*zip(*actions, strict=True))
+    assert [s.location.viewpointId for s in sim.getState()] == [i["path"][-1] for i in items]
 
 
 def test_iliads_paths_can_be_won_in_ten_actions(folders):
