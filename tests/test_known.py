@@ -8,9 +8,14 @@ import functools
 import pytest
 
 from assets.catalogue import Catalogue, CatalogueError, load_catalogue
+from assets.records import ROOM_KINDS
+from embodied.datasets.matterport import REGIONS
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.furnish.rooms import PROGRAMMES
+from embodied.house.floor_plan import ROOM_COLOURS
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.validation import check_known, load_house
+from embodied.language.lexicon import ROOM_NOUNS
 
 
 @functools.cache
@@ -91,3 +96,22 @@ def test_parameters_are_those_of_the_maker():
     assert catalogue().parameters(model) == {}
     with pytest.raises(CatalogueError, match="no asset"):
         catalogue().parameters("built/throne")
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pytest.param(PROGRAMMES, id="generate/furnish/rooms.py"),
+        pytest.param(ROOM_NOUNS, id="language/lexicon.py"),
+        pytest.param(ROOM_COLOURS, id="house/floor_plan.py"),
+        pytest.param(REGIONS, id="datasets/matterport.py"),
+    ],
+)
+def test_every_kind_of_room_stands_in_every_table_of_kinds(table):
+    """docs/houses.md, A new kind of room: what was forgotten is named."""
+    assert set(table) >= set(ROOM_KINDS)
+
+
+def test_something_is_at_home_in_every_kind_of_room():
+    things = [a for name in catalogue().classes for a in catalogue().of_class(name)]
+    assert {kind for a in things for kind in a.rooms} >= set(ROOM_KINDS)
