@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import importlib.metadata
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -230,7 +230,9 @@ class World:
                 log.warning("%s", e)
                 return None
             if file.meta != self.fingerprint:
-                log.warning("%s was made from another house or by another version; drawing again", self.path)
+                log.warning(
+                    "%s holds other pictures (%s); drawing again", self.path, differing(file.meta, self.fingerprint)
+                )
                 file.close()
                 return None
             self._file, self._refused = file, False
@@ -285,6 +287,13 @@ def open_folder(
     house = load_house(folder / "house.json", catalogue)
     graph, pictures = build_graph(house, catalogue), dataclasses.replace(pictures, **changes)
     return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
+
+
+def differing(held: Mapping[str, object], wanted: Mapping[str, object]) -> str:
+    """What differs between what pictures were made of and what they should be made of: 'size 256 instead of 192'."""
+    names = sorted({*held, *wanted}, key=str)
+    facts = [(n, held.get(n), wanted.get(n)) for n in names if held.get(n) != wanted.get(n)]
+    return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
 @functools.cache

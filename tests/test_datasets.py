@@ -6,6 +6,7 @@ import dataclasses
 import json
 import shutil
 
+import numpy as np
 import pytest
 from hand_worlds import grid_world, thing
 
@@ -18,7 +19,11 @@ from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
+from embodied.render.pictures import PictureSettings
 from embodied.teachers.vnla import VnlaTeacher
+from embodied.world import differing
 
 
 def hand_house(seed, name, config, catalogue):
@@ -201,3 +206,25 @@ def test_a_size_of_ones_own_is_a_scale():
         own_size(0, 10)
     with pytest.raises(ValueError, match="40x4000"):
         scale("0x5", "hanna")
+
+
+def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
+    data = build(tmp_path / "d", tmp_path / "c", "find")
+    name = data.names("train")[0]
+    assert data.drawn_pictures(name) is None
+    faces = np.zeros((6, 8, 8, 3), np.uint8)
+    empty = Panorama(faces, np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
+    made_of = {"size": 8, "quality": "normal", "backend": "classic", "light": "normal", "code": "x"}
+    path = data.folder / "houses" / name / "panoramas.pano"
+    write_panoramas(path, [empty], {**made_of, "house": data.place(name).house.digest})
+    assert data.drawn_pictures(name) == PictureSettings(8, "normal", "classic", "normal")
+    write_panoramas(path, [empty], {**made_of, "house": "another"})
+    assert data.drawn_pictures(name) is None
+
+
+def test_a_warning_names_what_differs_between_pictures():
+    held, wanted = (
+        {"size": 256, "quality": "unlit", "house": "a"},
+        {"size": 192, "quality": "unlit", "house": "a", "code": "b"},
+    )
+    assert differing(held, wanted) == "code None instead of 'b', size 256 instead of 192"

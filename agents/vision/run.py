@@ -27,6 +27,7 @@ from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.interface import VIEWS
+from embodied.render.pictures import PictureSettings
 
 Note = Callable[[str], None]
 FACES = 192
@@ -149,8 +150,11 @@ def _has_features(data: Dataset, name: str, encoder: Encoder) -> bool:
 
 def _make_features(data: Dataset, name: str, encoder: Encoder, args: argparse.Namespace) -> str:
     torch.set_num_threads(args.threads)
-    with data.open_world(name, load_catalogue(args.cache), args.cache, size=FACES, quality=args.quality) as world:
+    pictures = data.drawn_pictures(name)
+    if pictures is None or args.quality not in (None, pictures.quality):
+        pictures = PictureSettings(size=FACES, quality=args.quality or "unlit")
+    with data.open_world(name, load_catalogue(args.cache), args.cache, pictures) as world:
         panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
         path = feature_path(data.folder / "features", encoder.digest, name)
         save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest)
-        return f"{name}: {len(world.graph.positions)} nodes"
+        return f"{name}: {len(world.graph.positions)} nodes, {pictures.quality} pictures of {pictures.size} pixels"

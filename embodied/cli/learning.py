@@ -98,7 +98,9 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
 def add_features(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
-    parser.add_argument("--quality", default="unlit", help="how the houses are drawn (default: %(default)s)")
+    parser.add_argument(
+        "--quality", help="how the houses are drawn (default: the data set's panoramas where it holds them, else unlit)"
+    )
     parser.add_argument(
         "--workers", type=int, default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
@@ -155,11 +157,7 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
         "--execution", type=Path, metavar="FILE", help="a trained execution policy (default: trained in --out first)"
     )
     parser.add_argument(
-        "--seeds",
-        type=int,
-        default=3,
-        metavar="N",
-        help="agents per row, from --seed on (default: %(default)s)",
+        "--seeds", type=int, default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
     )
     parser.add_argument(
         "--tasks", type=int, metavar="N", help="judge on at most so many tasks of a split, from all houses alike"

@@ -124,6 +124,22 @@ class Dataset:
         file = self.folder / "houses" / name / "panoramas.pano"
         return World(place.house, catalogue, place.graph, cache, dataclasses.replace(pictures, **changes), file=file)
 
+    def drawn_pictures(self, name: str) -> PictureSettings | None:
+        """How the panoramas of a house that the data set holds were drawn; None where it holds none of this house."""
+        from embodied.render.panorama_file import PanoramaFile, PanoramaFileError  # decodes pictures
+
+        path = self.folder / "houses" / name / "panoramas.pano"
+        try:
+            with PanoramaFile(path) as file:
+                made_of = dict(file.meta)
+        except (FileNotFoundError, PanoramaFileError):
+            return None
+        if made_of.get("house") != self.place(name).house.digest:
+            return None
+        return PictureSettings(
+            **{f.name: made_of[f.name] for f in dataclasses.fields(PictureSettings) if f.name in made_of}
+        )
+
     def routes(self, name: str) -> tuple[Route, ...]:
         """The routes that assistants know in a house.
 
