@@ -1,28 +1,46 @@
 """Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0, registered by `import embodied`.
 
-    env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train")
+    env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", sees=("rgb", "depth"))
+    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
-Without `data` a small furnished house is generated, which takes a few seconds.
+Without `data` a small furnished flat is generated and lit, which takes a minute or two once. What an
+agent sees is chosen by `sees` (embodied.gym.eyes): by default a perspective view and the features
+that the shipped encoder finds in the same pictures. An oracle is called an oracle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import psutil
+from gymnasium.vector import SyncVectorEnv
 from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.evaluation.metrics import PER_EPISODE
+from embodied.gym.eyes import (
+    PIXELS,
+    AllEyes,
+    Eyes,
+    FeatureEyes,
+    PanoramaStore,
+    PictureEyes,
+    ViewSettings,
+    checked_sees,
+    encoder_entry,
+)
 from embodied.gym.playground import make_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import draw_plan, font
 from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.render.pictures import PictureSettings
 from embodied.world import World
 
 STEP_COST = 0.01
@@ -45,13 +63,13 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
     raises ActionError instead.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - as Gymnasium wants it
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
 
     def __init__(
         self,
         make_env: Callable[[], HelpEnv],
         tasks: Sequence[Task],
-        source: FeatureSource,
+        eyes: Eyes,
         *,
         layout: Layout = LAYOUT,
         shaping: bool = False,
@@ -62,7 +80,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         """
         Args:
           tasks: what `reset` draws from; reset(options={"task": i}) chooses one.
-          source: features of every place, of the target image too.
+          eyes: what is seen of every place, of the target image too.
 
         Raises:
           ValueError: no tasks, or an unknown render mode.
@@ -71,12 +89,12 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
             raise ValueError("there are no tasks to play; choose another split or a larger scale")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
-        self._env, self._tasks, self._source, self._layout = make_env(), tuple(tasks), source, layout
+        self._env, self._tasks, self._eyes, self._layout = make_env(), tuple(tasks), eyes, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
         self._names: dict[str, int] = {}
         self.render_mode = render_mode
         self.action_space = action_space(layout)
-        self.observation_space = observation_space(layout, source.size)
+        self.observation_space = observation_space(layout, eyes)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -122,7 +140,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         return picture(self._env, self._o)
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
-        return encode(o, self._source, self._layout, self._names)
+        return encode(o, self._eyes, self._layout, self._names)
 
     def _potential(self) -> float:
         e = self._env
@@ -176,42 +194,118 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join([*lines, line][:2])
 
 
-def make(
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Everything that environments of one batch share: houses, tasks, assistants, decoded panoramas."""
+
+    make_env: Callable[[], HelpEnv]
+    tasks: Sequence[Task]
+    eyes: Eyes
+    layout: Layout
+
+
+def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGymEnv:
+    """The environment of a kind of task over a data set, or over one generated and lit flat without `data`.
+
+    Args:
+      options: of `set_stage` (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
+        (shaping, strict, patience).
+    """
+    own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
+    stage = set_stage(kind, **options)
+    return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
+
+
+def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SyncVectorEnv:
+    """So many environments that share one stage: houses, pages and decoded panoramas are held once.
+
+    Each has its own task, target, instruction and generator; options as of `make`.
+
+    Raises:
+      ValueError: fewer than one, or more than memory has room for.
+    """
+    if num_envs < 1:
+        raise ValueError(f"num_envs should be at least 1, got {num_envs}")
+    own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
+    stage = set_stage(kind, **options)
+
+    def one() -> HelpGymEnv:
+        return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
+
+    refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
+    return SyncVectorEnv([one] * num_envs)
+
+
+COPIES = 3
+"""Of an observation that a vector environment holds per slot: its own, the batch's, and what is handed out."""
+
+
+def refuse_too_many(num_envs: int, space: gym.Space[Any]) -> None:
+    """Raises ValueError where the observations of a batch do not fit into memory."""
+    each = sum(int(np.prod(s.shape)) * np.dtype(s.dtype).itemsize for s in space.values() if s.shape is not None)
+    wanted, free = COPIES * num_envs * each, psutil.virtual_memory().available
+    if wanted > 0.8 * free:
+        raise ValueError(
+            f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB are free; "
+            "use fewer, or smaller views"
+        )
+
+
+def set_stage(
     kind: str,
     *,
     data: str | Path | None = None,
     split: str = "train",
     seed: int = 0,
     cache: str | Path | None = None,
+    sees: str | Sequence[str] = ("rgb", "features"),
+    view: ViewSettings = ViewSettings(),
+    pictures: PictureSettings | None = None,
     source: FeatureSource | None = None,
     worlds: Mapping[str, SeenPlace] | None = None,
+    layout: Layout | None = None,
     wheels: bool = False,
-    **options: Any,
-) -> HelpGymEnv:
-    """The environment of a kind of task over a data set, or over one generated house without `data`.
+) -> Stage:
+    """What environments of a kind of task play in and see.
 
     Args:
-      data: folder that `embodied dataset` built.
-      source: features; semantic ones of what is visible where not given.
-      worlds: worlds with pictures, for render(); otherwise opened from `data`.
+      data: folder that `embodied dataset` built; without it a flat is generated from `seed` and lit.
+      sees: some of embodied.gym.eyes.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'.
+      view: how pixels are framed.
+      pictures: how the houses are drawn; by default as the data set's pictures are, and 'fast' for a generated flat.
+      source: the features; those of the installed default encoder where not given.
+      worlds: worlds to play in; otherwise opened from `data`.
       wheels: edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"].
-      options: of HelpGymEnv.
 
     Raises:
-      ValueError: wheels for a kind of task that cannot have them.
+      ValueError: unknown `sees`, pixels where there are none, or wheels for a kind that cannot have them.
     """
+    seen, where = checked_sees(sees), Path(cache) if cache else default_cache()
     play = make_playground(
-        kind,
-        Path(data) if data else None,
-        split,
-        seed=seed,
-        cache=Path(cache) if cache else default_cache(),
-        worlds=worlds,
-        with_features=source is None,
+        kind, Path(data) if data else None, split, seed=seed, cache=where, worlds=worlds, pictures=pictures, sees=seen
     )
-    layout = options.pop("layout", Layout(descriptions=kind == "hari"))
-    make_env = _on_wheels(kind, play.make_env, Path(cache) if cache else default_cache()) if wheels else play.make_env
-    return HelpGymEnv(make_env, play.tasks, source or FeatureTable(play.features), layout=layout, **options)
+    eyes: list[Eyes] = []
+    drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
+    store = PanoramaStore(drawn)
+    if pixels := [name for name in PIXELS if name in seen]:
+        refuse_blind(play.worlds, drawn)
+        eyes.append(PictureEyes(store, pixels, view))
+    if "features" in seen:
+        if source is None:
+            refuse_blind(play.worlds, drawn)
+        eyes.append(FeatureEyes("features", source if source is not None else encoder_entry().load()(store)))
+    if "oracle" in seen:
+        eyes.append(FeatureEyes("oracle", FeatureTable(play.features)))
+    make_env = _on_wheels(kind, play.make_env, where) if wheels else play.make_env
+    return Stage(make_env, play.tasks, AllEyes(eyes), layout or Layout(descriptions=kind == "hari"))
+
+
+def refuse_blind(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:
+    """Raises ValueError where pixels are asked of places that nobody can draw."""
+    if blind := sorted(set(worlds) - set(drawn)):
+        raise ValueError(
+            f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose sees='oracle'"
+        )
 
 
 def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:

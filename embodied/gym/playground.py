@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,8 @@ from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, SeenPlace, Task
 from embodied.language import People, PlainLanguage
+from embodied.render.panorama_file import PanoramaFile
+from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 
 if TYPE_CHECKING:
@@ -52,24 +54,59 @@ def make_playground(
     seed: int,
     cache: Path,
     worlds: Mapping[str, SeenPlace] | None = None,
-    with_features: bool = True,
+    pictures: PictureSettings | None = None,
+    sees: Sequence[str] = ("oracle",),
 ) -> Playground:
     """A split of a data set, or one flat generated from `seed` where `data` is None.
 
+    Args:
+      pictures: how the houses are drawn; as the data set's pictures are, or 'fast', where not given.
+      sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
+
     Raises:
-      ValueError: the data set is of another kind.
+      ValueError: the data set is of another kind, or pictures are wanted and it has none.
     """
     catalogue = load_catalogue(cache)
     if data is None:
-        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds)
+        drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
+        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds, drawn)
     else:
         whole = Dataset(data)
         if whole.kind != kind:
             raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
-        worlds = worlds or {n: whole.open_world(n, catalogue, cache) for n in whole.names(split)}
+        if worlds is None:
+            names = whole.names(split)
+            drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
+            worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
         tasks, make_env = whole.tasks(split), whole.environment(split, worlds=worlds)
-    features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if with_features else {}
+    features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
     return Playground(worlds, tasks, make_env, features)
+
+
+def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> PictureSettings:
+    """How the pictures that a data set holds were drawn.
+
+    Args:
+      wanted: whether it is an error that there are none.
+
+    Raises:
+      ValueError: none, or not of all houses, though they are wanted.
+    """
+    found = {}
+    for name in names:
+        path = data.folder / "houses" / name / "panoramas.pano"
+        if path.exists():
+            with PanoramaFile(path) as file:
+                meta = file.meta
+            light = meta["light"] if meta["quality"] not in ("none", "unlit") else None
+            settings = PictureSettings(int(str(meta["size"])), str(meta["quality"]), str(meta["backend"]), light)
+            found[name] = settings
+    if wanted and len(found) < len(names):
+        raise ValueError(
+            f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
+            f"`embodied dataset {data.kind} --out {data.folder} ... --panoramas fast`, or choose sees='oracle'"
+        )
+    return next(iter(found.values()), PictureSettings())
 
 
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
@@ -97,7 +134,12 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 def _flat(
-    kind: str, seed: int, cache: Path, catalogue: Catalogue, worlds: Mapping[str, SeenPlace] | None
+    kind: str,
+    seed: int,
+    cache: Path,
+    catalogue: Catalogue,
+    worlds: Mapping[str, SeenPlace] | None,
+    pictures: PictureSettings,
 ) -> tuple[Mapping[str, SeenPlace], tuple[Task, ...], Callable[[], HelpEnv]]:
     """One world (generated unless given), tasks in it, and a maker of environments.
 
@@ -112,7 +154,7 @@ def _flat(
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        worlds = {name: open_world(house, catalogue, cache, graph=graph)}
+        worlds = {name: open_world(house, catalogue, cache, graph=graph, pictures=pictures)}
     name, world = next(iter(worlds.items()))
     routes = ()
     if kind in ("hanna", "vln"):

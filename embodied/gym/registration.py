@@ -25,7 +25,12 @@ def register(gymnasium: ModuleType) -> None:
     """Environments by the name of their maker, which is imported when the first is made."""
     for kind, name in IDS.items():
         if f"embodied/{name}-v0" not in gymnasium.registry:
-            gymnasium.register(f"embodied/{name}-v0", entry_point="embodied.gym.env:make", kwargs={"kind": kind})
+            gymnasium.register(
+                f"embodied/{name}-v0",
+                entry_point="embodied.gym.env:make",
+                vector_entry_point="embodied.gym.env:make_vec",
+                kwargs={"kind": kind},
+            )
 
 
 class WhenImported(MetaPathFinder):

@@ -9,21 +9,8 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.envs.base import ActionError
-from embodied.interface import (
-    TURNS,
-    VIEWS,
-    Action,
-    Ask,
-    Description,
-    Feature,
-    FeatureSource,
-    Intention,
-    Mode,
-    Move,
-    Observation,
-    Sight,
-    Stop,
-)
+from embodied.gym.eyes import Eyes
+from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
 
 INTENTIONS = tuple(Intention)
 KINDS = ("object", "room", "action")
@@ -56,12 +43,10 @@ def action_space(layout: Layout) -> spaces.Discrete:
     return spaces.Discrete(layout.actions)
 
 
-def observation_space(layout: Layout, size: int) -> spaces.Dict:
-    """`size` is D of the features. Everything an Observation holds, padded with zeros."""
-    panorama = spaces.Box(-LARGE, LARGE, (VIEWS, size), np.float32)
+def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
+    """Everything an Observation holds, padded with zeros, and what the eyes see."""
     whole = {
-        "panorama": panorama,
-        "target": panorama,
+        **eyes.spaces(),
         "has_target": spaces.Discrete(2),
         "instruction": spaces.Box(0, 255, (layout.text,), np.uint8),
         "candidates": spaces.Box(-1.0, 1.0, (layout.candidates, 4), np.float32),
@@ -77,7 +62,7 @@ def observation_space(layout: Layout, size: int) -> spaces.Dict:
     return spaces.Dict(whole)
 
 
-def encode(o: Observation, source: FeatureSource, layout: Layout, names: dict[str, int]) -> dict[str, object]:
+def encode(o: Observation, eyes: Eyes, layout: Layout, names: dict[str, int]) -> dict[str, object]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
@@ -97,8 +82,7 @@ def encode(o: Observation, source: FeatureSource, layout: Layout, names: dict[st
     views[:n] = c.view + 1
     left = LARGE if o.requests_left is None else o.requests_left
     whole = {
-        "panorama": source.features(o.sight).copy(),
-        "target": _features(o.target, source),
+        **eyes.look(o),
         "has_target": np.int64(o.target is not None),
         "instruction": codes_of(o.instruction, layout.text),
         "candidates": candidates,
@@ -173,7 +157,7 @@ class Numbers(gym.ObservationWrapper):
     """For learners that cannot read: the instruction becomes word numbers, the dictionary one flat vector.
 
     Words are numbered by a stable hash into `vocabulary` bins; the vector is (instruction word
-    counts, candidates, has_target, mode, clock, action mask, mean of the panorama's features).
+    counts, candidates, has_target, mode, clock, action mask, means of features where there are any).
     """
 
     def __init__(self, env: gym.Env, vocabulary: int = 256) -> None:
@@ -192,7 +176,7 @@ class Numbers(gym.ObservationWrapper):
             [observation["has_target"], observation["mode"]],
             np.minimum(observation["clock"], 100.0) / 100.0,
             observation["action_mask"],
-            np.mean(observation["panorama"], axis=0),
+            *(np.mean(observation[name], axis=0) for name in ("features", "oracle") if name in observation),
         )
         return np.nan_to_num(np.concatenate([np.ravel(p) for p in parts])).astype(np.float32)
 
@@ -202,10 +186,6 @@ def _stable(word: str) -> int:
     for c in word:
         total = (total * 131 + ord(c)) % 2_147_483_647
     return total
-
-
-def _features(sight: Sight | None, source: FeatureSource) -> np.ndarray:
-    return np.zeros((VIEWS, source.size), dtype=np.float32) if sight is None else source.features(sight).copy()
 
 
 def _description_space(layout: Layout) -> spaces.Box:

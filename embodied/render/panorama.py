@@ -92,6 +92,16 @@ class Panorama:
         """(height, 2 height) int32, in the layout of `equirect`."""
         return self._ids(equirect_grid(self.size, height))
 
+    def through(self, grid: Grid, channel: str) -> np.ndarray:
+        """One channel, 'rgb', 'depth' or 'ids', of the picture that a grid describes; see `view` for units.
+
+        Raises:
+          ValueError: another channel.
+        """
+        if channel not in ("rgb", "depth", "ids"):
+            raise ValueError(f"channel is {channel!r}; a panorama holds 'rgb', 'depth' and 'ids'")
+        return {"rgb": self._rgb, "depth": self._depth, "ids": self._ids}[channel](grid)
+
     @functools.cached_property
     def _padded_rgb(self) -> np.ndarray:
         """(6 (s + 2), s + 2, 3): the faces below each other, each with a border taken from its neighbours."""

@@ -1,0 +1,224 @@
+"""Eyes: what an environment shows of a place, beside words, moves and clock.
+
+Pixels (`PictureEyes`) are resampled from the panoramas of the viewpoints, which are drawn once and
+kept; features (`FeatureEyes`) are an encoder's of the same panoramas, or, by its honest name, an
+oracle's list of the visible objects.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import math
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from gymnasium import spaces
+
+from embodied.errors import UnableError
+from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight
+from embodied.render.panorama import Panorama, equirect_grid, grid36, perspective_grid
+from embodied.world import World
+
+SEES = ("rgb", "depth", "ids", "features", "oracle")
+"""What can be seen: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
+PIXELS = SEES[:3]
+FRAMES = ("view", "views36", "equirect")
+"""The picture along the agent's eyes, the 36 views of the VLN literature, or all directions in one picture."""
+LARGE = 1e6
+"""Bound of features; Gymnasium wants one."""
+FAR = 65.535
+"""Depth where nothing is, and the largest there is, metres."""
+MEMORY = 512 * 2**20
+"""Bytes of decoded panoramas that are kept."""
+ENCODERS = "embodied.encoders"
+"""Group of entry points under which encoders of pictures are found; 'default' is the one that ships."""
+
+
+class Eyes(Protocol):
+    """Turns the sights of an observation into arrays."""
+
+    def spaces(self) -> dict[str, spaces.Space]:
+        """The space of each array."""
+        ...
+
+    def look(self, o: Observation) -> dict[str, np.ndarray]:
+        """The arrays, one for each space."""
+        ...
+
+
+@dataclass(frozen=True)
+class ViewSettings:
+    """How pixels are framed."""
+
+    frame: str = "view"
+    """One of FRAMES."""
+    height: int = 128
+    """Pixels of a picture (of each of the 36 views, which are square); an equirect is twice as wide as high."""
+    width: int = 128
+    """Pixels; of 'view' only."""
+    vfov: float = math.radians(60.0)
+    """Vertical field of 'view', radians; 60 degrees is the literature's (Anderson et al. 2018)."""
+
+    def __post_init__(self) -> None:
+        if self.frame not in FRAMES:
+            raise ValueError(f"frame is {self.frame!r}; use one of {FRAMES}")
+        if not (1 <= self.height <= 4096 and 1 <= self.width <= 4096):
+            raise ValueError(f"a view of {self.height} x {self.width} pixels; each side needs 1 to 4096")
+        if not 0 < self.vfov < math.pi:
+            raise ValueError(f"vfov is {self.vfov} radians; a perspective picture needs more than 0 and less than pi")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of a picture without its channels."""
+        if self.frame == "views36":
+            return (VIEWS, self.height, self.height)
+        return (self.height, 2 * self.height if self.frame == "equirect" else self.width)
+
+
+class PanoramaStore:
+    """Owns the decoded panoramas of some worlds, the latest used, within a budget of bytes."""
+
+    def __init__(self, worlds: Mapping[str, World], budget: int = MEMORY) -> None:
+        self._worlds, self._budget, self._held = worlds, budget, 0
+        self._kept: OrderedDict[tuple[str, int], Panorama] = OrderedDict()
+
+    def at(self, sight: Sight) -> Panorama:
+        """The panorama of a sight; drawn, or read from the disk, when it is not in memory.
+
+        Raises:
+          KeyError: a sight of another world.
+        """
+        key = sight._world, sight._node
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        panorama = self._worlds[sight._world].panorama(sight._node)
+        self._kept[key] = panorama
+        self._held += _bytes(panorama)
+        while self._held > self._budget and len(self._kept) > 1:
+            self._held -= _bytes(self._kept.popitem(last=False)[1])
+        return panorama
+
+
+def _bytes(panorama: Panorama) -> int:
+    """With the padded copies that resampling makes: about twice the faces."""
+    return 2 * (panorama.rgb.nbytes + panorama.depth.nbytes + panorama.ids.nbytes)
+
+
+class PictureEyes:
+    """Pixels. The target image, where a task has one, is an equirect: where it was taken from is not told."""
+
+    TARGET = 64
+    """Height of the target image, pixels."""
+
+    def __init__(self, store: PanoramaStore, channels: Sequence[str], view: ViewSettings) -> None:
+        """
+        Args:
+          channels: some of PIXELS.
+        """
+        self._store, self._channels, self._view = store, tuple(channels), view
+
+    def spaces(self) -> dict[str, spaces.Space]:
+        """rgb uint8 (..., 3); depth float32 metres, FAR where nothing is; ids int32, 0 where nothing is."""
+        shape = self._view.shape
+        kinds: dict[str, spaces.Space] = {
+            "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
+            "depth": spaces.Box(0.0, FAR, shape, np.float32),
+            "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
+        }
+        found = {name: kinds[name] for name in self._channels}
+        if "rgb" in self._channels:
+            found["target_rgb"] = spaces.Box(0, 255, (self.TARGET, 2 * self.TARGET, 3), np.uint8)
+        return found
+
+    def look(self, o: Observation) -> dict[str, np.ndarray]:
+        panorama = self._store.at(o.sight)
+        found = {name: self._picture(panorama, name, o.turn * STEP, o.tilt * STEP) for name in self._channels}
+        if "rgb" in self._channels:
+            found["target_rgb"] = self._target(o.target)
+        return found
+
+    def _picture(self, panorama: Panorama, channel: str, yaw: float, pitch: float) -> np.ndarray:
+        view = self._view
+        s = panorama.size
+        if view.frame == "views36":
+            picture = panorama.through(grid36(s, view.height), channel)
+            picture = picture.reshape(*view.shape, *picture.shape[2:])
+        elif view.frame == "equirect":
+            picture = panorama.through(equirect_grid(s, view.height), channel)
+        else:
+            picture = panorama.through(perspective_grid(s, yaw, pitch, view.vfov, view.height, view.width), channel)
+        return np.minimum(picture, np.float32(FAR)) if channel == "depth" else picture
+
+    def _target(self, sight: Sight | None) -> np.ndarray:
+        if sight is None:
+            return np.zeros((self.TARGET, 2 * self.TARGET, 3), np.uint8)
+        return self._store.at(sight).equirect(self.TARGET)
+
+
+class FeatureEyes:
+    """(36, D) features of the place, and of the target image (zeros without one); row k is view k."""
+
+    def __init__(self, name: str, source: FeatureSource) -> None:
+        """
+        Args:
+          name: what the arrays are called: 'features' or 'oracle'; the target's 'target_NAME'.
+        """
+        self._name, self._source = name, source
+
+    def spaces(self) -> dict[str, spaces.Space]:
+        box = spaces.Box(-LARGE, LARGE, (VIEWS, self._source.size), np.float32)
+        return {self._name: box, f"target_{self._name}": box}
+
+    def look(self, o: Observation) -> dict[str, np.ndarray]:
+        return {self._name: self._of(o.sight), f"target_{self._name}": self._of(o.target)}
+
+    def _of(self, sight: Sight | None) -> np.ndarray:
+        if sight is None:
+            return np.zeros((VIEWS, self._source.size), dtype=np.float32)
+        return np.array(self._source.features(sight), dtype=np.float32)  # a copy: the source keeps its own
+
+
+class AllEyes:
+    """Several eyes as one."""
+
+    def __init__(self, eyes: Sequence[Eyes]) -> None:
+        self._eyes = tuple(eyes)
+
+    def spaces(self) -> dict[str, spaces.Space]:
+        return {name: space for eyes in self._eyes for name, space in eyes.spaces().items()}
+
+    def look(self, o: Observation) -> dict[str, np.ndarray]:
+        return {name: array for eyes in self._eyes for name, array in eyes.look(o).items()}
+
+
+@functools.cache
+def encoder_entry(name: str = "default") -> importlib.metadata.EntryPoint:
+    """Who makes an encoder's features: a function of a PanoramaStore that returns a FeatureSource.
+
+    Raises:
+      UnableError: no package offers one by this name.
+    """
+    found = {e.name: e for e in importlib.metadata.entry_points(group=ENCODERS)}
+    if name not in found:
+        raise UnableError(
+            f"no encoder {name!r} is installed, only {sorted(found)}: install this package with its `agents`, "
+            "hand over features with source=..., or choose sees=('rgb',)"
+        )
+    return found[name]
+
+
+def checked_sees(sees: str | Sequence[str]) -> tuple[str, ...]:
+    """`sees` as a tuple.
+
+    Raises:
+      ValueError: something that cannot be seen, nothing, or the same twice.
+    """
+    chosen = (sees,) if isinstance(sees, str) else tuple(sees)
+    if not chosen or set(chosen) - set(SEES) or len(set(chosen)) < len(chosen):
+        raise ValueError(f"sees should be one or several of {SEES}, each once, got {sees!r}")
+    return chosen
