@@ -72,12 +72,13 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
 
 
 def test_gymnasium_plays_on_wheels_too(place, tmp_path):
-    env = embodied.gym.env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
+    blank = {"sees": "features", "source": Blank()}
+    env = embodied.gym.env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, **blank)
     o, _ = env.reset(seed=0)
     _, _, _, _, info = env.step(int(np.flatnonzero(o["action_mask"])[0]))
     assert info["bumps"] == 0
     with pytest.raises(ValueError, match="wheels"):
-        embodied.gym.env.make("hari", cache=tmp_path, worlds={place.name: place}, wheels=True, source=Blank())
+        embodied.gym.env.make("hari", cache=tmp_path, worlds={place.name: place}, wheels=True, **blank)
 
 
 class Blank:

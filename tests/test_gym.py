@@ -25,7 +25,7 @@ KINDS = ("find", "vln", "vnla", "hanna", "hari")
 
 
 def make(kind: str, tmp: str, **options):
-    return embodied.gym.env.make(kind, cache=tmp, worlds={"grid": grid_world()}, **options)
+    return embodied.gym.env.make(kind, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
 
 
 @pytest.fixture
@@ -37,7 +37,8 @@ def tmp(tmp_path) -> str:
 def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make(f"embodied/{IDS[kind]}-v0", cache=tmp, worlds={"grid": grid_world()}, render_mode="rgb_array")
+        name, worlds = f"embodied/{IDS[kind]}-v0", {"grid": grid_world()}
+        env = gym.make(name, cache=tmp, worlds=worlds, sees="oracle", render_mode="rgb_array")
         check_env(env.unwrapped, skip_render_check=False)
 
 

@@ -48,7 +48,7 @@ LAYOUT = Layout()
 VIEW = (480, 640)
 """Height and width of the rendered view, pixels."""
 VIEW_ANGLE = np.radians(78.0)
-"""Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees, so that a person finds their way."""
+"""Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees; people need it."""
 
 
 class HelpGymEnv(gym.Env[dict[str, Any], int]):
@@ -194,6 +194,9 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join([*lines, line][:2])
 
 
+VIEW_OF_AGENTS = ViewSettings()
+
+
 @dataclass(frozen=True, eq=False)
 class Stage:
     """Everything that environments of one batch share: houses, tasks, assistants, decoded panoramas."""
@@ -246,8 +249,8 @@ def refuse_too_many(num_envs: int, space: gym.Space[Any]) -> None:
     wanted, free = COPIES * num_envs * each, psutil.virtual_memory().available
     if wanted > 0.8 * free:
         raise ValueError(
-            f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB are free; "
-            "use fewer, or smaller views"
+            f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB "
+            "are free; use fewer, or smaller views"
         )
 
 
@@ -259,7 +262,7 @@ def set_stage(
     seed: int = 0,
     cache: str | Path | None = None,
     sees: str | Sequence[str] = ("rgb", "features"),
-    view: ViewSettings = ViewSettings(),
+    view: ViewSettings = VIEW_OF_AGENTS,
     pictures: PictureSettings | None = None,
     source: FeatureSource | None = None,
     worlds: Mapping[str, SeenPlace] | None = None,

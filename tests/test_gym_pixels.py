@@ -1,0 +1,165 @@
+"""Pixels in environments: what is shown is what the panoramas hold, batches share them, and bad wishes are refused."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from conftest import two_rooms
+from hand_worlds import grid_world
+from handmade import HandCatalogue, furnished
+
+import embodied.gym.env
+from agents.vision.encoder import random_encoder
+from agents.vision.features import encode_panoramas
+from agents.vision.live import LiveFeatures
+from embodied.envs.base import HelpEnv
+from embodied.gym import eyes as module
+from embodied.gym.env import HelpGymEnv, refuse_too_many
+from embodied.gym.eyes import FAR, AllEyes, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
+from embodied.gym.spaces import Layout, number
+from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
+from embodied.navigation.graph import graph_of
+from embodied.world import open_world
+
+NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])
+ROOMS = ("living_room_1", "living_room_1", "bedroom_1")
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
+    cache = tmp_path_factory.mktemp("pixels")
+    with open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48) as w:
+        w.render_all()
+        yield w
+
+
+def tasks_in(world) -> list[Task]:
+    what = FindObject("mug", "living_room", ("mug_1",))
+    where = [(0, 0), (1, 4), (2, 7), (0, 11)]
+    return [
+        Task(f"{world.name}/find/{k}", "find", world.name, Pose(v, turn), what, (2 - v,), f"find a mug {k}", 0.0, 9)
+        for k, (v, turn) in enumerate(where)
+    ]
+
+
+def env_of(world, eyes) -> HelpGymEnv:
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, layout=Layout())
+
+
+@pytest.mark.parametrize(
+    "view", [ViewSettings(height=40, width=56), ViewSettings("views36", 24), ViewSettings("equirect", 20)]
+)
+def test_pixels_belong_to_the_space_and_are_those_of_the_panorama(world, view):
+    env = env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), view))
+    for task in range(4):
+        o, _ = env.reset(seed=task, options={"task": task})
+        assert env.observation_space.contains(o)
+        pose, panorama = env._env.pose, world.panorama(env._env.pose.node)
+        if view.frame == "view":
+            rgb, depth, ids = panorama.view(pose.yaw, pose.pitch, view.vfov, (40, 56))
+        elif view.frame == "views36":
+            rgb, depth, ids = panorama.views36(24), None, None
+        else:
+            rgb, depth, ids = panorama.equirect(20), panorama.equirect_depth(20), panorama.equirect_ids(20)
+        assert (o["rgb"] == rgb).all()
+        if depth is not None:
+            assert np.allclose(o["depth"], np.minimum(depth, FAR)) and (o["ids"] == ids).all()
+        assert o["depth"].shape == o["ids"].shape == view.shape and o["ids"].max() > 0
+
+
+def test_the_view_turns_with_the_agent(world):
+    """A move looks along the edge that was walked, so the picture is the one of that direction and place."""
+    view = ViewSettings(height=32, width=32)
+    env = env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb",), view))
+    env.reset(seed=0, options={"task": 0})
+    column = [p.node for p in env._env._reach[1]].index(1)
+    o, *_ = env.step(number(Move(column), Layout()))
+    pose = env._env.pose
+    assert pose.node == 1 and pose.turn != 0
+    seen = world.panorama(1).view_rgb(pose.yaw, pose.pitch, view.vfov, (32, 32))
+    assert (o["rgb"] == seen).all()
+    assert (o["rgb"] != world.panorama(0).view_rgb(0.0, 0.0, view.vfov, (32, 32))).any()
+
+
+def test_features_come_from_the_very_panoramas_that_are_shown(world):
+    store, encoder = PanoramaStore({world.name: world}), random_encoder(seed=0)
+    eyes = AllEyes(
+        [PictureEyes(store, ("rgb",), ViewSettings()), FeatureEyes("features", LiveFeatures(encoder, store))]
+    )
+    env = env_of(world, eyes)
+    o, _ = env.reset(seed=1, options={"task": 1})
+    assert set(o) > {"rgb", "target_rgb", "features", "target_features"}
+    expected = encode_panoramas(encoder, [world.panorama(1)])[0].astype(np.float32)
+    assert np.array_equal(o["features"], expected)
+    assert not o["target_features"].any() and not o["target_rgb"].any(), "this kind of task has no target image"
+    o["features"][:] = 0
+    assert env.step(number(Stop(), Layout()))[0]["features"].any(), "what is handed out is a copy"
+
+
+def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world):
+    store = PanoramaStore({world.name: world})
+    eyes = PictureEyes(store, ("rgb",), ViewSettings(height=16, width=16))
+    envs = gym.vector.SyncVectorEnv([lambda: env_of(world, eyes)] * 12)
+    o, _ = envs.reset(seed=5)
+    for _ in range(6):
+        o, *_ = envs.step(np.zeros(12, dtype=np.int64))
+    assert len(store._kept) == 3
+    assert len({bytes(row) for row in o["instruction"]}) > 1
+    for i, env in enumerate(envs.envs):
+        assert (o["rgb"][i] == env._eyes.look(env._o)["rgb"]).all()
+        assert bytes(o["instruction"][i]).rstrip(b"\0").decode() == env._env.instruction
+    envs.close()
+
+
+def test_the_store_keeps_to_its_budget_and_gives_the_same_pictures(world):
+    one = module._bytes(world.panorama(0))
+    store = PanoramaStore({world.name: world}, budget=2 * one)
+    first = store.at(Sight(world.name, 0)).rgb.copy()
+    for node in (1, 2, 1, 2):
+        store.at(Sight(world.name, node))
+    assert len(store._kept) == 2 and store._held <= 2 * one
+    assert (store.at(Sight(world.name, 0)).rgb == first).all()
+
+
+@pytest.mark.parametrize("sees", ["touch", ("rgb", "rgb"), (), ("rgb", "smell")])
+def test_what_cannot_be_seen_is_refused_with_what_can(sees, tmp_path):
+    with pytest.raises(ValueError, match="sees should be one or several of .*oracle"):
+        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, sees=sees)
+    assert checked_sees("rgb") == ("rgb",)
+
+
+def test_views_without_pixels_and_unknown_frames_are_refused():
+    for wrong in ({"height": 0}, {"width": -3}, {"vfov": math.pi}, {"vfov": 0.0}, {"frame": "fisheye"}):
+        with pytest.raises(ValueError, match=r"needs|use one of"):
+            ViewSettings(**wrong)
+
+
+def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="no pictures of .*grid.*sees='oracle'"):
+        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, sees=("rgb",))
+
+
+def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
+    space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
+    monkeypatch.setattr("psutil.virtual_memory", lambda: type("Memory", (), {"available": 2**30})())
+    refuse_too_many(8, space)
+    with pytest.raises(ValueError, match=r"1000 environments hold about 8\.8 GiB .* 1\.0 GiB are free"):
+        refuse_too_many(1000, space)
+
+
+def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
+    from test_datasets import build
+
+    data = build(tmp_path / "data", tmp_path / "cache")
+    with pytest.raises(ValueError, match=r"pictures of 0 of its \d+ houses.*--panoramas fast"):
+        embodied.gym.env.make(data.kind, data=data.folder, split="train", cache=tmp_path / "cache", sees="rgb")
+
+
+def test_without_an_installed_encoder_the_error_names_the_remedies():
+    with pytest.raises(module.UnableError, match="no encoder 'mine' is installed"):
+        module.encoder_entry("mine")
