@@ -1,4 +1,4 @@
-"""Wrong input, damaged files and unable machines: one line that says what to do, and nothing half-written is believed."""
+"""Wrong input, damaged files and unable machines: one line says what to do, nothing half-written is believed."""
 
 from __future__ import annotations
 
@@ -192,7 +192,8 @@ def test_no_opengl_is_one_line():
         ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
         ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL"),
     ):
-        code = "from embodied import cli\nfrom embodied.cli import doctor\ndoctor.run = lambda a: __import__('embodied.gl').gl.info()\n"
+        code = "from embodied import cli\nfrom embodied.cli import doctor\n"
+        code += "doctor.run = lambda a: __import__('embodied.gl').gl.info()\n"
         done = subprocess.run(
             [sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"],
             check=False,
@@ -263,7 +264,8 @@ def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
     code = (
-        "import sys, signal; signal.signal(signal.SIGINT, signal.default_int_handler); from embodied.__main__ import start\n"
+        "import sys, signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from embodied.__main__ import start\n"
         "print('go', flush=True); sys.exit(start())"
     )
     process = subprocess.Popen(

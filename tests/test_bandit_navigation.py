@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 import torch
+from agents.bandit.a2c import advantages
 from agents.imitation.config import SCALES
 from agents.imitation.training import Split
 from hand_worlds import grid_world
 
 from agents.bandit import navigation, runs
-from agents.bandit.a2c import advantages
 from agents.bandit.navigation import (
     Decided,
     StateCritic,

@@ -7,8 +7,8 @@ import json
 
 import numpy as np
 import pytest
+from hand_data import build
 from hand_worlds import line_world
-from test_datasets import build
 
 from embodied.datasets.folders import export_folder
 from embodied.datasets.matterport import (

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_datasets import build, content
+from hand_data import build, content
 
 from assets.cache import digest
 from embodied.datasets.store import Dataset, DatasetError
@@ -191,8 +191,8 @@ BUILD = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[3])
-import test_datasets
-slow = lambda *args: (print("building", flush=True), time.sleep(float(sys.argv[4])), test_datasets.hand_house(*args))[2]
+import hand_data
+slow = lambda *args: (print("building", flush=True), time.sleep(float(sys.argv[4])), hand_data.hand_house(*args))[2]
 from embodied.datasets.build import DatasetConfig, build_dataset
 config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
 build_dataset(config, Path(sys.argv[1]), Path(sys.argv[2]), make_house=slow)

@@ -8,7 +8,7 @@ import shutil
 
 import numpy as np
 import pytest
-from hand_worlds import grid_world, thing
+from hand_data import build, content, hand_house
 
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
@@ -24,27 +24,6 @@ from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import PictureSettings
 from embodied.teachers.vnla import VnlaTeacher
 from embodied.world import differing
-
-
-def hand_house(seed, name, config, catalogue):
-    """The grid world with forty more things, one of each class, ten to a room."""
-    world = grid_world(8, name=name)
-    rooms = {r.id: r.polygon[0] for r in world.house.rooms}
-    more = tuple(
-        thing(f"thing{k}", 1, room, x + 1 + (k * 1.7) % 6.5, y + 1 + (k * 2.3) % 6.5)
-        for k, (room, (x, y)) in ((k, sorted(rooms.items())[k % 4]) for k in range(40))
-    )
-    return dataclasses.replace(world.house, placements=world.house.placements + more), world.graph
-
-
-def build(folder, cache, kind="hanna", workers=1, **options):
-    config = DatasetConfig(kind, "tiny", seed=4, language="plain", **options)
-    build_dataset(config, folder, cache, workers=workers, make_house=hand_house)
-    return Dataset(folder)
-
-
-def content(folder):
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def test_paper_sizes_are_those_of_tables_4_2_and_e_1_and_of_room_to_room():

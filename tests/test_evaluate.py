@@ -6,7 +6,7 @@ import json
 import math
 
 import pytest
-from test_datasets import build
+from hand_data import build
 
 from embodied.cli import main
 from embodied.evaluation import tables

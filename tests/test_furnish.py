@@ -18,8 +18,8 @@ from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.furnish import furnish
 from embodied.generate.furnish.lights import LUMENS
-from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.furnish.rooms import BEDS
+from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.lacking import lacking
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import DOORS, House, Opening, Room, Storey, check

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from conftest import two_rooms
+from hand_data import build
 from hand_worlds import grid_world
 from handmade import HandCatalogue, furnished
 
@@ -153,8 +154,6 @@ def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monk
 
 
 def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
-    from test_datasets import build
-
     data = build(tmp_path / "data", tmp_path / "cache")
     with pytest.raises(ValueError, match=r"pictures of 0 of its \d+ houses.*--panoramas fast"):
         embodied.gym.env.make(data.kind, data=data.folder, split="train", cache=tmp_path / "cache", sees="rgb")

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
 from hand_worlds import grid_world, line_world
 
 from embodied.action_spaces import PanoramicMoves
@@ -21,24 +22,9 @@ from embodied.assistants.route_system import (
     spanning_paths,
 )
 from embodied.envs.base import ActionError
-from embodied.envs.hanna import HannaEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
-from embodied.interface import (
-    VIEWS,
-    Ask,
-    FindObject,
-    Intention,
-    Mode,
-    Move,
-    Pose,
-    Route,
-    Sight,
-    Step,
-    Stop,
-    Task,
-    Thought,
-)
+from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Sight, Step, Stop, Thought
 from embodied.language.plain import PlainLanguage
 from embodied.policies.baselines import (
     PerfectInterpreter,
@@ -51,35 +37,7 @@ from embodied.policies.baselines import (
 )
 from embodied.seeds import stream
 from embodied.tasks.goals import count_hops
-from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, lost_as_written, segments
-
-LINE_TASK = Task(
-    "line/hanna/0", "hanna", "line", Pose(0), FindObject("mug", None, ("mug_1",)), (3,), "find a mug", 0.0, 20
-)
-LINE_ROUTES = (
-    Route("short", (1, 2), 0, 0, "go one", "test"),
-    Route("long", (1, 2, 3), 3, 1, "go two", "test"),
-    Route("away", (3, 2, 1), 6, 0, "come back", "test"),
-)
-
-
-def line_env(routes=LINE_ROUTES) -> HannaEnv:
-    world = line_world()
-    return HannaEnv({"line": world}, Anna({"line": world.graph}, {"line": routes}, split="test"))
-
-
-def grid_setup(n: int = 40, seed: int = 1):
-    world = grid_world(8)
-    routes = build_routes(world, seed=seed, language=PlainLanguage(), house_split="test")
-    pool = hanna_pool(world, seed=seed)
-    tasks = [hanna_task(pool, i, seed=seed, language=PlainLanguage()) for i in range(min(n, len(pool)))]
-
-    def make() -> HannaEnv:
-        return HannaEnv({"grid": world}, Anna({"grid": world.graph}, {"grid": routes}, split="test"))
-
-    return world, routes, tasks, make
-
 
 # ANNA
 

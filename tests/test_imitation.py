@@ -453,8 +453,10 @@ def test_table_d1_is_the_default():
 def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     here = Path(__file__).parent
     code = (
-        "import sys, dataclasses; sys.path.insert(0, sys.argv[2]); import test_imitation as t; from pathlib import Path\n"
-        "split = t.setting(); agent = t.agent_for(split, dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6))\n"
+        "import sys, dataclasses; sys.path.insert(0, sys.argv[2])\n"
+        "import test_imitation as t; from pathlib import Path\n"
+        "config = dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6)\n"
+        "split = t.setting(); agent = t.agent_for(split, config)\n"
         "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), note=lambda line: print(line, flush=True))\n"
     )
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}

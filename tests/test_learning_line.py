@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 import torch
-from test_datasets import build
+from hand_data import build
 
 from agents import study as module
 from agents.failures import failures, hanna_policies, predictions, request_share

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pyarrow.parquet as pq
-from test_datasets import build
+from hand_data import build
 
 from embodied.datasets.parquet import SCHEMAS, export_parquet, size_category
 from embodied.evaluation.evaluate import agent

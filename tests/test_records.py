@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_hanna import LINE_TASK, grid_setup, line_env
+from hand_hanna import LINE_TASK, grid_setup, line_env
 
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, FollowRoute, Move, Pose, Route, Stop, Task, Thought

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_assets import CUBE, write_own
+from handmade_models import CUBE, write_own
 
 from assets.catalogue import load_catalogue
 from embodied.render.contact_sheet import LABEL, TILE, draw_sheets, sheet
