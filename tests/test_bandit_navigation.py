@@ -8,9 +8,6 @@ import math
 import numpy as np
 import pytest
 import torch
-from agents.bandit.a2c import advantages
-from agents.imitation.config import SCALES
-from agents.imitation.training import Split
 from hand_worlds import grid_world
 
 from agents.bandit import navigation, runs
@@ -28,8 +25,11 @@ from agents.bandit.navigation_study import gain, raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
 from agents.hanna.agent import HannaAgent, new_agent
+from agents.hanna.training import Split
+from agents.hanna.training_config import SCALES
 from agents.hanna.vocabulary import build_vocabulary
-from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.actor_critic import advantages
+from agents.imitation.checkpoint import CheckpointError, read_checkpoint
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
@@ -140,7 +140,7 @@ def test_a_killed_run_goes_on_exactly(split, tmp_path, monkeypatch):
     again = agent_for(split)
     found = learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with=before, note=silent)
     assert fingerprint(again) == fingerprint(whole)
-    assert found == runs.read_checkpoint(tmp_path / "whole" / "checkpoint.pt")["history"]
+    assert found == read_checkpoint(tmp_path / "whole" / "checkpoint.pt", runs.FORMAT)["history"]
     with pytest.raises(CheckpointError, match="agent"):
         learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with="other", note=silent)
 

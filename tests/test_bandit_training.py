@@ -22,7 +22,7 @@ from agents.bandit.study import Job, Setting, across_seeds, distinct, run_study
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, drawn_with, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
-from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.checkpoint import CheckpointError, read_checkpoint
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
@@ -284,7 +284,7 @@ def test_ratings_alone_improve_translations(data, trained, tmp_path):
 def weights(folder: Path) -> dict[str, torch.Tensor]:
     return {
         f"{k}.{n}": t
-        for k, m in runs.read_checkpoint(folder / "checkpoint.pt")["modules"].items()
+        for k, m in read_checkpoint(folder / "checkpoint.pt", runs.FORMAT)["modules"].items()
         for n, t in m.items()
     }
 
@@ -299,9 +299,9 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
     save = runs.Run.save
 
-    def killed(run):
-        save(run)
-        if run.update == 13:
+    def killed(run, progress):
+        save(run, progress)
+        if progress.update == 13:
             raise SystemExit
 
     monkeypatch.setattr(runs.Run, "save", killed)
@@ -339,7 +339,7 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
     said = []
     path = run_study(setting, ["3.2"], note=said.append)["3.2"]
     text = path.read_text()
-    assert "2.82 ± 0.03" in text and text.count("|") == 6 * 5
+    assert "2.82 ± 0.03" in text and text.count("|") == 6 * 6
     first = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")}
     assert len(first) == 2 * (1 + 2 + 6)
     run_study(setting, ["3.2"], note=said.append)
@@ -388,5 +388,5 @@ def test_the_command_makes_a_corpus_of_own_text(tmp_path, capsys):
     assert len(corpus.load(tmp_path / "c", ["supervised"])["supervised"]) == 20
     assert main(["corpus", "--out", str(tmp_path / "d"), *files]) == 2
     assert "too few" in capsys.readouterr().err
-    assert main(["ratings", "translate", "3.2", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "s")]) == 2
+    assert main(["study", "bandit", "3.2", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "s")]) == 2
     assert "embodied corpus" in capsys.readouterr().err

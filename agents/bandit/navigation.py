@@ -28,7 +28,7 @@ from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
 from agents.hanna.training import Split
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
-from agents.imitation.loop import stop_signal, tasks_of_update
+from agents.imitation.loop import seed_of, tasks_of_update
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -173,20 +173,14 @@ def learn_from_stars(
     )
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
-    with locked(run.folder), stop_signal() as stop:
-        while run.update < config.updates:
-            numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, run.update)
-            run.update += 1
-            run.history.append({"update": run.update, **numbers})
-            if run.update % 10 == 0 or run.update == config.updates or stop.is_set():
-                run.save()
+    with locked(run.folder), run.session(config.updates, 2.0, note) as session:
+        for update in session:
+            numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, update)
+            run.history.append({"update": update + 1, **numbers})
+            if (update + 1) % 10 == 0:
                 last = run.history[-10:]
-                note(
-                    f"{folder}: {run.update}/{config.updates}, "
-                    + ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers)
-                )
-            if stop.is_set():
-                raise KeyboardInterrupt
+                means = ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers)
+                note(f"{folder}: {update + 1}/{config.updates}, {means}")
     save_agent(agent, Path(folder) / "agent.safetensors")
     return run.history[: config.updates]
 
@@ -205,13 +199,7 @@ def _learn_once(
     tasks = tasks_of_update(split.tasks, update, config.batch, config.seed)
     tasks = [dataclasses.replace(t, horizon=agent.config.training_steps) for t in tasks]
     watching = Watching(policy)
-    episodes = play(
-        split.make_env,
-        watching,
-        tasks,
-        seed=int(stream(config.seed, "update", update).integers(2**31)),
-        batch=len(tasks),
-    )
+    episodes = play(split.make_env, watching, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
     scores = [score_of(e, split.worlds[e.task.world].graph, config.score) for e in episodes]
     rngs = [stream(config.seed, "stars", update, i) for i in range(len(episodes))]
     ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs, strict=True)]

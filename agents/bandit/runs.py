@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import nn
 
 from agents.bandit.translate import batches
-from agents.imitation.checkpoint import CheckpointError
-from agents.imitation.loop import stop_signal
-from assets.cache import atomic_path, write_json
+from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
+from agents.imitation.loop import Note, Progress, Session
+from assets.cache import write_json
 from embodied.locks import locked
 from embodied.seeds import stream
 
 FORMAT = "embodied-bandit-run-1"
-Note = Callable[[str], None]
 
 
 class Run:
@@ -41,7 +38,7 @@ class Run:
           CheckpointError: damaged, or of a run with other settings or another corpus.
         """
         self.folder, self.identity, self.modules, self.optimizers = Path(folder), dict(identity), modules, optimizers
-        self.update, self.seconds = 0, 0.0
+        self.progress = Progress()
         self.sums: dict[str, float] = {}
         """Of the pass at hand."""
         self.history: list[dict[str, float]] = []
@@ -57,55 +54,38 @@ class Run:
         for name, value in numbers.items():
             self.sums[name] = self.sums.get(name, 0.0) + value
 
-    def save(self) -> None:
+    def save(self, progress: Progress) -> None:
         """Write the checkpoint atomically; an interruption leaves the one before it."""
+        self.progress = progress
         body = {
-            "format": FORMAT,
             "identity": self.identity,
-            "update": self.update,
-            "seconds": self.seconds,
+            "update": progress.update,
+            "seconds": progress.seconds,
             "sums": self.sums,
             "history": self.history,
             "modules": {k: m.state_dict() for k, m in self.modules.items()},
             "optimizers": {k: o.state_dict() for k, o in self.optimizers.items()},
         }
-        with atomic_path(self.path) as temporary:
-            torch.save(body, temporary)
+        write_checkpoint(self.path, FORMAT, body)
         write_json(self.folder / "result.json", {"identity": self.identity, "history": self.history}, indent=1)
 
     def _load(self) -> None:
-        body = read_checkpoint(self.path)
-        changed = sorted(
-            k for k in {*body["identity"], *self.identity} if body["identity"].get(k) != self.identity.get(k)
-        )
-        if changed:
-            pairs = ", ".join(f"{k} {body['identity'].get(k)!r} -> {self.identity.get(k)!r}" for k in changed)
-            raise CheckpointError(
-                f"{self.path}: settings changed since this run began ({pairs}); restore them or use another folder"
-            )
+        body = read_checkpoint(self.path, FORMAT)
+        refuse_changes(self.path, body["identity"], self.identity)
         for name, module in self.modules.items():
             module.load_state_dict(body["modules"][name])
         for name, optimizer in self.optimizers.items():
             optimizer.load_state_dict(body["optimizers"][name])
-        self.update, self.seconds, self.sums, self.history = (body[k] for k in ("update", "seconds", "sums", "history"))
+        self.progress, self.sums, self.history = (
+            Progress(body["update"], body["seconds"]),
+            body["sums"],
+            body["history"],
+        )
 
-
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What `Run.save` wrote.
-
-    Raises:
-      CheckpointError: damaged, or of another format.
-    """
-    try:
-        body = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError:
-        raise
-    except Exception as e:  # a truncated file raises one of half a dozen kinds
-        raise CheckpointError(f"{path}: cannot be read ({e}); it was cut short, delete it to begin again") from e
-    if not isinstance(body, dict) or body.get("format") != FORMAT:
-        found = body.get("format") if isinstance(body, dict) else type(body).__name__
-        raise CheckpointError(f"{path}: format {found!r}, this version reads {FORMAT!r}; begin a new run")
-    return body
+    def session(self, total: int, minutes: float, note: Note) -> Session:
+        """Go on until `total` updates are done, saving every so many `minutes`."""
+        say = lambda line: note(f"{self.folder}: {line}")
+        return Session(self.progress, total, self.save, checkpoint_minutes=minutes, note=say)
 
 
 def run_passes(
@@ -118,7 +98,7 @@ def run_passes(
     purpose: str,
     minutes: float,
     note: Note,
-    step: Callable[[np.ndarray, int], Mapping[str, float]],
+    step: Callable[[np.ndarray, int, int], Mapping[str, float]],
     finish: Callable[[int, Mapping[str, float]], Mapping[str, float]],
 ) -> list[dict[str, float]]:
     """Go on with `run` until it has had so many passes; returns what `finish` said of each.
@@ -126,29 +106,21 @@ def run_passes(
     Args:
       lengths: of the sentences, which are put into batches of similar length, anew in every pass.
       minutes: between checkpoints.
-      step: does one update with the sentences it is given, in this pass; returns numbers to add up.
+      step: is given sentences, the pass and the number of the update, does it, and returns numbers to add up.
       finish: is given a pass and the sums of its numbers; returns what is kept of it.
 
     Raises:
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
-    each, order, saved, began = -(-len(lengths) // batch), None, time.monotonic(), time.monotonic() - run.seconds
-    with locked(run.folder), stop_signal() as stop:
-        while run.update < passes * each:
-            turn, place = divmod(run.update, each)
+    each, order = -(-len(lengths) // batch), None
+    with locked(run.folder), run.session(passes * each, minutes, note) as session:
+        for update in session:
+            turn, place = divmod(update, each)
             if order is None or place == 0:
                 order = batches(lengths, batch, stream(seed, purpose, "order", turn))
-            run.add(step(order[place], turn))
-            run.update += 1
-            run.seconds = time.monotonic() - began
+            run.add(step(order[place], turn, update))
             if place + 1 == each:
-                run.history.append({"pass": turn + 1, **finish(turn, run.sums), "seconds": round(run.seconds, 1)})
+                run.history.append({"pass": turn + 1, **finish(turn, run.sums)})
                 run.sums = {}
                 note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
-            if place + 1 == each or stop.is_set() or time.monotonic() - saved > 60 * minutes:
-                run.save()
-                saved = time.monotonic()
-            if stop.is_set():
-                note(f"{run.folder}: stopped after {run.update} updates; the same command goes on from there")
-                raise KeyboardInterrupt
     return run.history[:passes]

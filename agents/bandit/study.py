@@ -133,15 +133,16 @@ def history(setting: Setting, seed: int, job: Job) -> list[dict[str, float]]:
     return found[: job.passes] if len(found) >= job.passes else []
 
 
+def done(setting: Setting, *jobs: Job) -> list[int]:
+    """The seeds that have all these runs."""
+    return [s for s in setting.repeats if all(history(setting, s, job) for job in jobs)]
+
+
 def gains(setting: Setting, job: Job, column: str, turn: int = 0) -> list[float]:
-    """Difference to the reference model per seed, in a pass; nothing if a seed is missing."""
-    found = []
-    for seed in setting.repeats:
-        mine, base = history(setting, seed, job), history(setting, seed, Job(job.reference, "reference"))
-        if not mine or not base:
-            return []
-        found.append(mine[turn][column] - base[0][column])
-    return found
+    """Difference to the reference model in a pass, of each seed that has both."""
+    base = Job(job.reference, "reference")
+    seeds = done(setting, job, base)
+    return [history(setting, s, job)[turn][column] - history(setting, s, base)[0][column] for s in seeds]
 
 
 def folder_of(setting: Setting, seed: int, job: Job) -> Path:
@@ -179,79 +180,89 @@ def _write_table(setting: Setting) -> Path:
     lines = [
         "# Table 3.2: translation scores and their improvement by one round of ratings",
         "",
-        "| | reference | Δ supervised | Δ NED-A2C |",
-        "|---|---|---|---|",
+        "| | seeds | reference | Δ supervised | Δ NED-A2C |",
+        "|---|---|---|---|---|",
     ]
     facts = {}
     for reference in REFERENCES:
+        jobs = [Job(reference, learner) for learner in LEARNERS]
+        seeds = done(setting, *jobs)
+        if not seeds:
+            raise ValueError(f"{setting.out}: no seed has all runs of Table 3.2 yet; run the study without --report")
         for column in (SENTENCE, HELD_OUT):
-            base = [history(setting, s, Job(reference, "reference"))[0][column] for s in setting.repeats]
-            found = [
-                across_seeds(v) for v in (base, *(gains(setting, Job(reference, x), column) for x in LEARNERS[1:]))
-            ]
+            each = [[history(setting, s, job)[0][column] for s in seeds] for job in jobs]
+            base = each[0]
+            found = [across_seeds(base), *(across_seeds([b - a for a, b in zip(base, e)]) for e in each[1:])]
             facts[f"{reference}, {column}"] = [dataclasses.asdict(e) for e in found]
             cells = [f"{shown(e)} ({p})" for e, p in zip(found, PRINTED[reference, column], strict=True)]
-            lines.append(
-                f"| {'fully' if reference == 'full' else 'weakly'} pre-trained, {column} | " + " | ".join(cells) + " |"
-            )
+            label = f"{'fully' if reference == 'full' else 'weakly'} pre-trained, {column}"
+            lines.append(f"| {label} | {len(seeds)} | " + " | ".join(cells) + " |")
     write_json(setting.out / "table_3.2.json", facts, indent=1)
     return _markdown(setting, "table_3.2.md", lines)
 
 
 def _write_curves(setting: Setting) -> Path:
     job = Job("full", "a2c", passes=PASSES)
+    if not gains(setting, job, SENTENCE):
+        raise ValueError(f"{setting.out}: no seed has the {PASSES} passes of Figure 3.4 yet; run it without --report")
     curves = {c: [across_seeds(gains(setting, job, c, turn)) for turn in range(PASSES)] for c in (SENTENCE, HELD_OUT)}
     curves_figure(curves, setting.out / "figure_3.4.png")
     lines = [
         "# Figure 3.4: NED-A2C for five passes, gain over the fully pre-trained reference",
         "",
-        "| | " + " | ".join(f"pass {k + 1}" for k in range(PASSES)) + " |",
-        "|---|" + "---|" * PASSES,
+        "| | seeds | " + " | ".join(f"pass {k + 1}" for k in range(PASSES)) + " |",
+        "|---|---|" + "---|" * PASSES,
     ]
-    lines += [f"| Δ {c} | " + " | ".join(shown(e) for e in curve) + " |" for c, curve in curves.items()]
-    write_json(
-        setting.out / "figure_3.4.json", {c: [dataclasses.asdict(e) for e in v] for c, v in curves.items()}, indent=1
-    )
-    return _markdown(
-        setting, "figure_3.4.md", [*lines, "", "The dissertation (De-En): +6.73 per-sentence BLEU in the fifth pass."]
-    )
+    lines += [f"| Δ {c} | {e[0].n} | " + " | ".join(shown(x) for x in e) + " |" for c, e in curves.items()]
+    facts = {c: [dataclasses.asdict(e) for e in v] for c, v in curves.items()}
+    write_json(setting.out / "figure_3.4.json", facts, indent=1)
+    printed = "The dissertation (De-En): +6.73 per-sentence BLEU in the fifth pass."
+    return _markdown(setting, "figure_3.4.md", [*lines, "", printed])
 
 
 def _write_sweeps(setting: Setting) -> Path:
-    """Every setting that all repeats have; those that are missing are named."""
-    clean = {c: across_seeds(gains(setting, Job("full", "a2c"), c)) for c in (SENTENCE, HELD_OUT)}
-    found: dict[str, dict[float, dict[str, Estimate]]] = {}
-    missing = []
-    for name, values in SWEEPS.items():
-        found[name] = {}
-        for value in values:
-            job = Job("full", "a2c", rater_of(name, value))
-            each = {c: gains(setting, job, c) for c in (SENTENCE, HELD_OUT)}
-            if not each[SENTENCE]:
-                missing.append(f"{name} {value:g}")
-            else:
-                found[name][value] = {c: across_seeds(v) for c, v in each.items()}
-    gains_figure(found, clean, setting.out / "figure_3.5.png")
-    lines = [
-        "# Figure 3.5: gain by NED-A2C under imperfect ratings",
-        "",
-        f"| rater | Δ {SENTENCE} | share of the clean rater's | Δ {HELD_OUT} |",
-        "|---|---|---|---|",
-        f"| clean | {shown(clean[SENTENCE])} | 100 % | {shown(clean[HELD_OUT])} |",
-    ]
-    for name, values in found.items():
-        for value, e in values.items():
-            share = 100 * e[SENTENCE].mean / clean[SENTENCE].mean
-            lines.append(f"| {name} {value:g} | {shown(e[SENTENCE])} | {share:.0f} % | {shown(e[HELD_OUT])} |")
-    write_json(
-        setting.out / "figure_3.5.json",
-        {
-            name: {f"{value:g}": {c: dataclasses.asdict(x) for c, x in e.items()} for value, e in values.items()}
-            for name, values in found.items()
-        },
-        indent=1,
+    """Every setting that some seed has; those that are missing are named."""
+    columns = (SENTENCE, HELD_OUT)
+    clean = Job("full", "a2c")
+    if not gains(setting, clean, SENTENCE):
+        raise ValueError(f"{setting.out}: no seed has learned from clean ratings yet; run it without --report")
+    band = {c: across_seeds(gains(setting, clean, c)) for c in columns}
+    found: dict[str, dict[float, dict[str, Estimate]]] = {name: {} for name in SWEEPS}
+    missing, lines = (
+        [],
+        [
+            "# Figure 3.5: gain by NED-A2C under imperfect ratings",
+            "",
+            f"| rater | seeds | Δ {SENTENCE} | share of the clean rater's, same seeds | Δ {HELD_OUT} |",
+            "|---|---|---|---|---|",
+            f"| clean | {band[SENTENCE].n} | {shown(band[SENTENCE])} | 100 % | {shown(band[HELD_OUT])} |",
+        ],
     )
+    for name, value in ((name, value) for name, values in SWEEPS.items() for value in values):
+        job = Job("full", "a2c", rater_of(name, value))
+        if not gains(setting, job, SENTENCE):
+            missing.append(f"{name} {value:g}")
+            continue
+        e = found[name][value] = {c: across_seeds(gains(setting, job, c)) for c in columns}
+        share = 100 * sum(gains(setting, job, SENTENCE)) / sum(_clean_gains(setting, job))
+        lines.append(
+            f"| {name} {value:g} | {e[SENTENCE].n} | {shown(e[SENTENCE])} | {share:.0f} % | {shown(e[HELD_OUT])} |"
+        )
+    if any(found.values()):
+        swept = {name: values for name, values in found.items() if values}
+        gains_figure(swept, band, setting.out / "figure_3.5.png")
+    facts = {
+        n: {f"{v:g}": {c: vars(x) for c, x in e.items()} for v, e in values.items()} for n, values in found.items()
+    }
+    write_json(setting.out / "figure_3.5.json", facts, indent=1)
     return _markdown(setting, "figure_3.5.md", lines + (["", f"Not run yet: {', '.join(missing)}."] if missing else []))
+
+
+def _clean_gains(setting: Setting, job: Job) -> list[float]:
+    """What the clean rater gave the seeds that have `job`."""
+    base, clean = Job(job.reference, "reference"), Job(job.reference, "a2c")
+    seeds = done(setting, job, base, clean)
+    return [history(setting, s, clean)[0][SENTENCE] - history(setting, s, base)[0][SENTENCE] for s in seeds]
 
 
 def shown(e: Estimate) -> str:

@@ -113,10 +113,10 @@ def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str,
     optimizer = adam(translator, config.pretraining_rate)
     run = Run(folder, m.identity(), {"translator": translator}, {"translator": optimizer})
 
-    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+    def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source, target = rows(data.source, chosen), rows(data.target, chosen)
         loss = supervised_loss(translator, source, target)
-        descend(loss, optimizer, config.clip, f"pre-training, update {run.update}")
+        descend(loss, optimizer, config.clip, f"pre-training, update {update}")
         return {"loss": float(loss.detach()) * len(chosen), "sentences": len(chosen)}
 
     def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
@@ -150,7 +150,7 @@ def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = pri
     optimizer = adam(critic, config.pretraining_rate)
     run = Run(folder, m.identity("critic_passes", reference=reference.stem), {"critic": critic}, {"critic": optimizer})
 
-    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+    def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source = rows(data.source, chosen)
         said = sampled(translator, m, data, chosen, "critic", turn)
         scores = scores_of(said, m, data, chosen)
@@ -158,7 +158,7 @@ def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = pri
         values = critic(source, target)
         rated = Decisions(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
         loss = critic_loss(rated)
-        descend(loss, optimizer, config.clip, f"critic, update {run.update}")
+        descend(loss, optimizer, config.clip, f"critic, update {update}")
         return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
 
     def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
@@ -209,11 +209,11 @@ def bandit(
     )
     run = Run(folder, about, modules, optimizers)
 
-    def step(chosen: np.ndarray, turn: int) -> dict[str, float]:
+    def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said = sampled(translator, m, data, chosen, "bandit", turn)
         scores = scores_of(said, m, data, chosen)
         numbers = {"score": float(sum(scores)), "sentences": len(chosen)}
-        where = f"{learner}, update {run.update}"
+        where = f"{learner}, update {update}"
         if learner == "supervised":
             loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
             descend(loss, optimizers["translator"], config.clip, where)

@@ -37,7 +37,6 @@ COMMANDS = (
     "eval",
     "judge",
     "study",
-    "ratings",
     "bench",
 )
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""

@@ -11,6 +11,9 @@ import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from agents.bandit.config import SCALES as BANDIT_SCALES
+from agents.bandit.config import BanditConfig
+from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
@@ -213,3 +216,46 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where tables and episodes go")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def add_study_bandit(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tables", nargs="+", choices=("3.2", "3.4", "3.5"), metavar="TABLE", help="3.2, 3.4 or 3.5")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="corpus of `embodied corpus`")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="runs, tables and figures; the same command goes on"
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--scale", choices=sorted(BANDIT_SCALES), default="mini", help="settings to start from (default: %(default)s)"
+    )
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="runs side by side (default: %(default)s)")
+    parser.add_argument(
+        "--threads", type=int, default=1, metavar="N", help="of PyTorch, per run (default: %(default)s)"
+    )
+    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
+    add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
+
+
+def add_study_stars(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    parser.add_argument(
+        "--agent", type=Path, default=SHIPPED_AGENT, metavar="FILE", help="agent to begin with (default: shipped)"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="agents, episodes, table and figure; the same command goes on",
+    )
+    parser.add_argument("--only", nargs="+", metavar="RATER", help="which raters, such as 'skew 4' (default: all)")
+    parser.add_argument(
+        "--seeds", type=int, default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+    )
+    parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
+    parser.add_argument("--tasks", type=int, metavar="N", help="judge on at most so many tasks, from all houses alike")
+    parser.set_defaults(threads=1)
+    add_fields(parser, RatingConfig)

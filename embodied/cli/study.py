@@ -2,9 +2,13 @@
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
     embodied study hari 4.7 4.8 --data DATA --out STUDY
+    embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
+    embodied study stars --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
-number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. Rows that tables share are
+number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. `bandit` is a translator
+that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
+agent learn from ratings in the same way, in houses. Rows that tables share are
 trained once. Interrupt it whenever you like: the same command goes on.
 """
 
@@ -22,10 +26,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     learning.add_study(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
     learning.add_study_hari(kinds.add_parser("hari", help="agents that learn which question to ask"))
+    learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
+    learning.add_study_stars(kinds.add_parser("stars", help="HANNA agents that learn from ratings of their walks"))
 
 
 def run(args: argparse.Namespace) -> int:
-    for path in (run_hanna if args.what == "hanna" else run_hari)(args):
+    for path in {"hanna": run_hanna, "hari": run_hari, "bandit": run_bandit, "stars": run_stars}[args.what](args):
         print(path.read_text())
     return 0
 
@@ -64,3 +70,39 @@ def run_hari(args: argparse.Namespace) -> list[Path]:
         threads=args.threads,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def run_bandit(args: argparse.Namespace) -> list[Path]:
+    from agents.bandit.config import SCALES
+    from agents.bandit.study import Setting, report, run_study
+    from embodied.cli.learning import chosen
+
+    if args.seeds < 1 or args.workers < 1:
+        raise ValueError(f"--seeds and --workers should be at least 1, got {args.seeds} and {args.workers}")
+    setting = Setting(args.data, args.out, chosen(args, SCALES[args.scale]), args.seeds, args.threads)
+    if args.report:
+        return list(report(setting, args.tables).values())
+    return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def run_stars(args: argparse.Namespace) -> list[Path]:
+    from agents.bandit.navigation_study import NavigationSetting, run_navigation_study
+    from agents.bandit.rating_config import RatingConfig
+    from agents.vision.run import encoder_of
+    from embodied.cli.learning import chosen
+
+    if args.seeds < 1:
+        raise ValueError(f"--seeds should be at least 1, got {args.seeds}")
+    config = chosen(args, RatingConfig())
+    setting = NavigationSetting(
+        args.data,
+        encoder_of(args),
+        args.agent,
+        args.out,
+        config,
+        tuple(config.seed + k for k in range(args.seeds)),
+        args.split,
+        args.tasks,
+        args.threads,
+    )
+    return [run_navigation_study(setting, args.only, note=note)]
