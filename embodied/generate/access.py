@@ -3,51 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from embodied.generate.kinds import BEDROOMS
+from embodied.generate.kinds import KINDS
 from embodied.generate.modules import Cell
 
-Wall = tuple[str, int, int, int]
-"""A shared wall: the axis it runs along, its coordinate across, and its interval, decimetres."""
 
-THROUGH = ("hall", "corridor", "living_room", "dining_room", "kitchen", "family_room")
-"""Kinds one may cross on the way to another room."""
-_BED = {"corridor": 0.0, "hall": 0.4, "living_room": 5.0, "family_room": 6.0, "dining_room": 7.0}
-_OTHER = {"corridor": 0.0, "hall": 0.0, "living_room": 0.8, "family_room": 0.8, "dining_room": 1.6, "kitchen": 3.0}
-ENTERED_FROM: dict[str, dict[str, float]] = {
-    **{k: _BED for k in BEDROOMS},
-    "bathroom": {"corridor": 0.0, "hall": 0.4, "living_room": 6.0, "dining_room": 8.0, "family_room": 7.0},
-    "toilet": {"hall": 0.0, "corridor": 0.2, "living_room": 6.0, "family_room": 6.0, "dining_room": 8.0},
-    "kitchen": {"dining_room": 0.0, "living_room": 0.3, "family_room": 0.6, "hall": 0.8, "corridor": 1.0},
-    "dining_room": {"living_room": 0.0, "kitchen": 0.4, "hall": 0.6, "family_room": 0.6, "corridor": 0.8},
-    "living_room": {"hall": 0.0, "corridor": 0.3, "dining_room": 1.2, "family_room": 1.5, "kitchen": 3.0},
-    "family_room": {"corridor": 0.3, "hall": 0.3, "kitchen": 0.4, "dining_room": 0.4, "living_room": 0.5},
-    **{k: _OTHER for k in ("study", "library", "gym", "playroom")},
-    "workshop": {"garage": 0.3, "corridor": 0.0, "hall": 0.3, "laundry_room": 0.3, "kitchen": 2.0, "family_room": 2.0},
-    "laundry_room": {"corridor": 0.0, "kitchen": 0.2, "hall": 0.4, "dining_room": 4.0},
-    "pantry": {"kitchen": 0.0, "corridor": 1.0, "hall": 1.5, "dining_room": 2.5},
-    "closet": {"hall": 0.0, "corridor": 0.0, "living_room": 3.0, "study": 2.0, "family_room": 3.0},
-    "garage": {"laundry_room": 0.1, "hall": 0.2, "corridor": 0.2, "kitchen": 0.8, "workshop": 0.5},
-    "sun_room": {
-        "living_room": 0.0,
-        "dining_room": 0.2,
-        "family_room": 0.2,
-        "kitchen": 0.8,
-        "corridor": 0.8,
-        "hall": 1.0,
-        "library": 1.0,
-    },
-    "corridor": {
-        "hall": 0.0,
-        "corridor": 0.0,
-        "living_room": 1.5,
-        "family_room": 2.0,
-        "dining_room": 2.5,
-        "kitchen": 5.0,
-    },
-    "hall": {"corridor": 0.0, "living_room": 1.0},
-}
-"""Room kind to the kinds it may be entered from, with a cost; an owned room is entered from its owner."""
+class SharedWall(NamedTuple):
+    """A wall between two cells, or between a cell and the outdoors, decimetres."""
+
+    axis: str
+    """'x' or 'y': the axis it runs along."""
+    across: int
+    """Its coordinate on the other axis."""
+    low: int
+    high: int
+    """Its interval on its own axis."""
+
+    @property
+    def length(self) -> int:
+        return self.high - self.low
+
+
 JOINS = {
     ("kitchen", "dining_room"): 16,
     ("dining_room", "living_room"): 16,
@@ -63,8 +40,14 @@ JOINS = {
     ("library", "living_room"): 18,
 }
 """Kinds joined wherever their shared wall is at least so long, decimetres."""
-NEEDED = {"toilet": 11, "closet": 11, "pantry": 11}
-"""Shortest shared wall, decimetres, that holds the kind's door; 12 for the others."""
+ALSO_THROUGH = (
+    ("laundry_room", "garage"),
+    ("garage", "workshop"),
+    ("workshop", "garage"),
+    ("laundry_room", "workshop"),
+    ("library", "sun_room"),
+)
+"""(crossed, reached): kinds that one may cross on the way to some others only."""
 
 
 @dataclass(frozen=True)
@@ -73,23 +56,23 @@ class Link:
 
     child: int
     parent: int
-    wall: Wall
+    wall: SharedWall
     tree: bool
     """Whether the child is entered this way; otherwise it is a further join."""
 
 
-def shared_wall(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> Wall | None:
+def shared_wall(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> SharedWall | None:
     """The wall two rectangles share, None where they do not touch along more than a point."""
     if a[2] == b[0] or b[2] == a[0]:
         low, high = max(a[1], b[1]), min(a[3], b[3])
-        return ("y", a[2] if a[2] == b[0] else a[0], low, high) if high > low else None
+        return SharedWall("y", a[2] if a[2] == b[0] else a[0], low, high) if high > low else None
     if a[3] == b[1] or b[3] == a[1]:
         low, high = max(a[0], b[0]), min(a[2], b[2])
-        return ("x", a[3] if a[3] == b[1] else a[1], low, high) if high > low else None
+        return SharedWall("x", a[3] if a[3] == b[1] else a[1], low, high) if high > low else None
     return None
 
 
-def walls_between(cells: list[Cell]) -> dict[tuple[int, int], Wall]:
+def walls_between(cells: list[Cell]) -> dict[tuple[int, int], SharedWall]:
     """(i, j) with i < j to the wall they share."""
     found = {}
     for i, a in enumerate(cells):
@@ -101,7 +84,9 @@ def walls_between(cells: list[Cell]) -> dict[tuple[int, int], Wall]:
     return found
 
 
-def outer_stretches(cells: list[Cell], walls: dict[tuple[int, int], Wall], i: int) -> list[tuple[Wall, int]]:
+def outer_stretches(
+    cells: list[Cell], walls: dict[tuple[int, int], SharedWall], i: int
+) -> list[tuple[SharedWall, int]]:
     """Stretches of the edges of cell i that look outdoors, each with the sense of its outward normal, longest first."""
     x0, y0, x1, y1 = cells[i].rect
     taken = [w for pair, w in walls.items() if i in pair]
@@ -113,27 +98,27 @@ def outer_stretches(cells: list[Cell], walls: dict[tuple[int, int], Wall], i: in
         ("y", x0, y0, y1, -1),
     ):
         at = low
-        for _, _, p, q in sorted(w for w in taken if w[0] == axis and w[1] == across):
+        for _, _, p, q in sorted(w for w in taken if w.axis == axis and w.across == across):
             if p > at:
-                found.append(((axis, across, at, p), side))
+                found.append((SharedWall(axis, across, at, p), side))
             at = max(at, q)
         if high > at:
-            found.append(((axis, across, at, high), side))
-    return sorted(found, key=lambda f: (f[0][2] - f[0][3], f[0]))
+            found.append((SharedWall(axis, across, at, high), side))
+    return sorted(found, key=lambda f: (-f[0].length, f[0]))
 
 
-def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> bool:
+def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> bool:
     """Whether the hall has room for a front door and every garage for a car to drive in."""
     need = {"hall": 14, "garage": 29}
     for i, c in enumerate(cells):
         if c.kind in need:
             stretches = outer_stretches(cells, walls, i)
-            if not stretches or stretches[0][0][3] - stretches[0][0][2] < need[c.kind]:
+            if not stretches or stretches[0][0].length < need[c.kind]:
                 return False
     return True
 
 
-def connect(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> tuple[list[Link], float] | None:
+def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tuple[list[Link], float] | None:
     """The cheapest set of entrances that reaches every cell from the hall, and its cost.
 
     Grows a tree from the hall (Prim's algorithm) over the permitted entrances, then adds joins.
@@ -144,11 +129,11 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> tuple[list
     start = next((i for i, c in enumerate(cells) if c.kind == "hall"), None)
     if start is None:
         return None
-    options: list[list[tuple[float, int, Wall]]] = [[] for _ in cells]
+    options: list[list[tuple[float, int, SharedWall]]] = [[] for _ in cells]
     for (i, j), wall in walls.items():
         for child, parent in ((i, j), (j, i)):
             cost = _cost(cells, child, parent)
-            if cost is not None and wall[3] - wall[2] >= _needed(cells, child, parent):
+            if cost is not None and wall.length >= _needed(cells, child, parent):
                 options[parent].append((cost, child, wall))
     links: list[Link] = []
     reached = {start}
@@ -169,13 +154,13 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> tuple[list
     tree = {(min(k.child, k.parent), max(k.child, k.parent)) for k in links}
     for (i, j), wall in walls.items():
         least = JOINS.get((cells[i].kind, cells[j].kind)) or JOINS.get((cells[j].kind, cells[i].kind))
-        if least and (i, j) not in tree and wall[3] - wall[2] >= least:
+        if least and (i, j) not in tree and wall.length >= least:
             links.append(Link(i, j, wall, False))
     links += _second_doors(cells, walls, links)
     return links, total
 
 
-def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall], links: list[Link]) -> list[Link]:
+def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], links: list[Link]) -> list[Link]:
     """A door to hall or corridor for living rooms and kitchens that are entered through each other only."""
     found = []
     for i, c in enumerate(cells):
@@ -185,9 +170,9 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall], links: 
         if any(cells[k].kind in ("hall", "corridor") for k in ways):
             continue
         beside = [
-            (cells[j + k - i].kind != "hall", -(w[3] - w[2]), j + k - i, w)
+            (cells[j + k - i].kind != "hall", -w.length, j + k - i, w)
             for (j, k), w in walls.items()
-            if i in (j, k) and cells[j + k - i].kind in ("hall", "corridor") and w[3] - w[2] >= 12
+            if i in (j, k) and cells[j + k - i].kind in ("hall", "corridor") and w.length >= 12
         ]
         if beside:
             _, _, other, wall = min(beside)
@@ -198,19 +183,13 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], Wall], links: 
 def _needed(cells: list[Cell], child: int, parent: int) -> int:
     if {cells[child].kind, cells[parent].kind} <= {"hall", "corridor"}:
         return 9
-    return NEEDED.get(cells[child].kind, 12)
+    return KINDS[cells[child].kind].wall
 
 
 def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
     c, p = cells[child], cells[parent]
     if c.owner is not None:
         return 0.0 if c.owner == parent else None
-    if p.kind not in THROUGH and (p.kind, c.kind) not in (
-        ("laundry_room", "garage"),
-        ("garage", "workshop"),
-        ("workshop", "garage"),
-        ("laundry_room", "workshop"),
-        ("library", "sun_room"),
-    ):
+    if not KINDS[p.kind].leads_on and (p.kind, c.kind) not in ALSO_THROUGH:
         return None
-    return ENTERED_FROM[c.kind].get(p.kind)
+    return KINDS[c.kind].entered_from.get(p.kind)

@@ -113,11 +113,38 @@ def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Foot
     return _winged(area, shape, rng)
 
 
-def _depths(rng: np.random.Generator, low: int, high: int) -> tuple[int, int]:
-    """Depths of the two rows of a wing; often one serves and is shallower."""
+@dataclass(frozen=True)
+class Wing:
+    """The cross-section of a wing: two rows of rooms with a corridor between them, decimetres."""
+
+    first: int
+    """Depth of the row above its corridor, or left of it."""
+    second: int
+    """Depth of the row below its corridor, or right of it."""
+    corridor: int
+
+    @property
+    def depth(self) -> int:
+        return self.first + self.corridor + self.second
+
+
+def _draw_wing(corridor: int, low: int, high: int, rng: np.random.Generator) -> Wing:
+    """A wing whose rows are low..high deep; often one serves and is shallower."""
     a = int(rng.integers(low, high + 1))
     b = int(rng.integers(max(24, low - 12), low + 1)) if rng.random() < 0.6 else int(rng.integers(low, high + 1))
-    return (a, b) if rng.random() < 0.5 else (b, a)
+    return Wing(a, b, corridor) if rng.random() < 0.5 else Wing(b, a, corridor)
+
+
+def _cap_length(share: float, area: float, least_most: tuple[float, float], across: int, room: int) -> int:
+    """Length, decimetres, of the rooms across a wing's end; 0 where `room` is too short for them.
+
+    Args:
+      share: of the house's `area`, square metres, that they take.
+      least_most: smallest and largest area of these rooms, square metres.
+      across: the wing's depth, decimetres.
+    """
+    size = round(float(np.clip(share * area, *least_most)) * 100 / across)
+    return size if 30 <= size <= room - 25 else 0
 
 
 def _flat(area: float, rng: np.random.Generator) -> Footprint:
@@ -135,16 +162,16 @@ def _bar(area: float, rng: np.random.Generator) -> Footprint:
     """One wing with a corridor between two rows."""
     corridor = int(rng.integers(12, 15)) + (area > 180)
     scale = float(np.interp(area, (60, 110, 200, 400, 600), (0, 0.4, 1.0, 2.4, 3.2)))
-    top, bottom = _depths(rng, int(30 + 9 * scale), int(36 + 12 * scale))
-    depth = top + corridor + bottom
-    length = round(area * 100 / depth)
-    return _one_wing("rectangle", length, top, bottom, corridor, (), area, rng)
+    wing = _draw_wing(corridor, int(30 + 9 * scale), int(36 + 12 * scale), rng)
+    return _one_wing("rectangle", round(area * 100 / wing.depth), wing, (), area, rng)
 
 
-def _one_wing(shape, length, top, bottom, corridor, bumps, area, rng) -> Footprint:
+def _one_wing(
+    shape: str, length: int, wing: Wing, bumps: tuple[tuple[int, int, int], ...], area: float, rng: np.random.Generator
+) -> Footprint:
     """A wing along x; `bumps` are (x0, x1, extra depth) of the bottom row, sorted."""
     left = right = 0
-    depth = top + corridor + bottom
+    top, bottom, corridor, depth = wing.first, wing.second, wing.corridor, wing.depth
     if rng.random() < 0.65 and not any(b[0] == 0 for b in bumps):
         left = round(float(np.clip(rng.uniform(0.22, 0.34) * area, 20, 60)) * 100 / depth)
     if area > 100 and rng.random() < 0.35 and not any(b[1] == length for b in bumps):
@@ -173,12 +200,12 @@ def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
     """One wing whose front row steps out: at one end (L), in the middle (T) or at both ends (U)."""
     corridor = int(rng.integers(12, 15))
     scale = float(np.interp(area, (60, 110, 200), (0, 0.35, 0.8)))
-    top, bottom = _depths(rng, int(30 + 9 * scale), int(35 + 11 * scale))
+    wing = _draw_wing(corridor, int(30 + 9 * scale), int(35 + 11 * scale), rng)
     extra = int(rng.integers(15, 27))
     wide = int(rng.integers(38, 56))
     count = 2 if shape == "U" else 1
-    depth = top + corridor + bottom
-    length = round((area * 100 - count * extra * wide) / depth)
+    length = round((area * 100 - count * extra * wide) / wing.depth)
+    bumps: tuple[tuple[int, int, int], ...]
     if shape == "L":
         bumps = ((0, wide, extra),) if rng.random() < 0.6 else ((length - wide, length, extra),)
     elif shape == "T":
@@ -186,7 +213,7 @@ def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
         bumps = ((x0, x0 + wide, extra),)
     else:
         bumps = ((0, wide, extra), (length - wide, length, extra))
-    return _one_wing(shape, length, top, bottom, corridor, bumps, area, rng)
+    return _one_wing(shape, length, wing, bumps, area, rng)
 
 
 def _winged(area: float, shape: str, rng: np.random.Generator) -> Footprint:
@@ -194,54 +221,42 @@ def _winged(area: float, shape: str, rng: np.random.Generator) -> Footprint:
     corridor = int(rng.integers(13, 16))
     scale = float(np.interp(area, (130, 200, 400, 600), (0.4, 0.7, 1.2, 1.6)))
     low, high = int(30 + 9 * scale), int(36 + 11 * scale)
-    top, bottom = _depths(rng, low, high)
-    deep = top + corridor + bottom
-    left, right = _depths(rng, low, high)
-    wing = left + corridor + right
+    bar, wing = _draw_wing(corridor, low, high, rng), _draw_wing(corridor, low, high, rng)
     if shape == "U":
-        out, inner = _depths(rng, low, high)
-        other = out + corridor + inner
-        gap = int(rng.integers(55, 100))
-        long = wing + other + gap
-        rest = area * 100 - long * deep
-        if rest < 45 * (wing + other):
-            gap = 50
-            long = wing + other + gap
-            rest = max(area * 100 - long * deep, 35 * (wing + other))
+        public = _draw_wing(corridor, low, high, rng)
+        long = wing.depth + public.depth + int(rng.integers(55, 100))
+        rest = area * 100 - long * bar.depth
+        if rest < 45 * (wing.depth + public.depth):
+            long = wing.depth + public.depth + 50
+            rest = max(area * 100 - long * bar.depth, 35 * (wing.depth + public.depth))
         share = rng.uniform(0.4, 0.6)
-        return _u(
-            long,
-            top,
-            bottom,
-            corridor,
-            (out, inner, round(rest * share / other)),
-            (left, right, round(rest * (1 - share) / wing)),
-        )
+        drop, fall = round(rest * share / public.depth), round(rest * (1 - share) / wing.depth)
+        return _u(long, bar, (public, drop), (wing, fall))
     share = float(rng.uniform(0.6, 0.72))
-    long = max(round(area * 100 * share / deep), wing + 35)
-    drop = max(30, round((area * 100 - long * deep) / wing))
-    return _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng)
+    long = max(round(area * 100 * share / bar.depth), wing.depth + 35)
+    drop = max(30, round((area * 100 - long * bar.depth) / wing.depth))
+    return _l_or_t(shape, long, drop, bar, wing, area, rng)
 
 
-def _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng) -> Footprint:
-    wing = left + corridor + right
-    deep = top + corridor + bottom
-    x0 = long - wing if shape == "L" else int(rng.integers(30, max(31, long - wing - 30)))
+def _l_or_t(
+    shape: str, long: int, drop: int, bar: Wing, wing: Wing, area: float, rng: np.random.Generator
+) -> Footprint:
+    """A `bar` of length `long` and a `wing` that hangs `drop` below it, at its end (L) or inside (T)."""
+    top, bottom, corridor, left, right = bar.first, bar.second, bar.corridor, wing.first, wing.second
+    x0 = long - wing.depth if shape == "L" else int(rng.integers(30, max(31, long - wing.depth - 30)))
     xb = x0 + left
-    cap = round(float(np.clip(rng.uniform(0.18, 0.26) * area, 24, 60)) * 100 / deep) if rng.random() < 0.6 else 0
-    cap = cap if 30 <= cap <= xb - 25 else 0
-    foot = round(float(np.clip(rng.uniform(0.08, 0.14) * area, 18, 34)) * 100 / wing) if rng.random() < 0.4 else 0
-    foot = foot if 30 <= foot <= drop - 25 else 0
+    cap = _cap_length(rng.uniform(0.18, 0.26), area, (24, 60), bar.depth, xb) if rng.random() < 0.6 else 0
+    foot = _cap_length(rng.uniform(0.08, 0.14), area, (18, 34), wing.depth, drop) if rng.random() < 0.4 else 0
     end = xb + corridor if shape == "L" else long
     band_a = Band("x", cap, 1, end - cap, bottom, bottom + corridor, (cap == 0, shape == "T"))
     band_b = Band("y", bottom, -1, drop + bottom - foot, xb, xb + corridor, (False, foot == 0))
     a_top = Strip("x", cap, 1, long - cap, bottom + corridor, 1, top, cap, 0, 0)
     a_left = Strip("x", cap, 1, xb - cap, bottom, -1, bottom, cap, 0, 0)
     b_left = Strip("y", 0, -1, drop - foot, xb, -1, left, xb + bottom, 1, bottom)
+    strips: tuple[Strip, ...]
     if shape == "L":
-        b_right = Strip(
-            "y", bottom + corridor, -1, drop + bottom + corridor - foot, xb + corridor, 1, right, xb, 1, -corridor
-        )
+        length = drop + bottom + corridor - foot
+        b_right = Strip("y", bottom + corridor, -1, length, xb + corridor, 1, right, xb, 1, -corridor)
         strips = (a_top, a_left, b_left, b_right)
     else:
         a_right = Strip("x", xb + corridor, 1, long - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - cap)
@@ -249,16 +264,17 @@ def _l_or_t(shape, long, drop, top, bottom, corridor, left, right, area, rng) ->
         strips = (a_top, a_left, a_right, b_left, b_right)
     caps = []
     if cap:
-        caps.append(Cap(0, True, "y", (0, 0, cap, deep), (bottom, bottom + corridor)))
+        caps.append(Cap(0, True, "y", (0, 0, cap, bar.depth), (bottom, bottom + corridor)))
     if foot:
-        caps.append(Cap(1, False, "x", (x0, -drop, x0 + wing, foot - drop), (xb, xb + corridor)))
+        caps.append(Cap(1, False, "x", (x0, -drop, x0 + wing.depth, foot - drop), (xb, xb + corridor)))
     return Footprint(shape, strips, (band_a, band_b), tuple(caps), corridor)
 
 
-def _u(long, top, bottom, corridor, public, private) -> Footprint:
-    """`public` and `private` wings as (outer row, inner row, length below the first wing)."""
-    out, inner, drop = public
-    left, right, fall = private
+def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]) -> Footprint:
+    """A `bar` of length `long` with a wing below each of its ends, each with its length below the bar."""
+    top, bottom, corridor = bar.first, bar.second, bar.corridor
+    (out, inner), drop = (public[0].first, public[0].second), public[1]
+    (left, right), fall = (private[0].first, private[0].second), private[1]
     xa = out
     xb = long - right - corridor
     band_p = Band("y", -drop, 1, drop + bottom, xa, xa + corridor, (True, False))
@@ -286,8 +302,9 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     corridor = int(rng.integers(13, 17))
     scale = float(np.interp(area, (200, 300, 450, 700), (0.3, 0.8, 1.4, 2.0)))
     low, high = int(30 + 9 * scale), int(36 + 11 * scale)
-    (top, bottom), (left, right), (west, east) = (_depths(rng, low, high) for _ in range(3))
-    deep, wing, rise = top + corridor + bottom, left + corridor + right, west + corridor + east
+    bar, south, north = (_draw_wing(corridor, low, high, rng) for _ in range(3))
+    top, bottom, left, right, west, east = bar.first, bar.second, south.first, south.second, north.first, north.second
+    deep, wing, rise = bar.depth, south.depth, north.depth
     arm = area * 100 / ((deep + wing) / 2)  # total length of bar and wings
     long = round(arm * rng.uniform(0.5, 0.6))
     long = max(long, max(wing, rise) + 60)
@@ -300,15 +317,11 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     x_below, x_above = (min(max(x, 28), slack - 28) for x in (x_below, x_above))
     xb, xc = x_below + left, x_above + west
 
-    def end(share_of: float, length: int, room: int) -> int:
-        """Length of the rooms across a wing's end, 0 for none, decimetres."""
-        size = round(float(np.clip(share_of * area, 20, 58)) * 100 / length)
-        return size if 30 <= size <= room - 25 else 0
-
-    day = end(rng.uniform(0.1, 0.15), deep, min(xb, xc)) if rng.random() < 0.8 else 0
-    night = end(rng.uniform(0.06, 0.1), deep, long - max(xb, xc) - corridor) if rng.random() < 0.5 else 0
-    foot = end(rng.uniform(0.06, 0.1), wing, below) if rng.random() < 0.5 else 0
-    head = end(rng.uniform(0.08, 0.12), rise, above) if rng.random() < 0.8 else 0
+    inner, usual = long - max(xb, xc) - corridor, (20, 58)
+    day = _cap_length(rng.uniform(0.1, 0.15), area, usual, deep, min(xb, xc)) if rng.random() < 0.8 else 0
+    night = _cap_length(rng.uniform(0.06, 0.1), area, usual, deep, inner) if rng.random() < 0.5 else 0
+    foot = _cap_length(rng.uniform(0.06, 0.1), area, usual, wing, below) if rng.random() < 0.5 else 0
+    head = _cap_length(rng.uniform(0.08, 0.12), area, usual, rise, above) if rng.random() < 0.8 else 0
     roof = bottom + corridor
     stop = long - night
     strips = (

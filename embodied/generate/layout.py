@@ -10,41 +10,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.generate.access import Link, connect, has_outer_doors, walls_between
-from embodied.generate.footprint import Cap, Footprint, Rect
-from embodied.generate.modules import Cell, Module, arrange, draw_modules, width
-from embodied.generate.program import Space
+from embodied.generate.footprint import Band, Cap, Footprint, Rect
+from embodied.generate.kinds import KINDS
+from embodied.generate.modules import Cell, Module, Slot, arrange, draw_modules, width
+from embodied.generate.program import WantedRoom
 from embodied.generate.score import score
-
-ZONE = {
-    "living_room": 0.0,
-    "sun_room": 0.2,
-    "family_room": 0.6,
-    "dining_room": 0.5,
-    "kitchen": 0.9,
-    "hall": 1.2,
-    "garage": 1.2,
-    "library": 1.3,
-    "toilet": 1.4,
-    "workshop": 1.5,
-    "pantry": 1.0,
-    "laundry_room": 1.7,
-    "study": 1.9,
-    "gym": 2.2,
-    "guest_room": 2.5,
-    "playroom": 2.6,
-    "bathroom": 3.0,
-    "kids_room": 3.2,
-    "bedroom": 3.1,
-    "closet": 3.0,
-    "main_bedroom": 3.7,
-}
-"""How private a room kind is: 0 at the public end of the spine."""
-
 
 LONG = 95
 """Corridors longer than this, decimetres, are divided."""
 KEPT = 6
 """Candidates kept as parents."""
+MAIN_SUITE = ("main_bedroom", "bathroom")
+CAP_STARTS = (
+    ("living_room",),
+    ("living_room", "dining_room"),
+    ("living_room", "kitchen"),
+    ("family_room", "living_room"),
+    ("living_room", "library"),
+    ("garage", "kitchen"),
+    ("garage",),
+)
+CAP_ENDS = (
+    ("main_bedroom",),
+    MAIN_SUITE,
+    ("gym",),
+    ("living_room",),
+    ("family_room",),
+    ("guest_room",),
+    ("library",),
+    ("playroom",),
+)
+"""Rooms that may fill the public and the private end of a wing; MAIN_SUITE takes all rooms of the main bedroom."""
+
+
+Rows = list[list[tuple[Module, int]]]
+"""For each strip of a footprint its modules with their wanted widths, decimetres."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class Genome:
     rows: int
     cuts: int
     privacy: tuple[float, ...]
-    """What is added to each space's ZONE."""
+    """What is added to the privacy of each space's kind."""
 
 
 def draw_plan(
-    footprints: Sequence[Footprint], spaces: tuple[Space, ...], tries: int, *, rng: np.random.Generator
+    footprints: Sequence[Footprint], spaces: tuple[WantedRoom, ...], tries: int, *, rng: np.random.Generator
 ) -> Plan | None:
     """The best of `tries` candidates: random ones first, then changes of the best so far.
 
@@ -90,8 +90,8 @@ def draw_plan(
 
 
 def _random_genome(footprints: int, spaces: int, rng: np.random.Generator) -> Genome:
-    seeds = rng.integers(2**31, size=3).tolist()
-    return Genome(int(rng.integers(footprints)), *seeds, tuple(rng.normal(0, 0.45, spaces).tolist()))
+    modules, rows, cuts = rng.integers(2**31, size=3).tolist()
+    return Genome(int(rng.integers(footprints)), modules, rows, cuts, tuple(rng.normal(0, 0.45, spaces).tolist()))
 
 
 def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:
@@ -110,7 +110,7 @@ def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genom
     return replace(genome, privacy=tuple(privacy))
 
 
-def _realised(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome, floor: float) -> Plan | None:
+def _realised(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome, floor: float) -> Plan | None:
     """The genome's plan, None where it cannot be built or scores below `floor`."""
     cells = _candidate(footprint, spaces, genome)
     if cells is None:
@@ -177,7 +177,7 @@ def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
     return Plan(cells, links, plan.score)
 
 
-def _candidate(footprint: Footprint, spaces: tuple[Space, ...], genome: Genome) -> list[Cell] | None:
+def _candidate(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome) -> list[Cell] | None:
     rng = np.random.default_rng(genome.modules)
     modules = draw_modules(spaces, rng=rng)
     cells: list[Cell] = []
@@ -199,37 +199,9 @@ def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random
     x0, y0, x1, y1 = cap.rect
     area = (x1 - x0) * (y1 - y0) / 100
     by_kind = {m.main.kind: m for m in reversed(modules)}
-    if cap.at_start:
-        options = [
-            ("living_room",),
-            ("living_room", "dining_room"),
-            ("living_room", "kitchen"),
-            ("family_room", "living_room"),
-            ("living_room", "library"),
-            ("garage", "kitchen"),
-            ("garage",),
-        ]
-    else:
-        options = [
-            ("main_bedroom",),
-            ("main_bedroom", "bathroom"),
-            ("gym",),
-            ("bedroom", "bedroom"),
-            ("living_room",),
-            ("family_room",),
-            ("guest_room",),
-            ("library",),
-            ("playroom",),
-        ]
-    fits = []
-    for option in options:
-        if option == ("main_bedroom", "bathroom"):
-            main = by_kind.get("main_bedroom")
-            parts = [main.main, *main.owned] if main and main.owned else None
-            used = [main]
-        else:
-            used = [by_kind[k] for k in option if k in by_kind and not by_kind[k].owned and by_kind[k].guest is None]
-            parts = [m.main for m in used] if len(used) == len(option) and len(set(option)) == len(option) else None
+    fits: list[tuple[float, list[WantedRoom], list[Module]]] = []
+    for option in CAP_STARTS if cap.at_start else CAP_ENDS:
+        used, parts = _cap_rooms(option, by_kind)
         if parts:
             ratio = area / sum(s.area for s in parts)
             if 0.7 < ratio < 1.45:
@@ -241,7 +213,16 @@ def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random
     return used
 
 
-def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random.Generator) -> list[Cell]:
+def _cap_rooms(option: tuple[str, ...], by_kind: dict[str, Module]) -> tuple[list[Module], list[WantedRoom]]:
+    """The modules that an option takes and their rooms; no rooms where the house has not all of them to give."""
+    if option == MAIN_SUITE:
+        main = by_kind.get("main_bedroom")
+        return ([main], [main.main, *main.owned]) if main is not None and main.owned else ([], [])
+    used = [by_kind[k] for k in option if k in by_kind and not by_kind[k].owned and by_kind[k].guest is None]
+    return used, [m.main for m in used] if len(used) == len(option) else []
+
+
+def _stack(cap: Cap, parts: list[WantedRoom], owned: bool, first: int, rng: np.random.Generator) -> list[Cell]:
     """`parts` side by side across the wing's end, the first one where the corridor arrives if it owns the rest."""
     x0, y0, x1, y1 = cap.rect
     low, high = (y0, y1) if cap.axis == "y" else (x0, x1)
@@ -274,13 +255,13 @@ def _stack(cap: Cap, parts: list[Space], owned: bool, first: int, rng: np.random
 
 def _assign(
     footprint: Footprint, modules: list[Module], privacy: dict[int, float], rng: np.random.Generator
-) -> list[list[tuple[Module, int]]] | None:
+) -> Rows | None:
     """Modules with their wanted widths to rows, from the public end to the private one."""
-    keys = [ZONE[m.main.kind] + privacy[id(m.main)] for m in modules]
+    keys = [KINDS[m.main.kind].privacy + privacy[id(m.main)] for m in modules]
     order = sorted(range(len(modules)), key=lambda k: keys[k])
     strips, corridor = footprint.strips, footprint.corridor
     depths = sorted({s.depth for s in strips})
-    rows: list[list[tuple[Module, int]]] = [[] for _ in strips]
+    rows: Rows = [[] for _ in strips]
     used = [0] * len(rows)
     noise = rng.exponential(14.0, (len(modules), len(rows))).tolist()
     for k in order:
@@ -288,7 +269,8 @@ def _assign(
         by_depth = {
             d: (width(m, d, corridor), _slimness(m, d + (corridor if m.main.kind == "hall" else 0))) for d in depths
         }
-        best, least = None, 1e9
+        best: int | None = None
+        least = 1e9
         for i, s in enumerate(strips):
             w, slim = by_depth[s.depth]
             left = s.length - used[i]
@@ -317,76 +299,93 @@ def _slimness(m: Module, depth: int) -> float:
     return 45 * max(0.0, max(depth / own, own / depth) - 1.7)
 
 
-def _lay(
-    footprint: Footprint, rows: list[list[tuple[Module, int]]], cells: list[Cell], rng: np.random.Generator
-) -> list[Cell] | None:
+def _lay(footprint: Footprint, rows: Rows, cells: list[Cell], rng: np.random.Generator) -> list[Cell] | None:
     """Cut the rows into rooms, let end rooms take the corridor's ends, and cut the corridor by the hall."""
-    corridor = footprint.corridor
-    cuts: list[list[tuple[int, int]]] = []
-    for s, row in zip(footprint.strips, rows):
-        scale = s.length / max(1, sum(w for _, w in row))
-        edges = [0, *(round(x * scale) for x in itertools.accumulate(w for _, w in row))]
-        cuts.append(list(itertools.pairwise(edges)))
-    reach: dict[tuple[int, int], int] = {}
-    limits = []
+    corridor, rooms_of = footprint.corridor, _cut(footprint, rows)
     flips = rng.random(2 * len(footprint.bands) + sum(map(len, rows))).tolist()
+    reach: dict[tuple[int, int], int] = {}
+    limits = [[0, band.length] for band in footprint.bands]
     for b, band in enumerate(footprint.bands):
-        limits.append([0, band.length])
         for end in (0, 1):
             if band.free[end] and flips.pop() > 0.1:
-                _take_end(footprint, rows, cuts, b, end, reach, limits[b])
+                _take_end(Ends(footprint, rows, rooms_of, reach), b, end, limits[b])
     halls: list[tuple[int, int, int]] = []
     for i, (s, row) in enumerate(zip(footprint.strips, rows)):
         for k, (m, wanted) in enumerate(row):
-            made = arrange(
-                m,
-                s,
-                *cuts[i][k],
-                corridor,
-                wanted,
-                mirrored=flips.pop() < 0.5,
-                inner=reach.get((i, k), 0),
-                first=len(cells),
-            )
+            slot = Slot(s, *rooms_of[i][k], corridor, mirrored=flips.pop() < 0.5, inner=reach.get((i, k), 0))
+            made = arrange(m, slot, wanted, first=len(cells))
             if made is None:
                 return None
             if m.main.kind == "hall" and corridor:
-                r = made[0].rect
-                a, b = (r[0], r[2]) if s.axis == "x" else (r[1], r[3])
-                band = footprint.bands[s.band]
-                p, q = sorted(((a - band.start) * band.way, (b - band.start) * band.way))
+                p, q = _along_band(footprint.bands[s.band], made[0].rect, s.axis)
                 if p < limits[s.band][0] or q > limits[s.band][1]:
                     return None
                 halls.append((s.band, p, q))
             cells += made
+    corridors = _corridors(footprint, limits, halls)
+    return None if corridors is None else cells + corridors
+
+
+def _cut(footprint: Footprint, rows: Rows) -> list[list[tuple[int, int]]]:
+    """From where to where in its row each module goes, decimetres, for each strip."""
+    cuts = []
+    for s, row in zip(footprint.strips, rows):
+        scale = s.length / max(1, sum(w for _, w in row))
+        edges = [0, *(round(x * scale) for x in itertools.accumulate(w for _, w in row))]
+        cuts.append(list(itertools.pairwise(edges)))
+    return cuts
+
+
+def _along_band(band: Band, rect: Rect, axis: str) -> tuple[int, int]:
+    """The interval of a rectangle along a corridor, decimetres from the corridor's start."""
+    a, b = (rect[0], rect[2]) if axis == "x" else (rect[1], rect[3])
+    p, q = (a - band.start) * band.way, (b - band.start) * band.way
+    return min(p, q), max(p, q)
+
+
+def _corridors(footprint: Footprint, limits: list[list[int]], halls: list[tuple[int, int, int]]) -> list[Cell] | None:
+    """What the rooms at its ends and the halls (band, from, to) leave of each corridor; None if a piece is too short."""
+    cells = []
     for b, band in enumerate(footprint.bands):
-        pieces = [tuple(limits[b])]
-        for hb, p, q in halls:
-            if hb == b:
+        pieces = [(limits[b][0], limits[b][1])]
+        for hall_band, p, q in halls:
+            if hall_band == b:
                 pieces = [x for s, e in pieces for x in ((s, min(e, p)), (max(s, q), e)) if x[1] > x[0]]
         for s, e in pieces:
             if e - s < 9:
                 return None
-            cells.append(Cell("corridor", band.rect(s, e), (e - s) * corridor / 100))
+            cells.append(Cell("corridor", band.rect(s, e), (e - s) * footprint.corridor / 100))
     return cells
 
 
-def _take_end(footprint, rows, cuts, b: int, end: int, reach, limits: list[int]) -> None:
+@dataclass(frozen=True)
+class Ends:
+    """What is settled of the rows when the rooms at the ends of corridors are chosen."""
+
+    footprint: Footprint
+    rows: Rows
+    cuts: list[list[tuple[int, int]]]
+    reach: dict[tuple[int, int], int]
+    """(strip, place in its row) to how far that room reaches into the corridor, decimetres; filled in."""
+
+
+def _take_end(ends: Ends, b: int, end: int, limits: list[int]) -> None:
     """Let the shorter of the two rooms at a free corridor end reach across it, if the other keeps its door."""
+    footprint, rows = ends.footprint, ends.rows
     band = footprint.bands[b]
-    ends = []
+    found = []
     for i, s in enumerate(footprint.strips):
         at = s.u_band == 0 if end == 0 else s.u_band + s.length == band.length
         if s.band == b and at:
             k = 0 if end == 0 else len(rows[i]) - 1
-            a, z = cuts[i][k]
-            ends.append((z - a, i, k))
-    if len(ends) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in ends):
+            a, z = ends.cuts[i][k]
+            found.append((z - a, i, k))
+    if len(found) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in found):
         return
-    ends.sort()
-    (short, i, k), (long, _, _) = ends[0], ends[1]
+    found.sort()
+    (short, i, k), (long, _, _) = found[0], found[1]
     m = rows[i][k][0]
     if long - short < 12 or m.owned or m.guest or m.main.kind in ("toilet", "closet"):
         return
-    reach[i, k] = footprint.corridor
+    ends.reach[i, k] = footprint.corridor
     limits[end] = short if end == 0 else band.length - short

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.generate.footprint import Rect, Strip
-from embodied.generate.kinds import BEDROOMS, SIZES
-from embodied.generate.program import Space
+from embodied.generate.kinds import BEDROOMS, KINDS
+from embodied.generate.program import WantedRoom
 
-FILLERS = {"kitchen": "pantry", **{k: "closet" for k in (*BEDROOMS, "hall", "study", "laundry_room")}}
+FILLERS = {"kitchen": "pantry", **dict.fromkeys((*BEDROOMS, "hall", "study", "laundry_room"), "closet")}
 """What a leftover niche beside such a room becomes."""
-LEAST = {kind: round(sides[2] * 10) for kind, sides in SIZES.items()}
-"""Smallest usual side of each kind, decimetres."""
 NICHE = 12
 """Shortest side of a niche worth a door, decimetres."""
 
@@ -32,10 +30,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Module:
-    main: Space
-    owned: tuple[Space, ...] = ()
+    main: WantedRoom
+    owned: tuple[WantedRoom, ...] = ()
     """Small rooms entered from `main`."""
-    guest: Space | None = None
+    guest: WantedRoom | None = None
     """A small room entered from the corridor that shares a column with the owned ones."""
 
     @property
@@ -43,15 +41,15 @@ class Module:
         return self.main.area + sum(s.area for s in self.owned) + (self.guest.area if self.guest else 0.0)
 
 
-def draw_modules(spaces: tuple[Space, ...], *, rng: np.random.Generator) -> list[Module]:
+def draw_modules(spaces: tuple[WantedRoom, ...], *, rng: np.random.Generator) -> list[Module]:
     """Group `spaces`: owned rooms with their owners, some wet rooms into the columns between rooms."""
-    owned: dict[int, list[Space]] = {}
+    owned: dict[int, list[WantedRoom]] = {}
     for s in spaces:
         if s.owner is not None:
             owned.setdefault(s.owner, []).append(s)
     pool = [i for i, s in enumerate(spaces) if s.owner is None and s.kind in ("bathroom", "toilet", "laundry_room")]
     pool = [pool[k] for k in rng.permutation(len(pool))]
-    taken: dict[int, Space] = {}
+    taken: dict[int, WantedRoom] = {}
     hosts = [
         i
         for i, s in enumerate(spaces)
@@ -75,95 +73,109 @@ def draw_modules(spaces: tuple[Space, ...], *, rng: np.random.Generator) -> list
 def width(module: Module, depth: int, corridor: int) -> int:
     """The wanted width, decimetres, in a row of `depth`."""
     deep = depth + (corridor if module.main.kind == "hall" else 0)
-    least = LEAST[module.main.kind]
-    items = (*module.owned, *((module.guest,) if module.guest else ()))
-    if not items:
-        return max(least, round(module.main.area * 100 / deep))
-    main = max(least, round(module.main.area * 100 / deep))
-    return main + _column(items, depth)
+    least = _least(module.main.kind)
+    main, small = max(least, round(module.main.area * 100 / deep)), _small_rooms(module)
+    return main + _column(small, depth) if small else main
 
 
-def _column(items: tuple[Space, ...], depth: int) -> int:
+def _column(items: tuple[WantedRoom, ...], depth: int) -> int:
     if depth >= 34:
-        return max(max(LEAST[s.kind] for s in items), round(sum(s.area for s in items) * 100 / depth))
-    return sum(max(LEAST[s.kind], round(s.area * 100 / depth)) for s in items)
+        return max(max(_least(s.kind) for s in items), round(sum(s.area for s in items) * 100 / depth))
+    return sum(max(_least(s.kind), round(s.area * 100 / depth)) for s in items)
 
 
-def arrange(
-    module: Module,
-    strip: Strip,
-    u0: int,
-    u1: int,
-    corridor: int,
-    wanted: int,
-    *,
-    mirrored: bool,
-    inner: int = 0,
-    first: int = 0,
-) -> list[Cell] | None:
-    """The module's cells between u0 and u1 of `strip`; None where it does not fit.
+@dataclass(frozen=True)
+class Slot:
+    """The place of a module in its row, decimetres."""
+
+    strip: Strip
+    start: int
+    end: int
+    corridor: int
+    """Width of the corridor before it."""
+    mirrored: bool
+    inner: int = 0
+    """How far the main room reaches into the corridor."""
+
+    def cell(self, space: WantedRoom, a: int, b: int, v0: int, v1: int, owner: int | None = None) -> Cell:
+        """The cell from a to b along the row and from v0 to v1 away from the corridor."""
+        if self.mirrored:
+            a, b = self.start + self.end - b, self.start + self.end - a
+        return Cell(space.kind, self.strip.rect(a, b, v0, v1), space.area, owner)
+
+
+def arrange(module: Module, slot: Slot, wanted: int, *, first: int = 0) -> list[Cell] | None:
+    """The module's cells in its slot; None where it does not fit.
 
     Args:
-      wanted: its width(), decimetres, which u1 - u0 may exceed or fall short of.
-      inner: how far the main room reaches into the corridor (v = -inner).
+      wanted: its width(), decimetres, which the slot may exceed or fall short of.
       first: index that the first returned cell will have; owners refer to it.
     """
-    h = strip.depth
-    v0 = -corridor if module.main.kind == "hall" else -inner
-
-    def cell(space: Space, a: int, b: int, v0: int, v1: int, owner: int | None = None) -> Cell:
-        if mirrored:
-            a, b = u0 + u1 - b, u0 + u1 - a
-        return Cell(space.kind, strip.rect(a, b, v0, v1), space.area, owner)
-
-    items = list(module.owned)
-    if not items and module.guest is None:
-        return [cell(module.main, u0, u1, v0, h)]
-    total = (*items, *((module.guest,) if module.guest else ()))
-    column = round(_column(total, h) * min(1.0, (u1 - u0) / wanted) ** 0.5)
-    edge = u1 - column
-    if edge - u0 < 0.9 * LEAST[module.main.kind]:
+    h, v0 = slot.strip.depth, -slot.corridor if module.main.kind == "hall" else -slot.inner
+    small = _small_rooms(module)
+    if not small:
+        return [slot.cell(module.main, slot.start, slot.end, v0, h)]
+    column = round(_column(small, h) * min(1.0, (slot.end - slot.start) / wanted) ** 0.5)
+    edge = slot.end - column
+    if edge - slot.start < 0.9 * _least(module.main.kind):
         return None
-    cells = [cell(module.main, u0, edge, v0, h)]
-    if h < 34:
-        return _side_by_side(module, cells, cell, edge, u1, h, first)
-    if len(items) == 2 and module.guest is None:
-        cut = round(h * items[1].area / (items[0].area + items[1].area))
+    main = slot.cell(module.main, slot.start, edge, v0, h)
+    beside = _side_by_side(module, slot, edge, first) if h < 34 else _column_cells(module, slot, edge, first)
+    return None if beside is None else [main, *beside]
+
+
+def _least(kind: str) -> int:
+    """Smallest usual side of a kind, decimetres."""
+    return round(KINDS[kind].side * 10)
+
+
+def _small_rooms(module: Module) -> tuple[WantedRoom, ...]:
+    return (*module.owned, *((module.guest,) if module.guest else ()))
+
+
+def _column_cells(module: Module, slot: Slot, edge: int, first: int) -> list[Cell] | None:
+    """The small rooms behind one another in the column beside the main room, the owned ones away from the corridor."""
+    owned, guest, h, end = module.owned, module.guest, slot.strip.depth, slot.end
+    if len(owned) == 2 and guest is None:
+        cut = round(h * owned[1].area / (owned[0].area + owned[1].area))
         cut = min(max(cut, NICHE), h - 17)
-        return [*cells, cell(items[0], edge, u1, cut, h, first), cell(items[1], edge, u1, 0, cut, first)]
-    if items and module.guest:
-        if len(items) == 2:
+        return [slot.cell(owned[0], edge, end, cut, h, first), slot.cell(owned[1], edge, end, 0, cut, first)]
+    if owned and guest is not None:
+        if len(owned) == 2:
             return None
-        cut = round(h * module.guest.area / (items[0].area + module.guest.area))
-        cut = min(max(cut, LEAST[module.guest.kind]), h - LEAST[items[0].kind])
-        return [*cells, cell(items[0], edge, u1, cut, h, first), cell(module.guest, edge, u1, 0, cut)]
-    alone = items[0] if items else module.guest
-    deep = max(round(alone.area * 100 / column), LEAST[alone.kind])
-    rest = h - deep
+        cut = round(h * guest.area / (owned[0].area + guest.area))
+        cut = min(max(cut, _least(guest.kind)), h - _least(owned[0].kind))
+        return [slot.cell(owned[0], edge, end, cut, h, first), slot.cell(guest, edge, end, 0, cut)]
+    return _with_niche(module, slot, edge, first)
+
+
+def _with_niche(module: Module, slot: Slot, edge: int, first: int) -> list[Cell]:
+    """One small room in the column, and a closet or pantry in what it leaves."""
+    alone, h, end = _small_rooms(module)[0], slot.strip.depth, slot.end
+    deep = max(round(alone.area * 100 / (end - edge)), _least(alone.kind))
     filler = "closet" if alone.kind == "pantry" else FILLERS.get(module.main.kind)
-    if rest < NICHE or filler is None:
-        deep, rest = h, 0
-    niche = Space(filler or "closet", rest * column / 100)
-    if items:
-        cells.append(cell(alone, edge, u1, rest, h, first))
-        if rest:
-            cells.append(cell(niche, edge, u1, 0, rest, None if alone.kind == "pantry" else first))
-    else:
-        cells.append(cell(alone, edge, u1, 0, deep))
-        if rest:
-            cells.append(cell(niche, edge, u1, deep, h, first))
-    return cells
+    if h - deep < NICHE or filler is None:
+        deep = h
+    rest = h - deep
+    niche = WantedRoom(filler or "closet", rest * (end - edge) / 100)
+    if module.owned:
+        cells = [slot.cell(alone, edge, end, rest, h, first)]
+        return cells + (
+            [slot.cell(niche, edge, end, 0, rest, None if alone.kind == "pantry" else first)] if rest else []
+        )
+    cells = [slot.cell(alone, edge, end, 0, deep)]
+    return cells + ([slot.cell(niche, edge, end, deep, h, first)] if rest else [])
 
 
-def _side_by_side(module: Module, cells: list[Cell], cell, edge: int, u1: int, h: int, first: int) -> list[Cell] | None:
+def _side_by_side(module: Module, slot: Slot, edge: int, first: int) -> list[Cell] | None:
     """Owned rooms and the guest beside the main room in a shallow row; only one of them can touch it."""
     if len(module.owned) > 1:
         return None
-    items = (*module.owned, *((module.guest,) if module.guest else ()))
-    wanted = np.array([max(LEAST[s.kind], s.area * 100 / h) for s in items])
-    cuts = np.round(np.cumsum(wanted) / wanted.sum() * (u1 - edge)).astype(int).tolist()
+    small, h, cells = _small_rooms(module), slot.strip.depth, []
+    wanted = np.array([max(_least(s.kind), s.area * 100 / h) for s in small])
+    cuts = np.round(np.cumsum(wanted) / wanted.sum() * (slot.end - edge)).astype(int).tolist()
     a = edge
-    for s, b in zip(items, cuts):
-        cells.append(cell(s, a, edge + b, 0, h, first if s in module.owned else None))
+    for s, b in zip(small, cuts):
+        cells.append(slot.cell(s, a, edge + b, 0, h, first if s in module.owned else None))
         a = edge + b
     return cells

@@ -3,41 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.generate.access import Wall, outer_stretches, walls_between
-from embodied.generate.kinds import BEDROOMS
+from embodied.generate.access import Link, SharedWall, outer_stretches, walls_between
+from embodied.generate.kinds import KINDS
 from embodied.generate.layout import Plan
 from embodied.generate.modules import Cell
 from embodied.house.house import Opening, rounded
 
+Point = tuple[float, float]
+CIRCULATION = {"hall", "corridor"}
 NIB = 0.16
 """From a wall's centre-line corner to the jamb: half an inner wall and 0.1 m, metres."""
-DOOR = {"bathroom": 0.8, "toilet": 0.75, "closet": 0.75, "pantry": 0.75, "laundry_room": 0.8}
-"""Clear width of a room's door, metres; 0.85 for the others."""
-OPEN_KINDS = ("living_room", "dining_room", "kitchen", "family_room", "sun_room", "library")
-GLASS = {
-    "living_room": 0.2,
-    "family_room": 0.18,
-    "dining_room": 0.17,
-    "sun_room": 0.4,
-    "kitchen": 0.13,
-    "study": 0.15,
-    "library": 0.14,
-    "gym": 0.14,
-    "playroom": 0.15,
-    "workshop": 0.1,
-    "garage": 0.03,
-    "laundry_room": 0.1,
-    "bathroom": 0.1,
-    "toilet": 0.15,
-    "hall": 0.08,
-    "corridor": 0.1,
-    **{k: 0.14 for k in BEDROOMS},
-}
-"""Window area as a share of the floor area."""
+FRENCH = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35, "library": 0.12}
+"""Room kind to the chance of a French window to the garden."""
+FRENCH_BEDROOM, LARGE_BEDROOM = 0.12, 15.0
+"""The same for main bedrooms, if they are at least so large, square metres."""
+UTILITY = ("kitchen", "laundry_room", "workshop")
+"""Room kinds that may have the back door."""
+Rectangle = tuple[float, float, float, float]
+"""x0, y0, x1, y1, metres."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +33,8 @@ class OuterWall:
     """A stretch of a cell's edge that looks outdoors, metres."""
 
     cell: int
+    index: int
+    """Among the cell's outer walls, the longest first."""
     axis: str
     across: float
     low: float
@@ -52,198 +42,259 @@ class OuterWall:
     side: int
     """Sense of the outward normal across: +1 or -1."""
 
+    @property
+    def length(self) -> float:
+        return self.high - self.low
 
-def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], Wall]) -> list[list[OuterWall]]:
+
+def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall]) -> list[list[OuterWall]]:
     """For each cell its stretches of outer wall, longest first."""
     return [
         [
-            OuterWall(i, w[0], w[1] / 10, w[2] / 10, w[3] / 10, side)
-            for w, side in outer_stretches(list(cells), walls, i)
+            OuterWall(i, k, w.axis, w.across / 10, w.low / 10, w.high / 10, side)
+            for k, (w, side) in enumerate(outer_stretches(list(cells), walls, i))
         ]
         for i in range(len(cells))
     ]
 
 
+@dataclass(frozen=True)
+class Leaves:
+    """Material keys of what closes openings."""
+
+    door: str
+    front_door: str
+    frame: str
+    """Of windows and garage doors."""
+
+    def of(self, kind: str) -> str | None:
+        """The key for an opening kind; None for bare passages."""
+        if kind == "passage":
+            return None
+        return {"door": self.door, "front_door": self.front_door, "back_door": self.front_door}.get(kind, self.frame)
+
+
 @dataclass
-class _Draft:
-    """The openings so far and the floor that their leaves sweep."""
+class _Openings:
+    """The openings of a plan so far, and the floor that their leaves sweep."""
 
-    openings: list[Opening]
-    swings: list[tuple[float, float, float, float]]
-    leaves: list[tuple[float, float, float, float]]
-    """Where leaves stand open."""
-    zones: list[tuple[float, float, float, float]]
-    """Floor before and behind every way through, which no leaf should stand in."""
-    counts: dict[str, int]
+    plan: Plan
     names: tuple[str, ...]
-    leaf: str
-    outer_leaf: str
-    window_leaf: str
+    """Room id of each cell."""
+    leaves: Leaves
+    outside: list[list[OuterWall]]
+    free: dict[tuple[int, int], list[tuple[float, float]]]
+    """(cell, index of its outer wall) to the intervals of it without openings, metres."""
+    found: list[Opening] = field(default_factory=list)
+    swings: list[Rectangle] = field(default_factory=list)
+    stands: list[Rectangle] = field(default_factory=list)
+    """Where leaves stand open."""
+    zones: list[Rectangle] = field(default_factory=list)
+    """Floor before and behind every way through, which no leaf should stand in."""
+    counts: Counter[str] = field(default_factory=Counter)
 
-    def name(self, kind: str) -> str:
-        self.counts[kind] = self.counts.get(kind, 0) + 1
-        return f"{kind}_{self.counts[kind]}"
+    def add(
+        self,
+        kind: str,
+        rooms: tuple[str, str | None],
+        jambs: tuple[Point, Point],
+        sill: float,
+        head: float,
+        hinge: str = "a",
+        angle: float = 0.0,
+    ) -> None:
+        self.counts[kind] += 1
+        a, b = rounded(jambs[0]), rounded(jambs[1])
+        leaf, name = self.leaves.of(kind), f"{kind}_{self.counts[kind]}"
+        self.found.append(Opening(name, kind, rooms, a, b, rounded(sill), rounded(head), leaf, hinge, rounded(angle)))
+
+    def add_outer(
+        self,
+        w: OuterWall,
+        kind: str,
+        start: float,
+        width: float,
+        *,
+        sill: float = 0.0,
+        head: float = 2.1,
+        hinge: str = "a",
+    ) -> None:
+        """An opening to the outdoors from `start` along a wall, metres."""
+        jambs = _jambs(self.plan.cells[w.cell], w.axis, w.across, start, start + width)
+        self.free[w.cell, w.index] = _without(self.free[w.cell, w.index], start, start + width)
+        self.add(kind, (self.names[w.cell], None), jambs, sill, head, hinge)
+        if kind in ("front_door", "back_door"):
+            self.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
 
 
 def draw_openings(
-    plan: Plan,
-    names: tuple[str, ...],
-    leaves: tuple[str, str, str],
-    height: float,
-    open_plan: bool,
-    *,
-    rng: np.random.Generator,
+    plan: Plan, names: tuple[str, ...], leaves: Leaves, height: float, open_plan: bool, *, rng: np.random.Generator
 ) -> tuple[Opening, ...]:
     """All openings of a plan.
 
     Args:
       names: room id of each cell.
-      leaves: material keys of inner doors, the front door and window frames.
       height: clear storey height, metres.
       open_plan: whether living, dining and kitchen join through wide openings.
     """
-    walls = walls_between(list(plan.cells))
-    outside = outer_walls(plan.cells, walls)
-    draft = _Draft([], [], [], [], {}, names, *leaves)
-    free = {(i, k): [(w.low, w.high)] for i, ws in enumerate(outside) for k, w in enumerate(ws)}
-    _front_door(plan, outside, free, draft, rng)
+    outside = outer_walls(plan.cells, walls_between(list(plan.cells)))
+    free = {(w.cell, w.index): [(w.low, w.high)] for walls in outside for w in walls}
+    made = _Openings(plan, names, leaves, outside, free)
+    _front_door(made, rng)
     wide = [k for k in plan.links if _is_wide(plan, k)]
     for link in wide:
-        _passage(plan, link, draft, height, open_plan, rng)
+        _passage(made, link, height, open_plan, rng)
     doors = sorted((k for k in plan.links if k not in wide), key=lambda k: _is_tiny(plan.cells[k.child]))
     for link in doors:
-        if not (_is_tiny(plan.cells[link.child]) and _folded_door(plan, link, draft, rng)):
-            _door(plan, link, draft, rng)
-    _outer_doors(plan, outside, free, draft, rng)
+        if not (_is_tiny(plan.cells[link.child]) and _folded_door(made, link, rng)):
+            _door(made, link, rng)
+    _outer_doors(made, rng)
     for i in range(len(plan.cells)):
-        _windows(plan, i, outside[i], free, draft, height, rng)
-    return tuple(draft.openings)
+        _windows(made, i, height, rng)
+    return tuple(made.found)
 
 
-def _is_wide(plan: Plan, link) -> bool:
+def _is_wide(plan: Plan, link: Link) -> bool:
+    """Whether a way through is a passage without a leaf."""
     kinds = {plan.cells[link.child].kind, plan.cells[link.parent].kind}
-    return kinds <= {*OPEN_KINDS, "hall", "corridor"} and (
-        kinds <= set(OPEN_KINDS) or kinds <= {"hall", "corridor"} or kinds == {"hall", "living_room"}
-    )
+    return all(KINDS[k].is_open for k in kinds) or kinds <= CIRCULATION or kinds == {"hall", "living_room"}
 
 
-def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[tuple, tuple]:
+def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[Point, Point]:
     """The two jambs, in the sense that leaves `cell` on the left of a -> b."""
-    _, y0, x1, _ = (v / 10 for v in cell.rect)
+    _, y0, x1, _ = _metres(cell)
     forward = abs(across - y0) < 1e-6 if axis == "x" else abs(across - x1) < 1e-6
     p, q = ((low, across), (high, across)) if axis == "x" else ((across, low), (across, high))
     return (p, q) if forward else (q, p)
 
 
-def _passage(plan: Plan, link, draft: _Draft, height: float, open_plan: bool, rng: np.random.Generator) -> None:
-    axis, across, low, high = link.wall[0], *(v / 10 for v in link.wall[1:])
+def _metres(cell: Cell) -> Rectangle:
+    x0, y0, x1, y1 = cell.rect
+    return x0 / 10, y0 / 10, x1 / 10, y1 / 10
+
+
+def _passage(made: _Openings, link: Link, height: float, open_plan: bool, rng: np.random.Generator) -> None:
+    """A way without a leaf, wide where rooms flow into each other."""
+    plan, axis, (across, low, high) = made.plan, link.wall.axis, _wall_metres(link)
     a, b = plan.cells[link.child], plan.cells[link.parent]
     kinds = {a.kind, b.kind}
     room = high - low - 2 * NIB
-    if kinds <= {"hall", "corridor"}:
-        width = min(room, 1.4)
-    elif "hall" in kinds:
-        width = min(room, float(rng.choice([1.0, 1.4, 1.8])))
-    elif "library" in kinds or "sun_room" in kinds:
-        width = min(room, float(rng.choice([1.4, 1.8])))
-    else:
-        width = min(
-            room,
-            max(1.4, round(float(rng.uniform(0.65, 0.95)) * room, 1))
-            if open_plan
-            else float(rng.choice([0.9, 1.2, 1.6])),
-        )
+    width = min(room, _passage_width(kinds, room, open_plan, rng))
     tight = any(c.kind == "kitchen" and _area(c) < 9.5 for c in (a, b))  # its units need the wall
     if tight:
         width = min(width, 1.2)
     slack = room - width
     where = float(rng.choice([0, 0.5, 1]))
-    middle = (kinds <= {"hall", "corridor"} or open_plan) and not tight
+    middle = (kinds <= CIRCULATION or open_plan) and not tight
     start = low + NIB + slack * (0.5 if middle else round(where) if tight else where)
-    p, q = _jambs(a, axis, across, start, start + width)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
-    draft.zones += _fronts(axis, across, start, start + width)
-    draft.openings.append(
-        Opening(
-            draft.name("passage"),
-            "passage",
-            (draft.names[link.child], draft.names[link.parent]),
-            rounded(p),
-            rounded(q),
-            0.0,
-            head,
-            None,
-        )
-    )
+    made.zones += _fronts(axis, across, start, start + width)
+    ends = (made.names[link.child], made.names[link.parent])
+    made.add("passage", ends, _jambs(a, axis, across, start, start + width), 0.0, head)
 
 
-def _area(cell) -> float:
+def _passage_width(kinds: set[str], room: float, open_plan: bool, rng: np.random.Generator) -> float:
+    """Wanted width of a passage between two kinds in `room` metres of wall."""
+    if kinds <= CIRCULATION:
+        return 1.4
+    if "hall" in kinds:
+        return float(rng.choice([1.0, 1.4, 1.8]))
+    if "library" in kinds or "sun_room" in kinds:
+        return float(rng.choice([1.4, 1.8]))
+    if open_plan:
+        return max(1.4, round(float(rng.uniform(0.65, 0.95)) * room, 1))
+    return float(rng.choice([0.9, 1.2, 1.6]))
+
+
+def _wall_metres(link: Link) -> tuple[float, float, float]:
+    """Coordinate across and interval of the wall of a link, metres."""
+    w = link.wall
+    return w.across / 10, w.low / 10, w.high / 10
+
+
+def _area(cell: Cell) -> float:
     """Of a cell of the plan, square metres."""
-    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
+    x0, y0, x1, y1 = _metres(cell)
     return (x1 - x0) * (y1 - y0)
 
 
-def _swing(axis: str, across: float, low: float, high: float, side: int) -> tuple[float, float, float, float]:
-    """x0, y0, x1, y1 of the square a leaf sweeps on `side` of its wall."""
+def _swing(axis: str, across: float, low: float, high: float, side: int) -> Rectangle:
+    """The square a leaf sweeps on `side` of its wall."""
     c, d = sorted((across, across + side * (high - low)))
     return (low, c, high, d) if axis == "x" else (c, low, d, high)
 
 
-def _fronts(axis: str, across: float, low: float, high: float) -> list[tuple[float, float, float, float]]:
+def _fronts(axis: str, across: float, low: float, high: float) -> list[Rectangle]:
     """The floor half a metre before and behind a way through."""
     low, high = low + 0.12, high - 0.12
     c, d = across - 0.55, across + 0.55
     return [(low, c, high, d) if axis == "x" else (c, low, d, high)]
 
 
-def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_low: bool) -> tuple:
+def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_low: bool) -> Rectangle:
     """Where the leaf stands when open at a right angle, with a little air."""
     a, b = (low - 0.05, low + 0.1) if at_low else (high - 0.1, high + 0.05)
     c, d = sorted((across + side * 0.06, across + side * (high - low + 0.3)))
     return (a, c, b, d) if axis == "x" else (c, a, d, b)
 
 
-def _overlap(a: tuple, b: tuple) -> float:
+def _overlap(a: Rectangle, b: Rectangle) -> float:
     return max(0.0, min(a[2], b[2]) - max(a[0], b[0])) * max(0.0, min(a[3], b[3]) - max(a[1], b[1]))
 
 
-def _door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> None:
+@dataclass(frozen=True)
+class _LeafPlace:
+    """One way to hang a leaf."""
+
+    cost: float
+    start: float
+    at_low: bool
+    """Whether it hangs at the lower end of its hole."""
+
+
+def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
     """A leaf door near the corner of the room it swings into, clear of the other leaves."""
-    axis, across, low, high = link.wall[0], *(v / 10 for v in link.wall[1:])
-    cell = plan.cells[link.child]
-    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
-    own = (x0, x1) if axis == "x" else (y0, y1)
-    middle = (y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2
-    side = 1 if middle > across else -1
-    ends = (draft.names[link.child], draft.names[link.parent])
-    width = min(DOOR.get(cell.kind, 0.85), high - low - 2 * NIB)
-    best = None
+    axis, (across, low, high) = link.wall.axis, _wall_metres(link)
+    cell = made.plan.cells[link.child]
+    own, side = _span_and_side(cell, axis, across)
+    width = min(KINDS[cell.kind].door, high - low - 2 * NIB)
+    best: _LeafPlace | None = None
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
         corner = min(start - own[0], own[1] - start - width)
-        swing = _swing(axis, across, start, start + width, side)
+        crowd = sum(_overlap(_swing(axis, across, start, start + width, side), s) for s in made.swings)
         fronts = _fronts(axis, across, start, start + width)
-        crowd = sum(_overlap(swing, s) for s in draft.swings)
-        shut = sum(_overlap(f, s) for f in fronts for s in draft.leaves)
+        shut = sum(_overlap(f, s) for f in fronts for s in made.stands)
         near_low = start - own[0] <= own[1] - start - width
         for at_low in (True, False):
             leaf = _open_leaf(axis, across, start, start + width, side, at_low)
-            block = shut + sum(_overlap(leaf, z) for z in draft.zones)
+            block = shut + sum(_overlap(leaf, z) for z in made.zones)
             cost = 60.0 * block + 2.0 * crowd + 0.8 * max(0.0, corner - 0.2) + 0.5 * (at_low != near_low)
             cost += float(rng.uniform(0, 0.15))
-            if best is None or cost < best[0]:
-                best = (cost, start, at_low, swing, leaf, fronts)
-    _, start, at_low, swing, leaf, fronts = best
-    draft.swings.append(swing)
-    draft.leaves.append(leaf)
-    draft.zones += fronts
-    p, q = _jambs(cell, axis, across, start, start + width)
-    hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
+            if best is None or cost < best.cost:
+                best = _LeafPlace(cost, start, at_low)
+    assert best is not None  # of six places
+    start, end = best.start, best.start + width
+    made.swings.append(_swing(axis, across, start, end, side))
+    made.stands.append(_open_leaf(axis, across, start, end, side, best.at_low))
+    made.zones += _fronts(axis, across, start, end)
+    jambs = _jambs(cell, axis, across, start, end)
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
-    draft.openings.append(
-        Opening(
-            draft.name("door"), "door", ends, rounded(p), rounded(q), 0.0, 2.05, draft.leaf, hinge, rounded(open_by)
-        )
-    )
+    ends = (made.names[link.child], made.names[link.parent])
+    made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, best.at_low), open_by)
+
+
+def _span_and_side(cell: Cell, axis: str, across: float) -> tuple[tuple[float, float], int]:
+    """The interval of a cell along one of its walls, metres, and on which side of the wall it lies."""
+    x0, y0, x1, y1 = _metres(cell)
+    if axis == "x":
+        return (x0, x1), 1 if (y0 + y1) / 2 > across else -1
+    return (y0, y1), 1 if (x0 + x1) / 2 > across else -1
+
+
+def _hinge(jambs: tuple[Point, Point], at_low: bool) -> str:
+    """The jamb that carries a leaf which hangs at the lower end of its hole, or at the upper one."""
+    p, q = jambs
+    return "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
 
 
 def _is_tiny(cell: Cell) -> bool:
@@ -252,18 +303,16 @@ def _is_tiny(cell: Cell) -> bool:
     return cell.kind == "toilet" and (x1 - x0) * (y1 - y0) < 300
 
 
-def _folded_door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> bool:
+def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     """A leaf that opens outwards and folds back on the wall beside it; False where other doors leave no place."""
-    axis, across, low, high = link.wall[0], *(v / 10 for v in link.wall[1:])
-    outer = plan.cells[link.parent]
-    x0, y0, x1, y1 = (v / 10 for v in outer.rect)
-    own = (x0, x1) if axis == "x" else (y0, y1)
-    side = 1 if ((y0 + y1) / 2 if axis == "x" else (x0 + x1) / 2) > across else -1
-    width = min(DOOR[plan.cells[link.child].kind], high - low - 2 * NIB)
+    axis, (across, low, high) = link.wall.axis, _wall_metres(link)
+    outer = made.plan.cells[link.parent]
+    own, side = _span_and_side(outer, axis, across)
+    width = min(KINDS[made.plan.cells[link.child].kind].door, high - low - 2 * NIB)
     k = 0 if axis == "x" else 1
     taken = [
         sorted((o.a[k], o.b[k]))
-        for o in draft.openings
+        for o in made.found
         if abs(o.a[1 - k] - across) < 0.01 and abs(o.b[1 - k] - across) < 0.01
     ]
     spots = []
@@ -273,215 +322,115 @@ def _folded_door(plan: Plan, link, draft: _Draft, rng: np.random.Generator) -> b
             if a < own[0] + 0.08 or b > own[1] - 0.08 or any(a < q and p < b for p, q in taken):
                 continue
             swept = _swing(axis, across, a, b, side)
-            spots.append((sum(_overlap(swept, s) for s in draft.swings), float(rng.uniform(0, 0.1)), start, at_low))
+            spots.append((sum(_overlap(swept, s) for s in made.swings), float(rng.uniform(0, 0.1)), start, at_low))
     if not spots:
         return False
     _, _, start, at_low = min(spots)
-    p, q = _jambs(outer, axis, across, start, start + width)
-    hinge = "a" if (p[0] + p[1] < q[0] + q[1]) == at_low else "b"
-    draft.swings.append(_swing(axis, across, start, start + width, side))
-    draft.zones += _fronts(axis, across, start, start + width)
-    draft.openings.append(
-        Opening(
-            draft.name("door"),
-            "door",
-            (draft.names[link.parent], draft.names[link.child]),
-            rounded(p),
-            rounded(q),
-            0.0,
-            2.05,
-            draft.leaf,
-            hinge,
-            rounded(math.radians(float(rng.uniform(164, 174)))),
-        )
-    )
+    jambs = _jambs(outer, axis, across, start, start + width)
+    made.swings.append(_swing(axis, across, start, start + width, side))
+    made.zones += _fronts(axis, across, start, start + width)
+    open_by = math.radians(float(rng.uniform(164, 174)))
+    ends = (made.names[link.parent], made.names[link.child])
+    made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, at_low), open_by)
     return True
 
 
-def _take(free: list[tuple[float, float]], low: float, high: float, margin: float = 0.25) -> list[tuple[float, float]]:
+def _without(
+    free: list[tuple[float, float]], low: float, high: float, margin: float = 0.25
+) -> list[tuple[float, float]]:
     """`free` intervals without (low, high) and a margin on both sides."""
     low, high = low - margin, high + margin
-    kept = [(max(a, p), min(b, q)) for a, b in free for p, q in ((a, low), (high, b)) if min(b, q) > max(a, p)]
-    return kept
+    return [(max(a, p), min(b, q)) for a, b in free for p, q in ((a, low), (high, b)) if min(b, q) > max(a, p)]
 
 
-def _add_outer(plan, i, k, w: OuterWall, kind, start, width, sill, head, leaf, free, draft: _Draft, **more) -> None:
-    p, q = _jambs(plan.cells[i], w.axis, w.across, start, start + width)
-    free[i, k] = _take(free[i, k], start, start + width)
-    draft.openings.append(
-        Opening(
-            draft.name(kind),
-            kind,
-            (draft.names[i], None),
-            rounded(p),
-            rounded(q),
-            rounded(sill),
-            rounded(head),
-            leaf,
-            **more,
-        )
-    )
-    if kind in ("front_door", "back_door"):
-        draft.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
-
-
-def _front_door(plan, outside, free, draft: _Draft, rng: np.random.Generator) -> None:
-    i = next(k for k, c in enumerate(plan.cells) if c.kind == "hall")
-    x0, y0, x1, y1 = (v / 10 for v in plan.cells[i].rect)
-    walls = [(k, w) for k, w in enumerate(outside[i]) if w.high - w.low >= 1.25]
-    k, w = min(walls, key=lambda kw: (abs((kw[1].high - kw[1].low) - min(x1 - x0, y1 - y0)), kw[0]))
-    width = 1.0 if w.high - w.low > 1.5 else 0.9
+def _front_door(made: _Openings, rng: np.random.Generator) -> None:
+    """In an outer wall of the hall, the one that suits its narrow side best."""
+    i = next(k for k, c in enumerate(made.plan.cells) if c.kind == "hall")
+    x0, y0, x1, y1 = _metres(made.plan.cells[i])
+    walls = [w for w in made.outside[i] if w.length >= 1.25]
+    w = min(walls, key=lambda w: (abs(w.length - min(x1 - x0, y1 - y0)), w.index))
+    width = 1.0 if w.length > 1.5 else 0.9
     slack = w.high - w.low - 2 * 0.2 - width
     start = round(w.low + 0.2 + slack * (0.5 if slack < 0.6 else float(rng.choice([0.15, 0.5, 0.85]))), 2)
-    _add_outer(
-        plan,
-        i,
-        k,
-        w,
-        "front_door",
-        start,
-        width,
-        0.0,
-        2.1,
-        draft.outer_leaf,
-        free,
-        draft,
-        hinge=str(rng.choice(["a", "b"])),
-    )
+    made.add_outer(w, "front_door", start, width, hinge=str(rng.choice(["a", "b"])))
 
 
-def _outer_doors(plan, outside, free, draft: _Draft, rng: np.random.Generator) -> None:
+def _outer_doors(made: _Openings, rng: np.random.Generator) -> None:
     """Garage doors, French windows to the garden, a back door from kitchen or utility."""
     back = False
-    for i, c in enumerate(plan.cells):
-        x0, y0, x1, y1 = (v / 10 for v in c.rect)
+    for i, c in enumerate(made.plan.cells):
         if c.kind == "garage":
-            wide = 4.8 if min(x1 - x0, y1 - y0) > 5.4 else 2.5
-            fits = [(k, w) for k, w in enumerate(outside[i]) if w.high - w.low > 2.5]
-            if fits:
-                k, w = min(fits, key=lambda kw: (kw[1].high - kw[1].low < wide + 0.3, kw[1].high - kw[1].low, kw[0]))
-                width = min(wide, w.high - w.low - 0.4)
-                _add_outer(
-                    plan,
-                    i,
-                    k,
-                    w,
-                    "garage_door",
-                    (w.low + w.high - width) / 2,
-                    width,
-                    0.0,
-                    2.2,
-                    draft.window_leaf,
-                    free,
-                    draft,
-                )
-        elif c.kind in ("living_room", "sun_room", "family_room", "dining_room", "library", "main_bedroom"):
-            chance = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35}.get(c.kind, 0.12)
-            if c.kind == "main_bedroom" and (x1 - x0) * (y1 - y0) < 15.0:
-                chance = 0.0
-            if rng.random() < chance and outside[i] and outside[i][0].high - outside[i][0].low > 2.2:
-                w = outside[i][0]
-                room = w.high - w.low - 0.8
-                width = min(room, float(rng.choice([1.6, 1.8, 2.4, 3.0] if c.kind != "main_bedroom" else [1.4, 1.6])))
-                two = room > 2 * width + 1.0
-                at = float(rng.choice([0.18, 0.5, 0.82])) if two else 0.5
-                _add_outer(
-                    plan,
-                    i,
-                    0,
-                    w,
-                    "french_window",
-                    round(w.low + 0.4 + (room - width) * at, 2),
-                    width,
-                    0.0,
-                    2.2,
-                    draft.window_leaf,
-                    free,
-                    draft,
-                )
-        elif c.kind in ("kitchen", "laundry_room", "workshop") and not back and rng.random() < 0.3:
-            fits = [(k, w) for k, w in enumerate(outside[i]) if w.high - w.low > 2.4]
-            if fits:
-                back = True
-                k, w = fits[-1]
-                start = w.low + 0.3 if rng.random() < 0.5 else w.high - 1.2
-                _add_outer(
-                    plan,
-                    i,
-                    k,
-                    w,
-                    "back_door",
-                    start,
-                    0.9,
-                    0.0,
-                    2.1,
-                    draft.outer_leaf,
-                    free,
-                    draft,
-                    hinge=str(rng.choice(["a", "b"])),
-                )
+            _garage_door(made, i)
+        elif c.kind in FRENCH or c.kind == "main_bedroom":
+            _french_window(made, i, rng)
+        elif c.kind in UTILITY and not back and rng.random() < 0.3:
+            back = _back_door(made, i, rng)
 
 
-def _sill_head(kind: str, low_sill: bool) -> tuple[float, float]:
-    if kind in ("bathroom", "toilet"):
-        return 1.35, 2.1
-    if kind in ("garage", "workshop", "gym"):
-        return (1.5, 2.1) if kind == "garage" else (1.0, 2.1)
-    if kind in ("kitchen", "laundry_room"):
-        return 1.05, 2.1
-    if kind == "sun_room":
-        return 0.4, 2.2
-    return (0.45 if low_sill and kind in OPEN_KINDS else 0.9), 2.15
+def _garage_door(made: _Openings, i: int) -> None:
+    x0, y0, x1, y1 = _metres(made.plan.cells[i])
+    wide = 4.8 if min(x1 - x0, y1 - y0) > 5.4 else 2.5
+    fits = [w for w in made.outside[i] if w.length > 2.5]
+    if fits:
+        w = min(fits, key=lambda w: (w.length < wide + 0.3, w.length, w.index))
+        width = min(wide, w.length - 0.4)
+        made.add_outer(w, "garage_door", (w.low + w.high - width) / 2, width, head=2.2)
 
 
-def _windows(
-    plan, i: int, walls: list[OuterWall], free, draft: _Draft, height: float, rng: np.random.Generator
-) -> None:
-    """Windows for one room: as much glass as its floor asks for, centred on the free stretches of outer wall."""
-    c = plan.cells[i]
-    share = GLASS.get(c.kind)
-    if share is None:
+def _french_window(made: _Openings, i: int, rng: np.random.Generator) -> None:
+    cell = made.plan.cells[i]
+    is_bedroom = cell.kind == "main_bedroom"
+    chance = FRENCH_BEDROOM if is_bedroom else FRENCH[cell.kind]
+    if is_bedroom and _area(cell) < LARGE_BEDROOM:
+        chance = 0.0
+    if rng.random() >= chance or not made.outside[i] or made.outside[i][0].length <= 2.2:
         return
-    x0, y0, x1, y1 = (v / 10 for v in c.rect)
-    wanted = share * (x1 - x0) * (y1 - y0) * float(rng.uniform(0.85, 1.2))
+    w = made.outside[i][0]
+    room = w.high - w.low - 0.8
+    width = min(room, float(rng.choice([1.4, 1.6] if is_bedroom else [1.6, 1.8, 2.4, 3.0])))
+    at = float(rng.choice([0.18, 0.5, 0.82])) if room > 2 * width + 1.0 else 0.5
+    made.add_outer(w, "french_window", round(w.low + 0.4 + (room - width) * at, 2), width, head=2.2)
+
+
+def _back_door(made: _Openings, i: int, rng: np.random.Generator) -> bool:
+    """Whether there was an outer wall for it."""
+    fits = [w for w in made.outside[i] if w.length > 2.4]
+    if fits:
+        w = fits[-1]
+        start = w.low + 0.3 if rng.random() < 0.5 else w.high - 1.2
+        made.add_outer(w, "back_door", start, 0.9, hinge=str(rng.choice(["a", "b"])))
+    return bool(fits)
+
+
+def _windows(made: _Openings, i: int, height: float, rng: np.random.Generator) -> None:
+    """Windows for one room: as much glass as its floor asks for, centred on the free stretches of outer wall."""
+    c = made.plan.cells[i]
+    kind = KINDS[c.kind]
+    if kind.glass is None:
+        return
+    x0, y0, x1, y1 = _metres(c)
+    wanted = kind.glass * (x1 - x0) * (y1 - y0) * float(rng.uniform(0.85, 1.2))
     glazed = sum(
-        o.head * math.dist(o.a, o.b)
-        for o in draft.openings
-        if o.rooms[0] == draft.names[i] and o.kind == "french_window"
+        o.head * math.dist(o.a, o.b) for o in made.found if o.rooms[0] == made.names[i] and o.kind == "french_window"
     )
-    sill, head = _sill_head(c.kind, bool(rng.random() < 0.4))
-    widest = {"bathroom": 0.9, "toilet": 0.6, "hall": 0.8, "corridor": 0.9, "garage": 1.2}.get(c.kind, 2.4)
-    most = {"bathroom": 1, "toilet": 1, "hall": 1, "corridor": 2, "garage": 2, "laundry_room": 1}.get(c.kind, 5)
+    sill, head = kind.sills[bool(rng.random() < 0.4)], kind.head
     left = wanted - 0.6 * glazed
     stretches = sorted(
-        ((b - a, k, a, b) for k, _ in enumerate(walls) for a, b in free[i, k] if b - a > 1.0),
-        key=lambda s: (-s[0], s[1], s[2]),
+        ((b - a, w, a, b) for w in made.outside[i] for a, b in made.free[i, w.index] if b - a > 1.0),
+        key=lambda s: (-s[0], s[1].index, s[2]),
     )
     placed = 0
-    for length, k, a, b in stretches:
-        if left < 0.25 * wanted and placed or placed >= most or (left < 0.1 * wanted and glazed):
+    for length, w, a, _ in stretches:
+        if left < 0.25 * wanted and placed or placed >= kind.most or (left < 0.1 * wanted and glazed):
             break
         room = length - 0.6
         if room < 0.5:
             continue
-        count = max(1, min(most - placed, math.ceil(length / 3.6)))
-        width = min(room / count - 0.4 * (count > 1), left / (head - sill) / count, widest)
+        count = max(1, min(kind.most - placed, math.ceil(length / 3.6)))
+        width = min(room / count - 0.4 * (count > 1), left / (head - sill) / count, kind.widest)
         width = round(max(width, min(0.6, room)) * 10) / 10
         for n in range(count):
             start = round(a + length * (n + 0.5) / count - width / 2, 2)
-            _add_outer(
-                plan,
-                i,
-                k,
-                walls[k],
-                "window",
-                start,
-                width,
-                sill,
-                min(head, height - 0.15),
-                draft.window_leaf,
-                free,
-                draft,
-            )
+            made.add_outer(w, "window", start, width, sill=sill, head=min(head, height - 0.15))
             left -= width * (head - sill)
             placed += 1

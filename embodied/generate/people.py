@@ -13,6 +13,7 @@ import shapely
 
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
+from embodied.navigation.free_space import footprint
 from embodied.navigation.graph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
@@ -130,7 +131,7 @@ class _Site:
 
     def stand(self, figures: Sequence[Asset], rng: np.random.Generator) -> Placement | None:
         """The first figure that finds free floor beside the ways; it looks at the node."""
-        free = self.open.difference(shapely.union_all([*map(_ground, self.things), *self.others]))
+        free = self.open.difference(shapely.union_all([*map(footprint, self.things), *self.others]))
         too_wide = math.inf
         for i in rng.permutation(len(figures)):
             asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
@@ -158,11 +159,11 @@ class _Site:
             yaw = seat.placement.yaw
             lean = LEAN if seat.deep and asset.size[1] > GROWN else 0.0
             spot = seat.spot + rotation(yaw) @ np.array([0.0, lean - asset.size[1] / 2])
-            body = shapely.Polygon(rectangle(*spot, *asset.size[:2], yaw))
+            body = shapely.Polygon(rectangle(spot[0], spot[1], asset.size[0], asset.size[1], yaw))
             below = self.floor + asset.size[2]
             taken = [
                 *self.others,
-                *(_ground(p) for p in self.things if p is not seat.placement and p.position[2] < below),
+                *(footprint(p) for p in self.things if p is not seat.placement and p.position[2] < below),
             ]
             if (
                 self.ring.contains(shapely.Point(spot))
@@ -185,7 +186,7 @@ def _seats(house: House, catalogue: Catalogue) -> list[_Seat]:
     for p in house.placements:
         asset = catalogue.assets.get(p.asset)
         seat = next((s for s in asset.surfaces if s.name == "seat"), None) if asset else None
-        if seat is None:
+        if asset is None or seat is None:
             continue
         scale = np.divide(p.size, asset.size)
         lift = seat.z * scale[2] - LAP
@@ -224,7 +225,7 @@ def _passable(house: House, people: list[Placement]) -> list[Placement]:
 def _spots(
     free: shapely.Polygon, edges: shapely.MultiLineString, ring: shapely.Polygon, body: float
 ) -> shapely.Geometry:
-    """Where in `ring` somebody of radius `body` may stand: on `free` floor, and a walker can still follow the `edges`."""
+    """Where in `ring` somebody of radius `body` may stand: on `free` floor, no walker on `edges` being stopped."""
     return free.buffer(-body, quad_segs=4).intersection(ring).difference(edges.buffer(body + RADIUS, quad_segs=4))
 
 
@@ -241,11 +242,7 @@ def _in_the_way(p: Placement) -> bool:
     return p.position[2] < 1.8 and p.size[2] > 0.05
 
 
-def _ground(p: Placement) -> shapely.Polygon:
-    return shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
-
-
-def _disc(middle: Sequence[float], radius: float) -> shapely.Polygon:
+def _disc(middle: Sequence[float] | np.ndarray, radius: float) -> shapely.Polygon:
     return shapely.Point(middle).buffer(radius, quad_segs=8)
 
 

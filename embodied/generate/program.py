@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.generate.config import HouseConfig
-from embodied.generate.kinds import BEDROOMS, SIZES
+from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 
-MINOR = ("kitchen", "bathroom", "toilet", "hall", "corridor", "laundry_room", "pantry", "closet", "garage")
-"""Kinds that do not count as main rooms."""
+SECONDS = ("study", "family_room", "workshop", "playroom", "sun_room", "library")
+"""Kinds with an `extra` of which large houses may have two."""
 
 
 @dataclass(frozen=True)
-class Space:
-    """One room wanted."""
+class WantedRoom:
+    """One room that a house should have."""
 
     kind: str
     area: float
     """Wanted area, square metres."""
     owner: int | None = None
-    """Index of the space it belongs to and is entered from: an ensuite's bedroom, a pantry's kitchen."""
+    """Index of the room it belongs to and is entered from: an ensuite's bedroom, a pantry's kitchen."""
 
 
 def draw_area(config: HouseConfig, *, rng: np.random.Generator) -> float:
@@ -42,19 +42,19 @@ def draw_area(config: HouseConfig, *, rng: np.random.Generator) -> float:
     return float(np.clip(area, max(35.0, config.least_area()), 600.0))
 
 
-def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) -> tuple[Space, ...]:
+def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) -> tuple[WantedRoom, ...]:
     """The rooms of a house of `area` square metres (corridors come with the layout).
 
     Returns:
       Spaces whose areas sum to `area` less the circulation that a corridor will take.
     """
     bedrooms = config.bedrooms or _bedrooms(area, config, rng)
-    spaces = [Space("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
+    spaces = [WantedRoom("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
     living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, np.interp(area, (260, 500), (38, 52))))
-    spaces.append(Space("living_room", living))
-    spaces.append(Space("kitchen", float(np.clip(rng.normal(0.1, 0.012) * area, 5.2, 18))))
+    spaces.append(WantedRoom("living_room", living))
+    spaces.append(WantedRoom("kitchen", float(np.clip(rng.normal(0.1, 0.012) * area, 5.2, 18))))
     if area > rng.uniform(78, 105) and (config.rooms is None or config.rooms > bedrooms + 1):
-        spaces.append(Space("dining_room", float(np.clip(0.105 * area, 9.5, 18))))
+        spaces.append(WantedRoom("dining_room", float(np.clip(0.105 * area, 9.5, 18))))
     spaces += _sleeping(bedrooms, area, rng)
     wet = _bathrooms(area, bedrooms, rng)
     beds = [i for i, s in enumerate(spaces) if s.kind in BEDROOMS]
@@ -62,15 +62,15 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
     for k in range(wet):
         owner = beds[k] if k < suites else None
         size = float(np.clip(rng.normal(5.6, 0.5) + (area - 100) * 0.006, 4.0, 9.0))
-        spaces.append(Space("bathroom", min(size, 0.12 * area), owner))
+        spaces.append(WantedRoom("bathroom", min(size, 0.12 * area), owner))
     if area > rng.uniform(70, 140):
-        spaces.append(Space("toilet", 1.9, 0 if rng.random() < 0.7 else None))
+        spaces.append(WantedRoom("toilet", 1.9, 0 if rng.random() < 0.7 else None))
     if area > rng.uniform(95, 190) and beds:
-        spaces.append(Space("closet", float(np.clip(0.03 * area, 3.0, 6.5)), beds[0]))
+        spaces.append(WantedRoom("closet", float(np.clip(0.03 * area, 3.0, 6.5)), beds[0]))
     if area > rng.uniform(90, 230):
-        spaces.append(Space("pantry", 2.6, 2))
+        spaces.append(WantedRoom("pantry", 2.6, 2))
     if area > rng.uniform(75, 150):
-        spaces.append(Space("laundry_room", float(np.clip(0.04 * area, 3.8, 8))))
+        spaces.append(WantedRoom("laundry_room", float(np.clip(0.04 * area, 3.8, 8))))
     spaces = _extras(spaces, area, config, rng)
     return _scaled(spaces, 0.925 * area if area > 62 else area)
 
@@ -83,14 +83,14 @@ def _bedrooms(area: float, config: HouseConfig, rng: np.random.Generator) -> int
     return count
 
 
-def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[Space]:
+def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[WantedRoom]:
     main = float(np.clip(rng.normal(0.11, 0.01) * area, 11.0, 20.0)) if area > 45 else 0.3 * area
-    spaces = [Space("main_bedroom", main)]
+    spaces = [WantedRoom("main_bedroom", main)]
     for k in range(1, count):
         kind = str(
             rng.choice(["bedroom", "kids_room", "guest_room"], p=[0.45, 0.4, 0.15] if k < 3 else [0.4, 0.3, 0.3])
         )
-        spaces.append(Space(kind, float(np.clip(rng.normal(11.0, 0.8) + (area - 120) * 0.008, 9.0, 15.0))))
+        spaces.append(WantedRoom(kind, float(np.clip(rng.normal(11.0, 0.8) + (area - 120) * 0.008, 9.0, 15.0))))
     return spaces
 
 
@@ -99,85 +99,70 @@ def _bathrooms(area: float, bedrooms: int, rng: np.random.Generator) -> int:
     return max(1, min(round(wanted + rng.normal(0, 0.3)), bedrooms + 1))
 
 
-def _extras(spaces: list[Space], area: float, config: HouseConfig, rng: np.random.Generator) -> list[Space]:
+def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.random.Generator) -> list[WantedRoom]:
     """`spaces` and further rooms until the area is used (or the asked number of main rooms is there)."""
-    least = {
-        "study": 80,
-        "garage": 105,
-        "sun_room": 120,
-        "family_room": 150,
-        "workshop": 130,
-        "playroom": 150,
-        "library": 165,
-        "gym": 175,
-    }
-    size = {
-        "study": 9,
-        "garage": 19,
-        "sun_room": 11,
-        "family_room": 17,
-        "workshop": 11,
-        "playroom": 13,
-        "library": 14,
-        "gym": 14,
-    }
-    likely = {
-        "study": 3.0,
-        "garage": 1.6,
-        "sun_room": 0.8,
-        "family_room": 1.0,
-        "workshop": 0.6,
-        "playroom": 0.8,
-        "library": 0.8,
-        "gym": 0.7,
-    }
-    budget = 0.925 * area
-    grow = float(np.clip((area - 150) / 450, 0, 1))
-    open_kinds = [k for k in least]
+    extras = _extra_kinds()
+    asked, grow = config.rooms is not None, float(np.clip((area - 150) / 450, 0, 1))
+    left = list(extras)
     while True:
-        main = sum(s.kind not in MINOR for s in spaces)
-        if config.rooms is not None and main >= config.rooms:
+        if config.rooms is not None and sum(KINDS[s.kind].is_main for s in spaces) >= config.rooms:
             return spaces
-        free = budget - sum(s.area for s in spaces)
+        free = 0.925 * area - sum(s.area for s in spaces)
+        if not asked and free < 7.0:
+            return spaces
         fits = [
             k
-            for k in open_kinds
-            if (config.rooms is not None or area >= least[k])
-            and (size[k] * 0.8 <= free or (config.rooms is not None and k != "garage"))
+            for k in left
+            if (asked or area >= extras[k].house) and (extras[k].size * 0.8 <= free or (asked and k != "garage"))
         ]
-        if config.rooms is None and free < 7.0:
-            return spaces
-        if not fits:
-            if config.rooms is None and free < 0.12 * area:
-                return spaces
-            beds = sum(s.kind in BEDROOMS for s in spaces)
-            most = 0.5 * config.rooms if config.rooms is not None else area / 62
-            seconds = [
-                k
-                for k in ("study", "family_room", "workshop", "playroom", "sun_room", "library")
-                if sum(s.kind == k for s in spaces) < 2 and (config.rooms is not None or area > 2 * least[k])
-            ]
-            if (beds < most and config.bedrooms is None) or (not seconds and config.rooms is not None):
-                spaces.append(Space("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow))
-            elif not seconds:
-                return spaces
-            else:
-                kind = str(rng.choice(seconds))
-                spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))
+        if fits:
+            p = np.array([extras[k].likely for k in fits])
+            kind = str(rng.choice(fits, p=p / p.sum()))
+            size = extras[kind].size * (1 + 0.35 * grow)
+            if kind == "garage" and area > 220 and rng.random() < 0.6:
+                size = 33.0
+            spaces.append(WantedRoom(kind, size))
+            left.remove(kind)
             continue
-        p = np.array([likely[k] for k in fits])
-        kind = str(rng.choice(fits, p=p / p.sum()))
-        spaces.append(Space(kind, size[kind] * (1 + 0.35 * grow)))
-        if kind == "garage" and area > 220 and rng.random() < 0.6:
-            spaces[-1] = Space("garage", 33.0)
-        open_kinds.remove(kind)
+        if not asked and free < 0.12 * area:
+            return spaces
+        another = _another(spaces, area, config, grow, rng)
+        if another is None:
+            return spaces
+        spaces.append(another)
 
 
-def _scaled(spaces: list[Space], total: float) -> tuple[Space, ...]:
+def _extra_kinds() -> dict[str, Extra]:
+    return {name: kind.extra for name, kind in KINDS.items() if kind.extra is not None}
+
+
+def _another(
+    spaces: list[WantedRoom], area: float, config: HouseConfig, grow: float, rng: np.random.Generator
+) -> WantedRoom | None:
+    """One more bedroom, or a second study or the like; None where the house has enough of them."""
+    extras, asked = _extra_kinds(), config.rooms is not None
+    beds = sum(s.kind in BEDROOMS for s in spaces)
+    most = 0.5 * config.rooms if config.rooms is not None else area / 62
+    seconds = [k for k in SECONDS if sum(s.kind == k for s in spaces) < 2 and (asked or area > 2 * extras[k].house)]
+    if (beds < most and config.bedrooms is None) or (not seconds and asked):
+        return WantedRoom("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow)
+    if not seconds:
+        return None
+    kind = str(rng.choice(seconds))
+    return WantedRoom(kind, extras[kind].size * (1 + 0.35 * grow))
+
+
+def _within_usual(kind: str, area: float) -> float:
+    """An area, square metres, brought within a tenth of what is usual for a kind."""
+    least, most = KINDS[kind].area
+    return float(np.clip(area, 0.9 * least, 1.1 * most))
+
+
+def _scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
     """The same rooms stretched to sum to `total`, none beyond its usual range while that can be met."""
     factor = 1.0
     for _ in range(12):
-        areas = [float(np.clip(s.area * factor, 0.9 * SIZES[s.kind][0], 1.1 * SIZES[s.kind][1])) for s in spaces]
+        areas = [_within_usual(s.kind, s.area * factor) for s in spaces]
         factor *= (total / sum(areas)) ** 1.2
     rest = total / sum(areas)
     return tuple(replace(s, area=a * rest) for s, a in zip(spaces, areas))

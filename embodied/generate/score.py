@@ -4,23 +4,10 @@ from __future__ import annotations
 
 import math
 
-from embodied.generate.access import Wall
-from embodied.generate.kinds import BEDROOMS, SIZES
+from embodied.generate.access import SharedWall
+from embodied.generate.kinds import BEDROOMS, KINDS
 from embodied.generate.modules import Cell
 
-DAYLIT = (
-    *BEDROOMS,
-    "living_room",
-    "dining_room",
-    "kitchen",
-    "family_room",
-    "study",
-    "library",
-    "playroom",
-    "sun_room",
-    "gym",
-    "workshop",
-)
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
 NEAR = {
     ("dining_room", "kitchen"): 2.6,
@@ -45,13 +32,8 @@ NEAR = {
 }
 """What a shared wall between two kinds is worth."""
 
-TIGHT = (*BEDROOMS, "living_room", "bathroom", "kitchen")
-"""Kinds whose furniture does not fit below their usual size."""
-LIMITS = {"hall": 2.4, "toilet": 2.2, "closet": 2.2, "pantry": 2.2, "bathroom": 1.8, "laundry_room": 1.8}
-"""Longest side over shortest, 1.65 for other kinds, before it costs."""
 
-
-def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
+def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
     """Higher is better; entrances are judged by access.connect."""
     inner = [0] * len(cells)
     value = 0.0
@@ -67,8 +49,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
         if a in WET and b in WET:
             joined[i] = joined[j] = 0.3
     value += sum(joined.values())
-    total = 0
-    moving = 0
+    total = moving = 0.0
     for i, c in enumerate(cells):
         x0, y0, x1, y1 = c.rect
         w, h = x1 - x0, y1 - y0
@@ -80,18 +61,18 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], Wall]) -> float:
             moving += area
             value -= 0.07 * max(0, long - 80) + 0.15 * (long / 10 > 3)
             continue
-        low, high, least = SIZES[c.kind]
+        kind = KINDS[c.kind]
+        least, most = kind.area
         if c.kind == "hall":
             moving += 0.5 * area
-        value -= 0.3 * max(0.0, least * 10 - short) if c.kind != "hall" else 0.5 * max(0, 14 - short)
-        if area < low:
-            value -= (15.0 if c.kind in TIGHT else 5.0) * math.log(low / area)
-        elif area > high:
-            value -= 5.0 * math.log(area / high)
+        value -= 0.3 * max(0.0, kind.side * 10 - short) if c.kind != "hall" else 0.5 * max(0, 14 - short)
+        if area < least:
+            value -= (15.0 if kind.is_tight else 5.0) * math.log(least / area)
+        elif area > most:
+            value -= 5.0 * math.log(area / most)
         value -= 0.7 * abs(math.log(area / c.area))
-        limit = LIMITS.get(c.kind, 1.65)
-        value -= (4.0 if area > 15 else 3.0) * max(0.0, long / short - limit)
-        if c.kind in DAYLIT and outer < max(16, (0.7 if c.kind == "sun_room" else 0.26) * (w + h)):
+        value -= (4.0 if area > 15 else 3.0) * max(0.0, long / short - kind.longest)
+        if kind.needs_daylight and outer < max(16, (0.7 if c.kind == "sun_room" else 0.26) * (w + h)):
             value -= 12.0 if outer < 16 else 5.0
         if c.kind in ("hall", "garage") and outer < (13 if c.kind == "hall" else 26):
             value -= 12.0

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,8 +19,9 @@ from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
 from embodied.generate.lacking import lacking
 from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
-from embodied.generate.openings import draw_openings
-from embodied.generate.program import Space, draw_area, draw_program
+from embodied.generate.modules import Cell
+from embodied.generate.openings import Leaves, draw_openings
+from embodied.generate.program import WantedRoom, draw_area, draw_program
 from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
 from embodied.navigation.free_space import inward
@@ -44,12 +47,31 @@ class Draft:
     shape: str = "rectangle"
     footprints: tuple[Footprint, ...] = ()
     """Alternatives of one shape and area, among which the rooms stage chooses."""
-    spaces: tuple[Space, ...] = ()
+    spaces: tuple[WantedRoom, ...] = ()
     plan: Plan | None = None
     palette: Palette | None = None
     house: House | None = None
     first: int = 0
     """Attempts at the rooms that are skipped: no doors or no furniture fitted what came of them."""
+    stages: Mapping[str, Stage] = field(default_factory=lambda: STAGES)
+    """All stages of the run: one that finds no way goes back to an earlier one by its name, replaced or not."""
+
+
+Stage = Callable[[Draft], Draft]
+Made = TypeVar("Made")
+
+
+def _made(value: Made | None, stage: str) -> Made:
+    """What a stage has filled in.
+
+    Raises:
+      HouseError: it has not run.
+    """
+    if value is None:
+        raise HouseError(
+            f"the draft lacks what the stage {stage!r} makes; keep one of this name, before those it serves"
+        )
+    return value
 
 
 def footprint(draft: Draft) -> Draft:
@@ -95,7 +117,7 @@ def openings(draft: Draft) -> Draft:
         if not unreachable_rooms(house):
             return dataclasses.replace(draft, palette=palette, house=house)
         if attempt % 4 == 3:
-            draft = rooms(dataclasses.replace(draft, first=begun + 1 + attempt // 4))
+            draft = draft.stages["rooms"](dataclasses.replace(draft, first=begun + 1 + attempt // 4))
     raise HouseError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
 
 
@@ -103,53 +125,58 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
     disorder = draft.config.disorder
     if disorder is None:
         disorder = round(float(stream(draft.seed, "house", "disorder").beta(1.6, 2.2)), 3)
-    counts: dict[str, int] = {}
-    names = []
-    for c in draft.plan.cells:
-        counts[c.kind] = counts.get(c.kind, 0) + 1
-        names.append(f"{c.kind}_{counts[c.kind]}")
+    plan = _made(draft.plan, "rooms")
+    names = _names(plan)
     height = round(float(rng.choice([2.45, 2.5, 2.6, 2.7, 2.9, 3.0], p=[0.15, 0.25, 0.3, 0.17, 0.08, 0.05])), 2)
     open_plan = draft.config.open_plan
     if open_plan is None:
         open_plan = bool(rng.random() < 0.6)
-    made = []
-    for c, name in zip(draft.plan.cells, names):
-        x0, y0, x1, y1 = (v / 10 for v in c.rect)
-        made.append(
-            Room(
-                name,
-                c.kind,
-                ((x0, y0), (x1, y0), (x1, y1), (x0, y1)),
-                palette.floor,
-                palette.walls[0],
-                palette.ceiling,
-                palette.skirting,
-            )
-        )
-    doors = draw_openings(
-        draft.plan, tuple(names), (palette.door, palette.front_door, palette.frame), height, open_plan, rng=rng
-    )
+    leaves = Leaves(palette.door, palette.front_door, palette.frame)
     return House(
-        draft.seed,
-        _title(draft),
-        (Storey(0.0, height),),
-        tuple(made),
-        doors,
-        (),
-        (),
+        seed=draft.seed,
+        name=_title(draft),
+        storeys=(Storey(0.0, height),),
+        rooms=tuple(_bare_room(c, name, palette) for c, name in zip(plan.cells, names)),
+        openings=draw_openings(plan, names, leaves, height, open_plan, rng=rng),
+        placements=(),
+        lights=(),
         style=palette.style,
         disorder=disorder,
     )
 
 
+def _names(plan: Plan) -> tuple[str, ...]:
+    """'<kind>_<number>' for each cell."""
+    counts: Counter[str] = Counter()
+    names = []
+    for c in plan.cells:
+        counts[c.kind] += 1
+        names.append(f"{c.kind}_{counts[c.kind]}")
+    return tuple(names)
+
+
+def _bare_room(cell: Cell, name: str, palette: Palette) -> Room:
+    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
+    return Room(
+        id=name,
+        kind=cell.kind,
+        polygon=((x0, y0), (x1, y0), (x1, y1), (x0, y1)),
+        floor_finish=palette.floor,
+        wall_finish=palette.walls[0],
+        ceiling_finish=palette.ceiling,
+        skirting_finish=palette.skirting,
+    )
+
+
 def finishes(draft: Draft) -> Draft:
     """What every room wears, and the weather outside."""
-    sky = draw_sky(draft.config, draft.house, stream(draft.seed, "house", "sky"))
-    house = dressed(draft.house, draft.palette, rng=stream(draft.seed, "house", "finishes"))
+    bare = _made(draft.house, "openings")
+    sky = draw_sky(draft.config, bare, rng=stream(draft.seed, "house", "sky"))
+    house = dressed(bare, _made(draft.palette, "openings"), rng=stream(draft.seed, "house", "finishes"))
     return dataclasses.replace(draft, house=dataclasses.replace(house, sky=sky))
 
 
-def draw_sky(config: HouseConfig, house: House, rng: np.random.Generator) -> Sky:
+def draw_sky(config: HouseConfig, house: House, *, rng: np.random.Generator) -> Sky:
     """Daytime mostly, the living room's largest window more or less to the south; `config` may fix hour and weather."""
     hour = config.hour if config.hour is not None else round(float(rng.triangular(8.0, 12.0, 18.0)), 2)
     weather = config.weather or str(rng.choice(["clear", "hazy", "overcast"], p=[0.55, 0.25, 0.2]))
@@ -165,22 +192,22 @@ def draw_sky(config: HouseConfig, house: House, rng: np.random.Generator) -> Sky
 def furnishing(draft: Draft) -> Draft:
     """Furniture, wall and ceiling things, small things and lights."""
     catalogue = draft.catalogue if draft.catalogue is not None else load_catalogue()
-    house = furnish(draft.house, catalogue, seed=draft.seed)
+    house = furnish(_made(draft.house, "openings"), catalogue, seed=draft.seed)
     return dataclasses.replace(draft, house=house)
 
 
 def clearing(draft: Draft) -> Draft:
     """Every room can be entered on foot; whatever stood in the way is gone."""
-    return dataclasses.replace(draft, house=cleared(draft.house))
+    return dataclasses.replace(draft, house=cleared(_made(draft.house, "openings")))
 
 
 def checking(draft: Draft) -> Draft:
     """Refuse what cannot be."""
-    check(draft.house)
+    check(_made(draft.house, "openings"))
     return draft
 
 
-STAGES: Mapping[str, Callable[[Draft], Draft]] = {
+STAGES: Mapping[str, Stage] = {
     "footprint": footprint,
     "program": program,
     "rooms": rooms,
@@ -193,10 +220,7 @@ STAGES: Mapping[str, Callable[[Draft], Draft]] = {
 
 
 def generate_house(
-    seed: int,
-    config: HouseConfig = DEFAULT,
-    catalogue: Catalogue | None = None,
-    stages: Mapping[str, Callable[[Draft], Draft]] = STAGES,
+    seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None, stages: Mapping[str, Stage] = STAGES
 ) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
@@ -207,14 +231,15 @@ def generate_house(
       seed: any integer.
       config: what to fix; the rest is drawn.
       catalogue: assets to furnish with; the reviewed one by default.
-      stages: name to stage, run in order; replace one with {**STAGES, "rooms": mine}.
+      stages: name to stage, run in order; replace one with {**STAGES, "rooms": mine}, which then holds
+        for every attempt.
 
     Raises:
-      HouseError: the configuration cannot be built.
+      HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
     """
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
-        draft = Draft(seed, config, catalogue, first=first)
+        draft = Draft(seed, config, catalogue, first=first, stages=stages)
         try:
             for stage in stages.values():
                 draft = stage(draft)
@@ -222,11 +247,13 @@ def generate_house(
             if best is None:
                 raise
             break
-        short = len(lacking(draft.house))
+        house = _made(draft.house, "openings")
+        short = len(lacking(house))
         if best is None or short < best[0]:
-            best = short, draft.house
-        if not short or not draft.house.placements:
+            best = short, house
+        if not short or not house.placements:
             break
+    assert best is not None  # REDRAWN is positive
     return best[1]
 
 

@@ -60,7 +60,7 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class ScoredPose:
     """Where an arrangement's frame goes; the best score is tried first."""
 
     score: float
@@ -124,7 +124,7 @@ class Fit:
 
 
 def pack(
-    space: RoomSpace, items: Sequence[Item], poses: Iterable[Pose], group: str, tries: int = 40
+    space: RoomSpace, items: Sequence[Item], poses: Iterable[ScoredPose], group: str, tries: int = 40
 ) -> list[Thing] | None:
     """Put the arrangement at the first pose that takes all of it, or at one that takes most of it.
 
@@ -149,7 +149,7 @@ def pack(
     return list(fit.things)
 
 
-def _fit(space: RoomSpace, items: Sequence[Item], pose: Pose, group: str) -> Fit | None:
+def _fit(space: RoomSpace, items: Sequence[Item], pose: ScoredPose, group: str) -> Fit | None:
     """The arrangement at a pose; None where something that is not optional finds no room, or it cuts the room apart."""
     trial = _Trial(space, pose, group)
     for item in items:
@@ -172,7 +172,7 @@ class _Trial:
     """An arrangement that is being put at a pose, item by item."""
 
     space: RoomSpace
-    pose: Pose
+    pose: ScoredPose
     group: str
     things: list[Thing | None] = field(default_factory=list)
     """One for each item so far; None where an optional one was left out."""
@@ -332,13 +332,13 @@ def wall_poses(
     gap: float = WALL_GAP,
     step: float = 0.25,
     walls: Sequence[Wall] | None = None,
-) -> list[Pose]:
+) -> list[ScoredPose]:
     """Poses of a group `width` wide with its back to a wall, clear of doors.
 
     Tried along each wall are both ends, the middle, the middles of its free stretches, before
     its windows, and every `step` metres.
     """
-    poses: list[Pose] = []
+    poses: list[ScoredPose] = []
     for wall in space.walls if walls is None else walls:
         half = width / 2 + 0.01
         doors = [(s0 - 0.1, s1 + 0.1) for s0, s1, o in wall.openings if o.kind != "window"]
@@ -357,7 +357,7 @@ def wall_poses(
             if any(s - half < b - 0.01 and s + half > a + 0.01 for a, b in doors):
                 continue
             x, y = wall.point(s, gap)
-            poses.append(Pose(score(wall, s), x, y, wall.yaw, wall))
+            poses.append(ScoredPose(score(wall, s), x, y, wall.yaw, wall))
     return poses
 
 
@@ -368,18 +368,18 @@ def floor_poses(
     yaws: Sequence[float],
     step: float = 0.3,
     margin: float = 0.3,
-) -> list[Pose]:
+) -> list[ScoredPose]:
     """Poses on a grid over the floor, at each of `yaws`."""
     x0, y0, x1, y1 = space.polygon.bounds
     nx = max(int((x1 - x0 - 2 * margin) / step), 1) + 1
     ny = max(int((y1 - y0 - 2 * margin) / step), 1) + 1
     centre = ((x0 + x1) / 2, (y0 + y1) / 2)
-    poses: list[Pose] = []
+    poses: list[ScoredPose] = []
     for i in range(nx):
         for j in range(ny):
             x = centre[0] + (i - (nx - 1) / 2) * step
             y = centre[1] + (j - (ny - 1) / 2) * step
-            poses.extend(Pose(score(x, y, yaw), x, y, yaw) for yaw in yaws)
+            poses.extend(ScoredPose(score(x, y, yaw), x, y, yaw) for yaw in yaws)
     return poses
 
 

@@ -10,7 +10,7 @@ from typing import Unpack
 import numpy as np
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import WALL_GAP, Item, Pose, Thing, pack, wall_poses
+from embodied.generate.furnish.arrange import WALL_GAP, Item, ScoredPose, Thing, pack, wall_poses
 from embodied.generate.furnish.space import RoomSpace, Wall
 from embodied.generate.furnish.stock import Limits, Stock
 
@@ -57,7 +57,9 @@ class Context:
         limits.setdefault("avoid", tuple(t.asset.key for t in self.things))
         return self.stock.pick(role, rng=self.rng, kind=self.kind, **limits)
 
-    def put(self, items: Sequence[Item], poses: Iterable[Pose], group: str, tries: int = 40) -> list[Thing] | None:
+    def put(
+        self, items: Sequence[Item], poses: Iterable[ScoredPose], group: str, tries: int = 40
+    ) -> list[Thing] | None:
         """Pack the arrangement; what found its place joins the room."""
         name = f"{group}_{self._groups.get(group, 0) + 1}"
         things = pack(self.space, items, poses, name, tries)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Item, Pose, Thing, floor_poses
+from embodied.generate.furnish.arrange import Item, ScoredPose, Thing, floor_poses
 from embodied.generate.furnish.context import Context, Liking
 from embodied.generate.furnish.space import RoomSpace, Wall, box
 
@@ -155,7 +155,7 @@ def lone_fridge(ctx: Context) -> list[Thing] | None:
 
 
 @dataclass(frozen=True)
-class Slot:
+class UnitSlot:
     """One module of a run of units."""
 
     kind: str
@@ -166,7 +166,7 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Line:
+class UnitLine:
     """A run of units along a wall, before it is known what stands in it."""
 
     kit: KitchenSet
@@ -197,7 +197,7 @@ def _run(
     count = min(int(room / kit.unit + 0.15), int(4.0 / kit.unit))
     if count < need:
         return None
-    line = Line(kit, wall, min(max(room / count, 0.88 * kit.unit), 1.12 * kit.unit), free)
+    line = UnitLine(kit, wall, min(max(room / count, 0.88 * kit.unit), 1.12 * kit.unit), free)
     for at_end in _fridge_ends(ctx, line.windows, a, b, fridge):
         start = a if at_end or fridge is None else a + fridge.size[0] + 0.02
         if at_end and fridge is not None:
@@ -231,14 +231,14 @@ def _fridge_ends(
 def _put_line(ctx: Context, wall: Wall, items: list[tuple[float, Item]]) -> list[Thing] | None:
     """Put (s, item) at their places along a wall."""
     x, y = wall.point(0.0, 0.005)
-    return ctx.put([_moved(item, -s) for s, item in items], [Pose(0.0, x, y, wall.yaw, wall)], "kitchen")
+    return ctx.put([_moved(item, -s) for s, item in items], [ScoredPose(0.0, x, y, wall.yaw, wall)], "kitchen")
 
 
 def _moved(item: Item, x: float) -> Item:
     return item if item.on is not None else replace(item, x=item.x + x)
 
 
-def _slots(ctx: Context, line: Line, count: int, start: float, view: float | None) -> list[Slot]:
+def _slots(ctx: Context, line: UnitLine, count: int, start: float, view: float | None) -> list[UnitSlot]:
     """The modules of a run of `count` units from `start`: the sink before a window, the cooker at an arm's length."""
     kit, width = line.kit, line.width
     sink, cook = kit.units(kit.sink), 1 if kit.hob else kit.units(kit.cooker)
@@ -269,10 +269,10 @@ def _slots(ctx: Context, line: Line, count: int, start: float, view: float | Non
                 n += 1
             slots.append(("base", k, n))
             k += n
-    return [Slot(kind, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]
+    return [UnitSlot(kind, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]
 
 
-def _run_items(ctx: Context, line: Line, slots: list[Slot]) -> list[tuple[float, Item]]:
+def _run_items(ctx: Context, line: UnitLine, slots: list[UnitSlot]) -> list[tuple[float, Item]]:
     """(s, item) of all modules, the hob, the hood and the wall cabinets of a run."""
     items: list[tuple[float, Item]] = []
     for slot in slots:
@@ -285,7 +285,7 @@ def _run_items(ctx: Context, line: Line, slots: list[Slot]) -> list[tuple[float,
     return items
 
 
-def _base_items(ctx: Context, line: Line, slot: Slot, first: int) -> list[tuple[float, Item]]:
+def _base_items(ctx: Context, line: UnitLine, slot: UnitSlot, first: int) -> list[tuple[float, Item]]:
     """The floor units of one module; `first` is the index that the first item will have."""
     kit = line.kit
 
@@ -311,7 +311,7 @@ def _base_items(ctx: Context, line: Line, slot: Slot, first: int) -> list[tuple[
     ]
 
 
-def _hood(ctx: Context, line: Line, slot: Slot) -> list[tuple[float, Item]]:
+def _hood(ctx: Context, line: UnitLine, slot: UnitSlot) -> list[tuple[float, Item]]:
     """The hood over the cooker, if the kit has one."""
     hood = line.kit.hood
     if hood is None:
@@ -322,7 +322,7 @@ def _hood(ctx: Context, line: Line, slot: Slot) -> list[tuple[float, Item]]:
     return [(slot.s, Item(hood, 0.0, -hood.size[1] / 2, z=z, size=size, optional=True, role="range hood"))]
 
 
-def _upper_items(ctx: Context, line: Line, slot: Slot) -> list[tuple[float, Item]]:
+def _upper_items(ctx: Context, line: UnitLine, slot: UnitSlot) -> list[tuple[float, Item]]:
     """The wall cabinets over one module: one of double width, or single ones."""
     upper, s, n, width = line.kit.upper, slot.s, slot.units, line.width
     if not upper:
@@ -381,8 +381,8 @@ def _add_run(
     for n in range(most, least - 1, -1):
         width = min((b - a) / n, kit.unit) - 0.002
         at = a + 0.004 if starts_at_a else b - 0.004 - n * width
-        slots = [Slot("base", 1, at + (k + 0.5) * width) for k in range(n)]
-        found = _put_line(ctx, wall, _run_items(ctx, Line(kit, wall, width, 0.55), slots))
+        slots = [UnitSlot("base", 1, at + (k + 0.5) * width) for k in range(n)]
+        found = _put_line(ctx, wall, _run_items(ctx, UnitLine(kit, wall, width, 0.55), slots))
         if found:
             done.extend(found)
             return n * width

@@ -6,7 +6,7 @@ import math
 from typing import Unpack
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, Pose, Thing, floor_poses, wall_poses
+from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, Thing, floor_poses, wall_poses
 from embodied.generate.furnish.context import Context, Liking, at_corner, at_window, centred, door_distance, wobble
 from embodied.generate.furnish.space import Wall
 from embodied.generate.furnish.stock import Limits, Size
@@ -233,7 +233,9 @@ def doormat(ctx: Context) -> list[Thing] | None:
             if o.kind in ("front_door", "back_door"):
                 x, y = wall.point((s0 + s1) / 2, 0.12)
                 return ctx.put(
-                    [Item(asset, 0.0, -d / 2, passage=True, role="doormat")], [Pose(0.0, x, y, wall.yaw, wall)], "entry"
+                    [Item(asset, 0.0, -d / 2, passage=True, role="doormat")],
+                    [ScoredPose(0.0, x, y, wall.yaw, wall)],
+                    "entry",
                 )
     return None
 
@@ -268,5 +270,5 @@ def _sides(ctx: Context) -> tuple[float, float, bool]:
 def _in_the_middle(ctx: Context, rug: Asset, size: Size, group: str) -> list[Thing] | None:
     """A rug in the middle of the floor, its width along the longer side."""
     c = ctx.space.polygon.centroid
-    pose = Pose(0.0, c.x, c.y, 0.0 if _sides(ctx)[2] else math.pi / 2)
+    pose = ScoredPose(0.0, c.x, c.y, 0.0 if _sides(ctx)[2] else math.pi / 2)
     return ctx.put([Item(rug, size=size, passage=True, role="rug")], [pose], group)

@@ -14,7 +14,7 @@ Test = Callable[[Context], bool]
 
 
 @dataclass(frozen=True)
-class Step:
+class Wish:
     """One line of a room's programme."""
 
     group: Group
@@ -47,7 +47,7 @@ class Need:
 class Programme:
     """How one kind of room is furnished."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[Wish, ...]
     """In the order in which they claim their place: what makes the room what it is comes first."""
     needs: tuple[Need, ...] = ()
     """Most important first: a room is tried again, in its house, while it lacks one."""
@@ -77,7 +77,7 @@ def carry_out(programme: Programme, ctx: Context) -> None:
         programme.fillers[int(ctx.rng.integers(len(programme.fillers)))](ctx)
 
 
-def _is_tried(step: Step, ctx: Context, found_place: dict[str, bool]) -> bool:
+def _is_tried(step: Wish, ctx: Context, found_place: dict[str, bool]) -> bool:
     if not step.above < ctx.space.area <= step.upto or not all(test(ctx) for test in step.when):
         return False
     if step.unless is not None and found_place[step.unless]:
