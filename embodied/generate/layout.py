@@ -344,7 +344,7 @@ def _along_band(band: Band, rect: Rect, axis: str) -> tuple[int, int]:
 
 
 def _corridors(footprint: Footprint, limits: list[list[int]], halls: list[tuple[int, int, int]]) -> list[Cell] | None:
-    """What the rooms at its ends and the halls (band, from, to) leave of each corridor; None if a piece is too short."""
+    """What the end rooms and the halls (band, from, to) leave of each corridor; None if a piece is too short."""
     cells = []
     for b, band in enumerate(footprint.bands):
         pieces = [(limits[b][0], limits[b][1])]
