@@ -91,7 +91,7 @@ def edited(change) -> str:
         (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
         (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
         (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
-        (lambda h: h["placements"][0].update(yaw="north"), "should be float"),
+        (lambda h: h["placements"][0].update(yaw="north"), "should be a number"),
         (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
         (lambda h: h.update(disorder=7.0), "disorder"),
         (

@@ -6,21 +6,27 @@ import functools
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 
+from assets.catalogue import load_catalogue
 from assets.materials import MATERIALS
 from assets.records import ROOM_KINDS
-from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.clearing import cleared
 from embodied.generate.finishes import TASTES
 from embodied.generate.footprint import draw_footprint
-from embodied.generate.kinds import BEDROOMS
+from embodied.generate.furnish import groups_work as work
+from embodied.generate.furnish.programme import Programme, Wish
+from embodied.generate.furnish.rooms import PROGRAMMES, piece
+from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 from embodied.generate.stages import Draft
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
 from embodied.house.validation import STYLES
+from embodied.language.lexicon import ROOM_NOUNS
 from embodied.navigation.free_space import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
@@ -289,6 +295,44 @@ def test_a_stage_can_be_replaced():
 
     house = generate_house(2, stages={**BARE, "footprint": square})
     assert house.area == pytest.approx(100, rel=0.05)
+
+
+def test_a_replaced_stage_is_asked_on_every_retry(monkeypatch):
+    """No doors please until the fifth attempt: the plan is drawn again after four, by the stage that was given."""
+    asked, refused = [], iter(["hall_1"] * 4)
+    monkeypatch.setattr(stages, "unreachable_rooms", lambda house: next(refused, ()))
+
+    def mine(draft: Draft) -> Draft:
+        asked.append(draft.first)
+        return STAGES["rooms"](draft)
+
+    house = generate_house(2, stages={**BARE, "rooms": mine})
+    assert asked == [0, 1]
+    second = generate_house(2, stages={**BARE, "rooms": lambda d: STAGES["rooms"](replace(d, first=1))})
+    assert [r.polygon for r in house.rooms] == [r.polygon for r in second.rooms]
+
+
+def test_a_stage_that_was_left_out_is_named():
+    with pytest.raises(HouseError, match="'rooms' makes"):
+        generate_house(2, stages={name: stage for name, stage in BARE.items() if name != "rooms"})
+
+
+def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(monkeypatch):
+    """As docs/houses.md promises: its name, how architects think of it, and its furniture."""
+    monkeypatch.setattr("embodied.house.house.ROOM_KINDS", (*ROOM_KINDS, "music_room"))
+    often = Extra(house=0.0, size=14.0, likely=1e6)
+    monkeypatch.setitem(KINDS, "music_room", replace(KINDS["library"], extra=often))
+    piano = Wish(piece("upright piano", clear=0.8))
+    monkeypatch.setitem(PROGRAMMES, "music_room", Programme((piano, Wish(work.corner_plant))))
+    house = generate_house(4, HouseConfig(rooms=6, bedrooms=2), load_catalogue())
+    rooms = {r.id for r in house.rooms if r.kind == "music_room"}
+    assert rooms and {p.room for p in house.placements if p.object_class == "upright piano"} >= rooms
+
+
+def test_every_kind_of_room_stands_in_every_table():
+    drawn = set(ROOM_KINDS) - {"stairwell"}  # of houses with several storeys, which are not drawn yet
+    assert set(KINDS) == drawn
+    assert set(PROGRAMMES) == set(ROOM_NOUNS) == set(ROOM_KINDS)
 
 
 def test_a_wardrobe_in_the_doorway_is_cleared_away_with_what_lies_on_it():

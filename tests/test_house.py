@@ -6,10 +6,13 @@ import dataclasses
 import json
 import math
 
+import hypothesis
+import hypothesis.strategies as st
 import pytest
 from conftest import two_rooms
 
-from embodied.house.house import House, HouseError, Light, Placement, Sky, check
+from embodied.house import House
+from embodied.house.house import HouseError, Light, Placement, Sky, Storey, check
 
 
 def with_opening(number: int, **changes) -> House:
@@ -75,7 +78,14 @@ NONSENSE = {
             *h.openings[1:],
         ),
     ),
-    "storeys": lambda h: dataclasses.replace(h, storeys=(dataclasses.replace(h.storeys[0], height=1.0),)),
+    "storeys .1. have no room": lambda h: dataclasses.replace(h, storeys=(*h.storeys, Storey(3.0, 2.5))),
+    "below the ceiling of storey 0": lambda h: dataclasses.replace(h, storeys=(*h.storeys, Storey(2.0, 2.5))),
+    "does not fit into its room 'living_room_1'": lambda h: with_thing(size=(30.0, 30.0, 30.0)),
+    "at least 0.0001": lambda h: with_thing(size=(1e-9, 1e-9, 1e-9)),
+    "shines at .* outside its room": lambda h: dataclasses.replace(
+        h, lights=(Light("light_1", "bedroom_1", None, (-9.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
+    ),
+    "of 1.8 to 20 m": lambda h: dataclasses.replace(h, storeys=(dataclasses.replace(h.storeys[0], height=1.0),)),
     "weather": lambda h: dataclasses.replace(h, sky=Sky(weather="hail")),
     "names the unknown room": lambda h: dataclasses.replace(
         h, lights=(Light("light_1", "attic_1", None, (1.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
@@ -98,8 +108,12 @@ BROKEN = {
     "unknown fields": lambda text: text.replace('"seed":', '"sed":'),
     "lacks the fields": lambda text: json.dumps({k: v for k, v in json.loads(text).items() if k != "rooms"}),
     "should be a finite number": lambda text: text.replace('"outer_wall":0.32', '"outer_wall":NaN'),
-    "should be str": lambda text: text.replace('"kind":"bedroom"', '"kind":7'),
+    "should be a text": lambda text: text.replace('"kind":"bedroom"', '"kind":7'),
     "should be a list": lambda text: text.replace('"lights":[]', '"lights":{}'),
+    r"placements\[0\] \('rug_1'\).yaw should be a number, got 'north'": lambda text: text.replace(
+        '"yaw":0.0', '"yaw":"north"'
+    ),
+    r"\['seed'\] stand there twice": lambda text: text.replace('"seed":0', '"seed":0,"seed":1'),
 }
 
 
@@ -118,3 +132,93 @@ def test_objects_may_touch_the_wall_they_hang_on():
     house = two_rooms()
     clock = Placement("clock_1", "hand/clock", "clock", "living_room_1", (2.5, 0.06, 1.8), math.pi, (0.3, 0.05, 0.3))
     check(dataclasses.replace(house, placements=(*house.placements, clock)))
+
+
+# What Hypothesis thinks of ----------------------------------------------------------------------
+
+NUMBERS = st.floats(-2.0, 2.0, allow_subnormal=False)
+NAMES = st.from_regex(r"[a-z_'.-]{1,12}", fullmatch=True)
+PARAMS = st.lists(st.tuples(NAMES, st.one_of(st.text(max_size=20), NUMBERS)), max_size=3).map(tuple)
+RUGS = st.builds(
+    Placement,
+    id=NAMES,
+    asset=st.text(max_size=20),
+    object_class=st.text(max_size=20),
+    room=st.just("living_room_1"),
+    position=st.tuples(st.floats(0.1, 4.9), st.floats(0.1, 3.9), st.floats(0.0, 2.5)),
+    yaw=st.floats(-4.0, 4.0),
+    size=st.tuples(*[st.floats(0.01, 2.5)] * 3),
+    params=PARAMS,
+    group=st.none() | st.text(max_size=10),
+)
+LAMPS = st.builds(
+    Light,
+    id=NAMES,
+    room=st.just("bedroom_1"),
+    placement=st.none(),
+    position=st.tuples(st.floats(5.1, 8.9), st.floats(0.1, 3.9), st.floats(0.0, 2.5)),
+    color=st.tuples(*[st.floats(0.0, 1.0)] * 3),
+    power=st.floats(0.0, 5000.0),
+    on=st.booleans(),
+)
+SKIES = st.builds(
+    Sky, hour=st.floats(0.0, 23.9), weather=st.sampled_from(["clear", "hazy", "overcast"]), north=st.floats(-4.0, 4.0)
+)
+
+
+@hypothesis.settings(derandomize=True, deadline=None)
+@hypothesis.given(
+    rugs=st.lists(RUGS, max_size=3, unique_by=lambda p: p.id),
+    lamps=st.lists(LAMPS, max_size=3, unique_by=lambda x: x.id),
+    sky=SKIES,
+    seed=st.integers(),
+    name=st.text(max_size=30),
+)
+def test_any_house_that_passes_the_check_survives_json(rugs, lamps, sky, seed, name):
+    house = dataclasses.replace(two_rooms(), placements=tuple(rugs), lights=tuple(lamps), sky=sky, seed=seed, name=name)
+    check(house)
+    again = House.from_json(house.to_json())
+    assert again == house and again.digest == house.digest
+
+
+JSON = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from([1e-9, 30.0, 1e300, -1, "north", "living_room_1"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def places(value: object, path: tuple = ()) -> list[tuple]:
+    """The way to every value inside a JSON value."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path, *(p for k, v in inner for p in places(v, (*path, k)))]
+
+
+FURNISHED = dataclasses.replace(
+    two_rooms(), lights=(Light("light_1", "bedroom_1", None, (6.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
+)
+
+
+@hypothesis.settings(max_examples=300, derandomize=True, deadline=None)
+@hypothesis.given(data=st.data())
+def test_a_house_file_with_any_value_changed_is_refused_with_a_reason_or_is_a_house(data):
+    body = json.loads(FURNISHED.to_json())
+    *way, last = data.draw(st.sampled_from([p for p in places(body) if p]))
+    inside = body
+    for key in way:
+        inside = inside[key]
+    if data.draw(st.booleans()):
+        inside[last] = data.draw(JSON)
+    else:
+        del inside[last]
+    try:
+        house = House.from_json(json.dumps(body))
+    except HouseError as error:
+        assert len(str(error)) > 20 and "NaN to" not in str(error)
+    else:
+        assert House.from_json(house.to_json()) == house

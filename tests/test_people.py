@@ -6,8 +6,10 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import shapely
+from conftest import two_rooms
 from hand_worlds import grid_world, thing
 
 from assets.records import Asset, SupportSurface
@@ -15,7 +17,7 @@ from embodied.assistants.route_system import route_paths
 from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Placement, check
-from embodied.navigation.graph import RADIUS
+from embodied.navigation.graph import RADIUS, NavGraph, graph_of, unreachable_rooms
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
@@ -128,16 +130,32 @@ def test_routes_begin_where_somebody_is_met():
     )
 
 
-def test_whoever_shuts_a_room_steps_aside_alone(monkeypatch):
-    world = grid_world(6, spacing=2.2)
-    everybody = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
-    first = next(iter(everybody.values()))
-    monkeypatch.setattr(
-        "embodied.generate.people.unreachable_rooms",
-        lambda house: ["kitchen_1"] if any(p.position == first.position for p in house.placements) else [],
+def nook_before_a_door() -> tuple[House, NavGraph]:
+    """Two rooms; whoever is met at the eastern node stands in a nook 0.7 m wide that leads to the bedroom's door."""
+    blocks = (((3.2, 1.1), (2.0, 2.0)), ((3.0, 3.5), (3.9, 0.8)))  # middle and size of what fills the rest
+    things = tuple(
+        dataclasses.replace(thing("cupboard", k + 1, "living_room_1", *at), size=(*size, 1.0))
+        for k, (at, size) in enumerate(blocks)
     )
-    left = {p.position for p in meet(world.house, world.graph, catalogue(FIGURE), seed=1).values()}
-    assert first.position not in left and left >= {p.position for p in everybody.values()} - {first.position}
+    graph = graph_of(
+        np.array([[1.2, 2.6, 0.0], [4.0, 2.6, 0.0]]), np.array([[0, 1]]), ("a", "b"), ("living_room_1",) * 2
+    )
+    return dataclasses.replace(two_rooms(), placements=things), graph
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whoever_shuts_a_room_steps_aside_alone(seed):
+    house, graph = nook_before_a_door()
+    assert unreachable_rooms(house) == ()
+    met = meet(house, graph, catalogue(FIGURE), seed=seed)
+    assert set(met) == {0} and unreachable_rooms(add_people(house, met, (0,))) == ()
+    # in a house whose bedroom has a door of its own to the garden, the same two people stay
+    garden = dataclasses.replace(
+        house.openings[0], id="back_door_1", kind="back_door", rooms=("bedroom_1", None), a=(9.0, 1.0), b=(9.0, 2.0)
+    )
+    shut_anyway = dataclasses.replace(house, openings=(garden, *house.openings[1:]))
+    both = meet(shut_anyway, graph, catalogue(FIGURE), seed=seed)
+    assert set(both) == {0, 1} and both[0] == met[0] and both[1].position[0] > 4.2
 
 
 def test_where_the_first_figure_does_not_fit_a_slimmer_one_stands():

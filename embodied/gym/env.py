@@ -38,7 +38,7 @@ from embodied.gym.eyes import (
 from embodied.gym.playground import make_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
-from embodied.house.floor_plan import draw_plan, font
+from embodied.house.floor_plan import paint_plan, font
 from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.render.pictures import PictureSettings
 from embodied.world import World
@@ -157,7 +157,7 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     """The view along the agent's eyes, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
-    plan = draw_plan(
+    plan = paint_plan(
         env.world.house,
         pixels_per_metre=28,
         graph=env.world.graph,

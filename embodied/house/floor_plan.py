@@ -1,6 +1,6 @@
 """The floor plan as a picture: walls with thickness, door swings, windows, furniture, names and areas, scale and north.
 
-draw_plan(house).save("plan.png")
+paint_plan(house).save("plan.png")
 """
 
 from __future__ import annotations
@@ -8,18 +8,25 @@ from __future__ import annotations
 import io
 import itertools
 import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Protocol, TypedDict, Unpack
 
-import matplotlib
+import matplotlib as mpl
 import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
 
 from assets.cache import write_bytes
 from embodied.geometry import rectangle, rotation
-from embodied.house.house import House, Opening, Placement, Room
+from embodied.house.house import House, Opening, Placement, Room, Stair
 
-PAPER, INK, SOFT = (250, 248, 243), (52, 50, 56), (128, 124, 122)
+Colour = tuple[int, int, int]
+Point = Sequence[float] | np.ndarray
+"""x and y, and perhaps more that a plan does not show, metres."""
+Line = Iterable[Point] | np.ndarray
+
+PAPER, INK, SOFT, GLASS = (250, 248, 243), (52, 50, 56), (128, 124, 122), (150, 175, 190)
 ROOM_COLOURS = {
     "living_room": (250, 236, 208),
     "family_room": (248, 232, 205),
@@ -49,13 +56,25 @@ SMALL = 3
 """Draw at this many times the final resolution, then shrink: smooth lines."""
 
 
-def draw_plan(
+class Graph(Protocol):
+    """What a plan shows of a navigation graph."""
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(n, 3) metres, world."""
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(m, 2) node indices."""
+
+
+def paint_plan(
     house: House,
     *,
     storey: int = 0,
     pixels_per_metre: float = 48.0,
     furniture: bool = True,
-    graph=None,
+    graph: Graph | None = None,
     path: tuple[int, ...] = (),
     facing: float | None = None,
     titles: bool = True,
@@ -90,7 +109,7 @@ def draw_plan(
         _draw_graph(sheet, graph, path)
         if path and facing is not None:
             _draw_walker(sheet, graph.positions[path[-1]][:2], facing)
-    image = sheet.image.resize((sheet.image.width // SMALL, sheet.image.height // SMALL), Image.LANCZOS)
+    image = sheet.image.resize((sheet.image.width // SMALL, sheet.image.height // SMALL), Image.Resampling.LANCZOS)
     out = _Sheet(rooms, pixels_per_metre, house.outer_wall, image)
     for room in rooms:
         _label(out, house, room)
@@ -98,18 +117,28 @@ def draw_plan(
     return out.image
 
 
-def save_plan(house: House, path: Path, **options) -> None:
-    """Write the plan of the ground floor as a PNG, atomically; options as for `draw_plan`."""
+class PlanOptions(TypedDict, total=False):
+    """What `paint_plan` takes by name."""
+
+    storey: int
+    pixels_per_metre: float
+    furniture: bool
+    graph: Graph | None
+    path: tuple[int, ...]
+    facing: float | None
+    titles: bool
+
+
+def save_plan(house: House, file: Path, **options: Unpack[PlanOptions]) -> None:
+    """Write the plan of the ground floor as a PNG, atomically; options as for `paint_plan`."""
     data = io.BytesIO()
-    draw_plan(house, **options).save(data, format="PNG")
-    write_bytes(Path(path), data.getvalue())
+    paint_plan(house, **options).save(data, format="PNG")
+    write_bytes(Path(file), data.getvalue())
 
 
-def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font(size: float) -> ImageFont.FreeTypeFont:
     """DejaVu Sans as Matplotlib ships it, so that pictures agree between machines."""
-    return ImageFont.truetype(
-        str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size)
-    )
+    return ImageFont.truetype(str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size))
 
 
 class _Sheet:
@@ -125,18 +154,18 @@ class _Sheet:
         self.image = image if image is not None else Image.new("RGB", (int(size[0]), int(size[1])), PAPER)
         self.draw = ImageDraw.Draw(self.image)
 
-    def xy(self, point) -> tuple[float, float]:
+    def xy(self, point: Point) -> tuple[float, float]:
         return ((point[0] - self.low[0]) * self.scale, (self.high[1] - point[1]) * self.scale)
 
-    def polygon(self, points, **style) -> None:
-        self.draw.polygon([self.xy(p) for p in points], **style)
+    def polygon(self, points: Line, fill: Colour) -> None:
+        self.draw.polygon([self.xy(p) for p in points], fill=fill)
 
-    def line(self, points, metres: float, colour=INK) -> None:
+    def line(self, points: Line, metres: float, colour: Colour = INK) -> None:
         self.draw.line(
             [self.xy(p) for p in points], fill=colour, width=max(1, round(metres * self.scale)), joint="curve"
         )
 
-    def shape(self, shape, fill) -> None:
+    def shape(self, shape: shapely.Geometry, fill: Colour) -> None:
         """Fill a shapely polygon with holes."""
         for g in getattr(shape, "geoms", [shape]):
             if g.is_empty:
@@ -151,7 +180,7 @@ class _Sheet:
     def hatch(self, room: Room) -> None:
         """Faint tiles."""
         base = ROOM_COLOURS.get(room.kind, PAPER)
-        pale = tuple(max(0, c - 9) for c in base)
+        pale = _darker(base, 9)
         x0, y0, x1, y1 = shapely.Polygon(room.polygon).bounds
         inside = shapely.Polygon(room.polygon)
         for k in range(1, math.ceil((x1 - x0) / 0.4)):
@@ -159,7 +188,7 @@ class _Sheet:
         for k in range(1, math.ceil((y1 - y0) / 0.4)):
             self._clipped(((x0, y0 + 0.4 * k), (x1, y0 + 0.4 * k)), inside, pale)
 
-    def _clipped(self, line, inside, colour) -> None:
+    def _clipped(self, line: Sequence[Point], inside: shapely.Polygon, colour: Colour) -> None:
         cut = inside.intersection(shapely.LineString(line))
         for g in getattr(cut, "geoms", [cut]):
             if g.geom_type == "LineString" and not g.is_empty:
@@ -205,15 +234,8 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
             mid = (a + b) / 2
             sheet.line((mid + low * n, mid + high * n), 0.03)
             for end, sign in ((a, 1), (b, -1)):
-                _arc(
-                    sheet,
-                    end + high * n,
-                    (b - a) / np.linalg.norm(b - a) * sign,
-                    n,
-                    np.linalg.norm(b - a) / 2,
-                    1.4,
-                    (150, 175, 190),
-                )
+                width = float(np.linalg.norm(b - a))
+                _arc(sheet, end + high * n, (b - a) / width * sign, n, width / 2, 1.4, GLASS)
     elif o.kind == "garage_door":
         for v in np.linspace(low, high, 4):
             sheet.line((a + v * n, b + v * n), 0.02, SOFT)
@@ -229,7 +251,15 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
             sheet.line((a + low * n, b + low * n), 0.05)
 
 
-def _arc(sheet: _Sheet, centre, start, normal, radius: float, angle: float, colour) -> None:
+def _arc(
+    sheet: _Sheet,
+    centre: np.ndarray,
+    start: np.ndarray,
+    normal: np.ndarray,
+    radius: float,
+    angle: float,
+    colour: Colour,
+) -> None:
     t = np.linspace(0, angle, 24)[:, None]
     sheet.line(centre + radius * (np.cos(t) * start + np.sin(t) * normal), 0.018, colour)
 
@@ -245,16 +275,17 @@ def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
         flat = p.size[2] < 0.04
         fill = _tint(p.object_class, 0.5 if flat else 0.0)
         sheet.polygon(corners, fill=fill)
-        sheet.line([*corners, corners[0]], 0.016, tuple(max(0, c - (28 if flat else 95)) for c in fill))
+        sheet.line([*corners, corners[0]], 0.016, _darker(fill, 28 if flat else 95))
         _glyph(sheet, p, corners, fill)
 
 
 def _draw_person(sheet: _Sheet, p: Placement) -> None:
     """Shoulders and a head with the face to the front, as architects draw people from above."""
     t = np.linspace(0, 2 * math.pi, 28)
-    oval = lambda rx, ry, dy: (
-        np.asarray(p.position[:2]) + np.stack([rx * np.cos(t), ry * np.sin(t) + dy], 1) @ rotation(p.yaw).T
-    )
+
+    def oval(rx: float, ry: float, dy: float) -> np.ndarray:
+        return np.asarray(p.position[:2]) + np.stack([rx * np.cos(t), ry * np.sin(t) + dy], 1) @ rotation(p.yaw).T
+
     for shape, fill in ((oval(0.23, 0.12, 0.0), (233, 138, 60)), (oval(0.1, 0.11, -0.05), (92, 62, 44))):
         sheet.polygon(shape, fill=fill)
         sheet.line(shape, 0.014, (96, 52, 20))
@@ -300,14 +331,20 @@ TINTS = (
 )
 
 
-def _tint(name: str, pale: float) -> tuple[int, int, int]:
+def _tint(name: str, pale: float) -> Colour:
     base = next((c for words, c in TINTS if any(w in name for w in words)), (216, 210, 202))
-    return tuple(round(c + (255 - c) * pale * 0.6) for c in base)
+    red, green, blue = (round(c + (255 - c) * pale * 0.6) for c in base)
+    return red, green, blue
 
 
-def _glyph(sheet: _Sheet, p: Placement, corners: np.ndarray, fill) -> None:
+def _darker(colour: Colour, by: int) -> Colour:
+    red, green, blue = (max(0, c - by) for c in colour)
+    return red, green, blue
+
+
+def _glyph(sheet: _Sheet, p: Placement, corners: np.ndarray, fill: Colour) -> None:
     """A stroke or two that make the common things readable."""
-    dark = tuple(max(0, c - 60) for c in fill)
+    dark = _darker(fill, 60)
     # corners: back runs from corner 3 to 2 (the front looks along -y of the asset)
     front_left, front_right, back_right, back_left = corners
 
@@ -332,7 +369,7 @@ def _glyph(sheet: _Sheet, p: Placement, corners: np.ndarray, fill) -> None:
         sheet.line((at(0.5, 0), at(0.5, 1)), 0.014, dark)
 
 
-def _draw_stair(sheet: _Sheet, stair) -> None:
+def _draw_stair(sheet: _Sheet, stair: Stair) -> None:
     path = np.asarray(stair.path)[:, :2]
     line = shapely.LineString(path)
     for k in range(1, stair.risers):
@@ -344,7 +381,7 @@ def _draw_stair(sheet: _Sheet, stair) -> None:
     sheet.line(path, 0.025, SOFT)
 
 
-def _draw_graph(sheet: _Sheet, graph, path: tuple[int, ...]) -> None:
+def _draw_graph(sheet: _Sheet, graph: Graph, path: tuple[int, ...]) -> None:
     for i, j in graph.edges:
         sheet.line((graph.positions[i][:2], graph.positions[j][:2]), 0.025, (196, 118, 88))
     for a, b in itertools.pairwise(path):

@@ -2,7 +2,7 @@
 
 World frame: metres, right-handed, z up, the ground floor's floor at z = 0. Rooms tile the
 footprint: a room's polygon runs along the centre lines of its walls, and what one can walk on
-is `room.floor(house)`, the polygon shrunk by half an inner wall. Outer walls grow outwards.
+is `house.floor(room)`, the polygon shrunk by half an inner wall. Outer walls grow outwards.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import itertools
 import json
 import math
 import re
@@ -33,8 +34,8 @@ DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_
 """Opening kinds that a person can walk through."""
 
 
-LARGEST = 30.0
-"""Longest side an object may have, metres."""
+SMALLEST, LARGEST = 1e-4, 30.0
+"""Shortest and longest side an object may have, metres."""
 ID = re.compile(r"[\w'.-]+")
 """What an id looks like; walls and leaves are named '<id>/<part>', so that it holds no slash."""
 
@@ -215,7 +216,7 @@ class House:
             numbers that are not finite, or a house that fails `check`.
         """
         try:
-            body = json.loads(text)
+            body = json.loads(text, object_pairs_hook=_once)
         except (ValueError, RecursionError) as e:
             raise HouseError(f"house file is not JSON ({e}); write it with House.save") from e
         if not isinstance(body, dict) or "schema" not in body:
@@ -258,6 +259,7 @@ def check(house: House) -> None:
     """
     _check_numbers(house)
     _check_ids(house)
+    _check_storeys(house)
     polygons = {}
     for room in house.rooms:
         polygon = shapely.Polygon(room.polygon if len(room.polygon) > 2 else ())
@@ -271,22 +273,48 @@ def check(house: House) -> None:
     _check_walls(house, polygons)
     _check_reach(house)
     for p in house.placements:
-        room = house.room_by_id[p.room]
-        storey, above = house.storey_of(room), 0.5
-        if not storey.elevation - above <= p.position[2] <= storey.elevation + storey.height + above:
+        _check_place(house, polygons, f"object {p.id!r} stands", p.room, p.position)
+        _check_size(house, polygons, p)
+    for x in house.lights:
+        _check_place(house, polygons, f"light {x.id!r} shines", x.room, x.position)
+
+
+def _check_place(
+    house: House, polygons: dict[str, shapely.Polygon], what: str, room: str, position: tuple[float, float, float]
+) -> None:
+    """Refuse what is outside its room, by more than a wall or half a metre of height."""
+    storey, above = house.storey_of(house.room_by_id[room]), 0.5
+    if not storey.elevation - above <= position[2] <= storey.elevation + storey.height + above:
+        raise HouseError(f"{what} at {position} below or above its room {room!r}; change its height")
+    if polygons[room].distance(shapely.Point(position[:2])) > house.outer_wall:
+        raise HouseError(f"{what} at {position} outside its room {room!r}; move it inside or name the room it is in")
+
+
+def _check_size(house: House, polygons: dict[str, shapely.Polygon], p: Placement) -> None:
+    """Refuse an object that no placing would fit into its room."""
+    x0, y0, x1, y1 = polygons[p.room].bounds
+    longest, height = math.hypot(x1 - x0, y1 - y0), house.storey_of(house.room_by_id[p.room]).height
+    if max(p.size[:2]) > longest + house.outer_wall or p.size[2] > height + 0.5:
+        raise HouseError(
+            f"object {p.id!r} of {p.size} m does not fit into its room {p.room!r}, {longest:.1f} m from corner to "
+            f"corner and {height:.2f} m high; make it smaller"
+        )
+
+
+def _check_storeys(house: House) -> None:
+    if not house.storeys or any(not 1.8 <= s.height <= 20 for s in house.storeys):
+        raise HouseError(f"a house needs storeys of 1.8 to 20 m clear height, got {house.storeys}")
+    for k, (below, above) in enumerate(itertools.pairwise(house.storeys)):
+        if above.elevation < below.elevation + below.height - 1e-6:
             raise HouseError(
-                f"object {p.id!r} stands at {p.position} below or above its room {p.room!r}; change its height"
+                f"storey {k + 1} begins at {above.elevation} m, below the ceiling of storey {k} at "
+                f"{below.elevation + below.height} m; list storeys from the ground up, each above the one before"
             )
-        if polygons[p.room].distance(shapely.Point(p.position[:2])) > house.outer_wall:
-            raise HouseError(
-                f"object {p.id!r} stands at {p.position} outside its room {p.room!r}; "
-                "move it inside or name the room it is in"
-            )
+    if empty := sorted(set(range(len(house.storeys))) - {r.storey for r in house.rooms}):
+        raise HouseError(f"the storeys {empty} have no room; put a room on each (Room.storey) or drop them")
 
 
 def _check_numbers(house: House) -> None:
-    if not house.storeys or any(not 1.8 <= s.height <= 20 for s in house.storeys):
-        raise HouseError(f"a house needs storeys of 1.8 to 20 m clear height, got {house.storeys}")
     if not 0 <= house.disorder <= 1:
         raise HouseError(f"disorder should lie between 0 and 1, got {house.disorder}")
     if not 0 < house.inner_wall < 1 or not house.inner_wall <= house.outer_wall < 2:
@@ -302,9 +330,10 @@ def _check_numbers(house: House) -> None:
         if not all(map(math.isfinite, values)):
             raise HouseError(f"{name!r} has a number that is not finite: {values}")
     for p in house.placements:
-        if not all(0 < s <= LARGEST for s in p.size):
+        if not all(SMALLEST <= s <= LARGEST for s in p.size):
             raise HouseError(
-                f"object {p.id!r} has the size {p.size}; all three must be positive and at most {LARGEST} m"
+                f"object {p.id!r} has the size {p.size}; all three must be positive, at least {SMALLEST} and "
+                f"at most {LARGEST:.0f} m"
             )
     for x in house.lights:
         if x.power < 0 or not all(0 <= c <= 1 for c in x.color):
@@ -314,8 +343,14 @@ def _check_numbers(house: House) -> None:
 
 
 def _check_ids(house: House) -> None:
-    for what in ("rooms", "openings", "placements", "lights", "stairs"):
-        ids = [x.id for x in getattr(house, what)]
+    for what, named in (
+        ("rooms", house.rooms),
+        ("openings", house.openings),
+        ("placements", house.placements),
+        ("lights", house.lights),
+        ("stairs", house.stairs),
+    ):
+        ids = [x.id for x in named]
         if len(set(ids)) < len(ids):
             twice = sorted({i for i in ids if ids.count(i) > 1})
             raise HouseError(f"{what} share the ids {twice}; every id must be unique")
@@ -329,13 +364,14 @@ def _check_ids(house: House) -> None:
             raise HouseError(f"room {r.id!r} is on storey {r.storey}, the house has {len(house.storeys)}")
         if r.kind not in ROOM_KINDS:
             raise HouseError(f"room {r.id!r} has the unknown kind {r.kind!r}; use one of {ROOM_KINDS}")
-        if r.accent_wall is not None and not 0 <= r.accent_wall < len(r.polygon):
+        if r.accent_wall is not None and len(r.polygon) > 2 and not 0 <= r.accent_wall < len(r.polygon):
             raise HouseError(
                 f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}"
             )
-    for x in (*house.placements, *house.lights):
-        if x.room not in rooms:
-            raise HouseError(f"{x.id!r} names the unknown room {x.room!r}; rooms are {sorted(rooms)}")
+    places = [*((p.id, p.room) for p in house.placements), *((x.id, x.room) for x in house.lights)]
+    for name, room in places:
+        if room not in rooms:
+            raise HouseError(f"{name!r} names the unknown room {room!r}; rooms are {sorted(rooms)}")
     for x in house.lights:
         if x.placement is not None and x.placement not in house.placement_by_id:
             raise HouseError(
@@ -376,15 +412,15 @@ def _check_openings(house: House, polygons: dict[str, shapely.Polygon]) -> None:
         if o.kind not in OPENING_KINDS:
             raise HouseError(f"opening {o.id!r} has the unknown kind {o.kind!r}; use one of {OPENING_KINDS}")
         segment = shapely.LineString([o.a, o.b])
-        for room in o.rooms:
-            if room is None:
+        for name in o.rooms:
+            if name is None:
                 continue
-            if room not in polygons:
-                raise HouseError(f"opening {o.id!r} names the unknown room {room!r}")
-            if not polygons[room].exterior.buffer(1e-3).covers(segment):
-                raise HouseError(f"opening {o.id!r} does not lie on a wall of room {room!r}")
+            if name not in polygons:
+                raise HouseError(f"opening {o.id!r} names the unknown room {name!r}")
+            if not polygons[name].exterior.buffer(1e-3).covers(segment):
+                raise HouseError(f"opening {o.id!r} does not lie on a wall of room {name!r}")
             if o.kind in DOORS:
-                has_door.add(room)
+                has_door.add(name)
         if not 0 <= o.sill < o.head:
             raise HouseError(f"opening {o.id!r} needs 0 <= sill < head, got {o.sill} and {o.head}")
     for room in house.rooms:
@@ -439,10 +475,11 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
 def _check_reach(house: House) -> None:
     """Every room can be reached from the first one through doors and stairs."""
     ways: dict[str, list[str]] = {r.id: [] for r in house.rooms}
-    pairs = [o.rooms for o in house.openings if o.kind in DOORS and o.rooms[1] is not None]
+    pairs = [o.rooms for o in house.openings if o.kind in DOORS]
     for a, b in (*pairs, *(s.rooms for s in house.stairs)):
-        ways[a].append(b)
-        ways[b].append(a)
+        if b is not None:
+            ways[a].append(b)
+            ways[b].append(a)
     reached, todo = {house.rooms[0].id}, [house.rooms[0].id]
     while todo:
         new = [r for r in ways[todo.pop()] if r not in reached]
@@ -450,6 +487,10 @@ def _check_reach(house: House) -> None:
         todo += new
     if lost := [r.id for r in house.rooms if r.id not in reached]:
         raise HouseError(f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one")
+
+
+WORDS = {float: "a number", int: "an integer", str: "a text", bool: "true or false"}
+"""Types as people call them."""
 
 
 def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
@@ -476,8 +517,15 @@ def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
             raise HouseError(f"{where} should be a finite number below 1e12, got {value!r:.40}")
         return float(value)
     if type(value) is not kind:
-        raise HouseError(f"{where} should be {kind.__name__}, got {value!r}")
+        raise HouseError(f"{where} should be {WORDS.get(kind, kind.__name__)}, got {value!r:.60}")
     return value
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """An object of JSON, refused where a field stands twice."""
+    if twice := sorted({n for n, _ in pairs if sum(n == m for m, _ in pairs) > 1}):
+        raise ValueError(f"the fields {twice} stand there twice")
+    return dict(pairs)
 
 
 def _read_record(kind: typing.Any, value: object, where: str) -> typing.Any:
@@ -485,6 +533,8 @@ def _read_record(kind: typing.Any, value: object, where: str) -> typing.Any:
         raise HouseError(f"{where} should be an object, got {value!r}")
     hints = typing.get_type_hints(kind)
     names = [f.name for f in dataclasses.fields(kind)]
+    if isinstance(value.get("id"), str):
+        where = f"{where} ({value['id']!r:.60})"
     if unknown := sorted(set(value) - set(names)):
         raise HouseError(f"{where} has the unknown fields {unknown}; it may hold {names}")
     required = [f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING]

@@ -83,13 +83,13 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
             isinstance(value, float) and not math.isfinite(value)
         ):
             raise HouseError(f"object {p.id!r} has {name}={value!r}; a value like {known[name]!r} is wanted")
-        if isinstance(known[name], str) and known[name] in MATERIALS:
+        if isinstance(value, str) and known[name] in MATERIALS:
             _check_material(f"object {p.id!r}", value)
 
 
 def _surfaces(house: House, p: Placement, catalogue: Catalogue) -> list[str]:
     """Names of the surfaces of what `p` rests on; the parent's asset may be unknown too."""
-    parent = house.placement_by_id.get(p.parent)
+    parent = house.placement_by_id.get(p.parent) if p.parent is not None else None
     below = catalogue.assets.get(parent.asset) if parent is not None else None
     return [s.name for s in below.surfaces] if below is not None else []
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import two_rooms
 
-from embodied.house.floor_plan import INK, ROOM_COLOURS, draw_plan, save_plan
+from embodied.house.floor_plan import INK, ROOM_COLOURS, paint_plan, save_plan
 from embodied.house.house import Placement
 from embodied.navigation.graph import build_graph
 
@@ -24,7 +24,7 @@ def colour_at(image, house, x: float, y: float) -> np.ndarray:
 
 def test_walls_are_dark_rooms_have_their_colour_and_openings_break_the_walls():
     house = two_rooms()
-    image = draw_plan(house, pixels_per_metre=SCALE, furniture=False)
+    image = paint_plan(house, pixels_per_metre=SCALE, furniture=False)
     assert np.abs(colour_at(image, house, 5.0, 3.0) - INK).max() < 12
     assert np.abs(colour_at(image, house, 9.1, 2.0) - INK).max() < 12
     assert np.abs(colour_at(image, house, 6.0, 0.5) - ROOM_COLOURS["bedroom"]).max() < 12
@@ -35,10 +35,10 @@ def test_walls_are_dark_rooms_have_their_colour_and_openings_break_the_walls():
 
 def test_furniture_and_graph_change_the_picture_where_they_are():
     house = two_rooms()
-    bare = draw_plan(house, pixels_per_metre=SCALE, furniture=False)
-    full = draw_plan(house, pixels_per_metre=SCALE)
+    bare = paint_plan(house, pixels_per_metre=SCALE, furniture=False)
+    full = paint_plan(house, pixels_per_metre=SCALE)
     graph = build_graph(house)
-    walked = draw_plan(house, pixels_per_metre=SCALE, graph=graph, path=graph.path(0, len(graph.ids) - 1))
+    walked = paint_plan(house, pixels_per_metre=SCALE, graph=graph, path=graph.path(0, len(graph.ids) - 1))
     assert (colour_at(bare, house, 1.7, 1.5) != colour_at(full, house, 1.7, 1.5)).any()
     assert (np.asarray(full) != np.asarray(walked)).any()
     assert bare.size == full.size == walked.size
@@ -49,10 +49,10 @@ def test_people_and_the_walker_are_seen_from_above():
     person = Placement("person_1", "hand/person", "person", house.rooms[0].id, (2.5, 3.0, 0.0), 0.0, (0.5, 0.4, 1.7))
     inhabited = dataclasses.replace(house, placements=(*house.placements, person))
     assert (
-        np.abs(colour_at(draw_plan(inhabited, pixels_per_metre=SCALE), house, 2.68, 3.0) - (233, 138, 60)).max() < 30
+        np.abs(colour_at(paint_plan(inhabited, pixels_per_metre=SCALE), house, 2.68, 3.0) - (233, 138, 60)).max() < 30
     )  # a shoulder
     graph = build_graph(house)
-    walked = [draw_plan(house, pixels_per_metre=SCALE, graph=graph, path=(0,), facing=f) for f in (None, 0.0, math.pi)]
+    walked = [paint_plan(house, pixels_per_metre=SCALE, graph=graph, path=(0,), facing=f) for f in (None, 0.0, math.pi)]
     x, y = graph.positions[0][:2]
     blue = [colour_at(image, house, x + 0.2, y)[2] > colour_at(image, house, x + 0.2, y)[0] + 100 for image in walked]
     assert blue == [False, True, False]
@@ -68,4 +68,4 @@ def test_a_plan_is_the_same_every_time_and_saves_as_png(tmp_path):
 
 def test_a_storey_that_is_not_there_is_refused():
     with pytest.raises(ValueError, match="no rooms on storey 3"):
-        draw_plan(two_rooms(), storey=3)
+        paint_plan(two_rooms(), storey=3)
