@@ -19,7 +19,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import as_json, markdown, save
-from embodied.interface import Agent, Episode
+from embodied.interface import Agent, Episode, Place
 from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
@@ -39,21 +39,22 @@ def run_eval(
     data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
     rows, extra = [], {}
     for split in args.split:
-        worlds = data.places(split)
+        whole = data.split(split)
         judged = {**_without_learning(), **hanna_policies(agent, split_of(data, split, encoder).bank)}
         names = args.only or list(judged)
         if unknown := sorted(set(names) - set(judged)):
             raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
 
-        def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds=worlds) -> None:
+        def keep(
+            name: str, episodes: Sequence[Episode], split: str = split, worlds: Mapping[str, Place] = whole.worlds
+        ) -> None:
             if args.out:
                 save_lines(args.out / episodes_file(split, name), episodes)
             if name == "learned":
                 extra[split] = about(episodes, worlds)
 
         rows += evaluate(
-            data,
-            split,
+            whole,
             {n: judged[n] for n in names},
             seed=args.seed,
             limit=args.tasks,

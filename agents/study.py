@@ -324,8 +324,7 @@ class _Judge:
                     self.behaviour[line.key, split] = about(episodes, self.data.places(split))
 
             (row,) = evaluate(
-                self.data,
-                split,
+                self.data.split(split),
                 {line.key: self._policy(line, split)},
                 seed=self.setting.seed,
                 limit=self.setting.tasks,

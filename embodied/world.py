@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib.metadata
 import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tqdm import tqdm
 
 from assets.cache import digest
+from assets.closure import code_digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
@@ -36,16 +36,6 @@ KEPT = 8
 LIGHTS = {"fast": "draft"}
 """Light settings by the name of a picture's light, where embodied.light calls them otherwise."""
 log = logging.getLogger(__name__)
-ROOT = Path(__file__).resolve().parent.parent
-PICTURE_SOURCES = (
-    "assets/**/*.py",
-    "assets/data/*.json",
-    "embodied/light/*.py",
-    "embodied/house/house.py",
-    "embodied/scene/*.py",
-    "embodied/render/*.py",
-)
-"""Files that decide what a picture shows; a cached picture made by other versions of them is not used."""
 
 
 class World:
@@ -92,8 +82,6 @@ class World:
         return {
             "house": self.house.digest,
             "nodes": digest(self.graph.positions.tolist()),
-            "mujoco": importlib.metadata.version("mujoco"),
-            "code": code_digest(),
             "own": self.catalogue.own_digests(p.asset for p in self.house.placements),
         }
 
@@ -103,7 +91,7 @@ class World:
         return (
             self._origin
             | dataclasses.asdict(self.pictures)
-            | {"light": self.pictures.lit_by, "renderer": str(gl.info())}
+            | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
         )
 
     @functools.cached_property
@@ -240,7 +228,8 @@ class World:
 
     @functools.cached_property
     def _sightings(self) -> SightingTable:
-        path = self.cache / "sightings" / f"{digest(self._origin, FACE)[:32]}.npz"
+        code = code_digest(*makers(PictureSettings()), "embodied.render.sightings")
+        path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_table(path)
         if table is None:
             with Renderer(self.house, self.catalogue, size=FACE) as renderer:
@@ -296,8 +285,13 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object]) -> str:
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
-@functools.cache
-def code_digest() -> str:
-    """Hex digest of the sources that decide what a picture shows."""
-    files = sorted({f for pattern in PICTURE_SOURCES for f in ROOT.glob(pattern)})
-    return digest(*(f.read_bytes() for f in files))[:16]
+def makers(pictures: PictureSettings) -> tuple[str, ...]:
+    """Modules that draw and keep such pictures; cached pictures made by other code than theirs are not used."""
+    modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
+    if pictures.lit:
+        modules.append("embodied.light.baking")
+    if pictures.backend == "filament":
+        modules.append("embodied.render.filament")
+    if pictures.quality in TRACED:
+        modules.append("embodied.light.reference")
+    return tuple(modules)

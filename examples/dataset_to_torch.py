@@ -36,7 +36,8 @@ def samples(data: Dataset, split: str, classes: list[str]) -> TensorDataset:
             tables[name] = seen_features(world, catalogue, cache)
     source = FeatureTable(tables)
     seen, taken = [], []
-    for frame in rollout(data.environment(split), Shortest(), data.tasks(split), seed=0):
+    whole = data.split(split)
+    for frame in rollout(whole.make_env, Shortest(), whole.tasks, seed=0):
         goal = frame.situation.task.goal
         if not isinstance(frame.step.action, Move) or not isinstance(goal, FindObject):
             continue

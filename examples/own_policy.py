@@ -58,7 +58,7 @@ def main() -> None:
         build_dataset(DatasetConfig("find", "tiny", area=(45.0, 60.0)), args.data, default_cache())
     data = Dataset(args.data)
     agents = {name: agent("find", name) for name in ("random walk", "forward 10", "shortest")}
-    rows = evaluate(data, "test_unseen", {"least tried": LeastTried(), **agents})
+    rows = evaluate(data.split("test_unseen"), {"least tried": LeastTried(), **agents})
     print(markdown(rows, ("success", "spl", "navigation error", "steps")))
 
 

@@ -53,7 +53,7 @@ def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
     for split in data.splits:
         tasks = data.tasks(split)
         assert tasks, f"{split} is empty"
-        episodes = play(data.environment(split), expert, tasks, seed=0)
+        episodes = play(data.split(split).make_env, expert, tasks, seed=0)
         assert all(metrics.success(e, data.place(e.task.world).graph) for e in episodes), split
     assert data.table().count("\n") == 2 + len(data.splits)
 
@@ -72,7 +72,7 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
     heard = {}
     for split in ("train", "test_seen"):
-        episodes = play(data.environment(split), PrivilegedAsking(Shortest(), ask_every_5), data.tasks(split), seed=0)
+        episodes = play(data.split(split).make_env, PrivilegedAsking(Shortest(), ask_every_5), data.tasks(split), seed=0)
         heard[split] = {s.reply.subtask.id for e in episodes for s in e.steps if isinstance(s.action, Ask)}
     assert heard["train"] and heard["test_seen"] and not heard["train"] & heard["test_seen"]
 

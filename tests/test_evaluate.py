@@ -45,7 +45,7 @@ def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
     data = build(tmp_path / "d", tmp_path / "c", kind)
     split = "test_unseen_env" if kind == "hari" else "test_unseen"
-    rows = {r.agent: r.values for r in evaluate(data, split, {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
+    rows = {r.agent: r.values for r in evaluate(data.split(split), {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
     assert rows["shortest"]["success"].mean == 1
     assert rows["random walk"]["success"].mean < 0.5
     if kind == "hanna":

@@ -126,8 +126,7 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     policies = hanna_policies(agent, bank)
     episodes = []
     evaluate(
-        data,
-        "test_unseen",
+        data.split("test_unseen"),
         {"p": policies["learned, perfect interpretation"]},
         seed=0,
         batch=4,

@@ -11,7 +11,6 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied import world as worlds
 from embodied.interface import Sight
 from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
@@ -141,7 +140,3 @@ def test_a_misspelt_setting_is_refused(house, tmp_path):
 def test_unknown_quality_is_refused_at_once(house, tmp_path):
     with pytest.raises(ValueError, match="pretty"):
         make(house, tmp_path, quality="pretty")
-
-
-def test_sources_of_pictures_exist():
-    assert all(any(worlds.ROOT.glob(p)) for p in worlds.PICTURE_SOURCES)

@@ -29,15 +29,10 @@ def split_of(
     data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None, houses: int | None = None
 ) -> Split:
     """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses."""
-    names = data.names(name)[:houses]
-    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in names}
-    tasks = [t for t in data.tasks(name) if t.world in paths]
-    return Split(
-        data.places(name),
-        tasks if limit is None else spread(tasks, limit),
-        data.environment(name),
-        load_bank(paths, encoder.digest).to(device),
-    )
+    split = data.split(name, houses=houses)
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in split.worlds}
+    tasks = split.tasks if limit is None else spread(split.tasks, limit)
+    return Split(split.worlds, tasks, split.make_env, load_bank(paths, encoder.digest).to(device))
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:

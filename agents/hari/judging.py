@@ -13,6 +13,7 @@ from agents.hari.policy import policy_of
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
 from agents.hari.run import CONDITIONS, ground_of, rules_of
 from embodied.datasets.store import Dataset
+from embodied.envs.base import HelpEnv
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
@@ -72,18 +73,19 @@ def judge(
         raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
     rows = []
     for split in splits:
-        tasks = [dataclasses.replace(t, horizon=agent.config.horizon) for t in spread(data.tasks(split), limit)]
+        whole = data.split(split, hari=rules_of(agent.config))
+        tasks = [dataclasses.replace(t, horizon=agent.config.horizon) for t in spread(whole.tasks, limit)]
+        graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):
-            episodes = _play(data, split, judged[name], tasks, agent, seed)
-            rows.append(row(name, split, episodes, {n: p.graph for n, p in data.places(split).items()}, seed=seed))
+            episodes = _play(whole.make_env, judged[name], tasks, agent, seed)
+            rows.append(row(name, split, episodes, graphs, seed=seed))
             if keep:
                 keep(split, name, episodes)
     return rows
 
 
 def _play(
-    data: Dataset, split: str, policy: Agent, tasks: Sequence[Task], agent: HariAgent, seed: int
+    make_env: Callable[[], HelpEnv], policy: Agent, tasks: Sequence[Task], agent: HariAgent, seed: int
 ) -> list[Episode]:
-    make_env = data.environment(split, hari=rules_of(agent.config))
     with torch.inference_mode():
         return play(make_env, policy, tasks, seed=seed, batch=agent.config.batch)

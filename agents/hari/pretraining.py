@@ -224,10 +224,7 @@ def _validate(
     with open(folder / "validation.jsonl", "a") as f:
         f.write(json.dumps({"update": update, "success": success, "episodes": len(tasks)}) + "\n")
     kept = success >= progress.best
-    note(
-        f"validation on {len(tasks)} tasks after {update} updates: success {100 * success:.1f} %"
-        + "; kept" * kept
-    )
+    note(f"validation on {len(tasks)} tasks after {update} updates: success {100 * success:.1f} %" + "; kept" * kept)
     if kept:
         save_executor(executor, folder / "best.safetensors")
         return dataclasses.replace(progress, best=success, best_update=update)

@@ -50,11 +50,11 @@ def rules_of(config: IntentionConfig) -> HariRules:
 
 def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
     """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
-    makers: dict[str, Callable[[], HelpEnv]] = {s: data.environment(s, hari=rules_of(config)) for s in splits}
+    parts = [data.split(s, hari=rules_of(config)) for s in splits]
     each = None if limit is None else -(-limit // len(splits))
-    tasks = [t for s in splits for t in spread(data.tasks(s), each)]
-    places: Mapping[str, Place] = {name: place for s in splits for name, place in data.places(s).items()}
-    return Ground(places, tasks, makers[splits[0]] if len(splits) == 1 else _over(makers[splits[0]], places))
+    tasks = [t for part in parts for t in spread(part.tasks, each)]
+    places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
+    return Ground(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
 
 
 def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:

@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
         agents = {name: agent(args.kind, name, worlds) for name in names}
-        rows += evaluate(data, split, agents, seed=args.seed, limit=args.tasks, keep=keep, worlds=worlds, watch=watch)
+        whole = data.split(split, worlds=worlds)
+        rows += evaluate(whole, agents, seed=args.seed, limit=args.tasks, keep=keep, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
         if theirs:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import os
 import shutil
@@ -16,9 +15,10 @@ import joblib
 
 from assets.cache import digest, draft_prefix, write_bytes
 from assets.catalogue import load_catalogue
+from assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
-from embodied.datasets.scale import Scale, Split, quota, scale
+from embodied.datasets.scale import Scale, SplitPlan, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.people import add_people, meet
 from embodied.house.house import House, HouseError
@@ -33,20 +33,6 @@ from embodied.world import World, open_world
 
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
-MAKERS = (
-    "assets",
-    "embodied/assistants",
-    "embodied/datasets",
-    "embodied/generate",
-    "embodied/house",
-    "embodied/language",
-    "embodied/navigation",
-    "embodied/render",
-    "embodied/scene",
-    "embodied/tasks",
-    "embodied",
-)
-"""Folders of the code and the catalogue that decide what is in a data set; of the last, its own modules only."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
@@ -103,7 +89,7 @@ class UnitFacts:
     nodes: int
     routes: int
     tasks: Mapping[str, int]
-    """Split to number of tasks."""
+    """SplitPlan to number of tasks."""
 
 
 Watch = Callable[[Iterable[str], int], Iterable[str]]
@@ -288,7 +274,7 @@ def _write_unit(
     write_bytes(home / "unit.json", (body + "\n").encode())
 
 
-def shares(unit: Unit, config: DatasetConfig) -> list[tuple[Split, int]]:
+def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
     """The splits that a house serves, with its even share of their tasks."""
     wanted = scale(config.scale, config.kind)
     served = []
@@ -300,7 +286,7 @@ def shares(unit: Unit, config: DatasetConfig) -> list[tuple[Split, int]]:
     return served
 
 
-def _part(split: Split, unit: Unit, kind: str) -> str:
+def _part(split: SplitPlan, unit: Unit, kind: str) -> str:
     """Nothing is held out in unseen houses."""
     return "main_unseen" if kind == "hari" and unit.group in ("val", "test") else split.part
 
@@ -325,15 +311,9 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
         write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
 
 
-@functools.cache
 def program() -> str:
     """A digest of the code and the catalogue that make data sets: what one of them began, only the same one may finish."""
-    root = Path(__file__).parents[2]
-    files = [
-        f for name in MAKERS for f in ((root / name).glob("*") if name == "embodied" else (root / name).rglob("*"))
-    ]
-    texts = {f.relative_to(root).as_posix(): digest(f.read_bytes()) for f in files if f.suffix in (".py", ".json")}
-    return digest(texts)[:16]
+    return code_digest(__name__)
 
 
 def write_index(config: DatasetConfig, folder: Path) -> Path:

@@ -26,7 +26,9 @@ def run_on_ray(job: Callable[..., str], work: Sequence[Any], arguments: tuple, a
     try:
         import ray
     except ImportError as e:
-        raise UnableError("--ray needs Ray; install it with: pip install 'embodied-houses[ray]', or use --workers") from e
+        raise UnableError(
+            "--ray needs Ray; install it with: pip install 'embodied-houses[ray]', or use --workers"
+        ) from e
     started = not ray.is_initialized()
     if started:
         ray.init(address=None if address == "local" else address, log_to_driver=False, include_dashboard=False)

@@ -10,7 +10,7 @@ KINDS = ("find", "vln", "vnla", "hanna", "hari")
 
 
 @dataclass(frozen=True)
-class Split:
+class SplitPlan:
     """One split: which houses it draws from and how many tasks it wants."""
 
     name: str
@@ -33,31 +33,33 @@ class Scale:
     name: str
     houses: Mapping[str, int]
     """Group to number of houses."""
-    splits: tuple[Split, ...]
+    splits: tuple[SplitPlan, ...]
 
 
-def _seen_and_unseen(train: int, val_seen: int, val_unseen: int, test_seen: int, test_unseen: int) -> tuple[Split, ...]:
+def _seen_and_unseen(
+    train: int, val_seen: int, val_unseen: int, test_seen: int, test_unseen: int
+) -> tuple[SplitPlan, ...]:
     return (
-        Split("train", "train", train),
-        Split("val_seen", "train", val_seen, "val"),
-        Split("val_unseen", "val", val_unseen),
-        Split("test_seen", "train", test_seen, "test"),
-        Split("test_unseen", "test", test_unseen),
+        SplitPlan("train", "train", train),
+        SplitPlan("val_seen", "train", val_seen, "val"),
+        SplitPlan("val_unseen", "val", val_unseen),
+        SplitPlan("test_seen", "train", test_seen, "test"),
+        SplitPlan("test_unseen", "test", test_unseen),
     )
 
 
-def _hari(sizes: tuple[int, int, int, tuple[int, int, int], tuple[int, int, int]]) -> tuple[Split, ...]:
+def _hari(sizes: tuple[int, int, int, tuple[int, int, int], tuple[int, int, int]]) -> tuple[SplitPlan, ...]:
     pretrain, pretrain_val, train, val, test = sizes
     splits = [
-        Split("pretrain", "train", pretrain, "pretrain"),
-        Split("pretrain_val", "train", pretrain_val, "pretrain_val"),
-        Split("train", "train", train, groups=("extra",)),
+        SplitPlan("pretrain", "train", pretrain, "pretrain"),
+        SplitPlan("pretrain_val", "train", pretrain_val, "pretrain_val"),
+        SplitPlan("train", "train", train, groups=("extra",)),
     ]
     for when, (start, other, env) in (("val", val), ("test", test)):
         splits += [
-            Split(f"{when}_unseen_start", "train", start, f"start_{when}", ("extra",)),
-            Split(f"{when}_unseen_object", "train", other, f"object_{when}", ("extra",)),
-            Split(f"{when}_unseen_env", when, env),
+            SplitPlan(f"{when}_unseen_start", "train", start, f"start_{when}", ("extra",)),
+            SplitPlan(f"{when}_unseen_object", "train", other, f"object_{when}", ("extra",)),
+            SplitPlan(f"{when}_unseen_env", when, env),
         ]
     return tuple(splits)
 
@@ -76,7 +78,7 @@ training and 1,020 seen validation instructions, 11 scenes with 2,349, 18 scenes
 were published later hold 14,039 and 1,021). Room-to-Room has no seen test split; ours has one of the size
 of its seen validation split."""
 
-PAPER: Mapping[str, tuple[Mapping[str, int], tuple[Split, ...]]] = {
+PAPER: Mapping[str, tuple[Mapping[str, int], tuple[SplitPlan, ...]]] = {
     "hanna": TABLE_4_2,
     "hari": TABLE_E_1,
     "vln": ROOM_TO_ROOM,
@@ -88,7 +90,7 @@ PAPER: Mapping[str, tuple[Mapping[str, int], tuple[Split, ...]]] = {
 
 def _small(
     kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int
-) -> tuple[Mapping[str, int], tuple[Split, ...]]:
+) -> tuple[Mapping[str, int], tuple[SplitPlan, ...]]:
     train, extra, val, test = houses
     if kind == "hari":
         third = max(1, judged // 3)

@@ -58,6 +58,19 @@ class StoredPlace:
         return self.house.name
 
 
+@dataclass(frozen=True, eq=False)
+class SplitData:
+    """A split of a data set, ready to be played."""
+
+    name: str
+    worlds: Mapping[str, Place]
+    """By house name, in the data set's order."""
+    tasks: tuple[Task, ...]
+    """House by house."""
+    make_env: Callable[[], HelpEnv]
+    """All that it makes share assistants and caches."""
+
+
 class Dataset:
     """A data set on disk. Houses, graphs and tasks are read when first asked for and kept."""
 
@@ -176,30 +189,38 @@ class Dataset:
             tasks = [self._with_limit(t, limits) for t in tasks]
         return tuple(tasks)
 
-    def environment(
+    def split(
         self,
-        split: str,
+        name: str,
         *,
+        houses: int | None = None,
         language: Language | None = None,
         worlds: Mapping[str, Place] | None = None,
         hari: HariRules = AS_PRINTED,
-    ) -> Callable[[], HelpEnv]:
-        """A maker of environments for the tasks of a split; all it makes share their caches.
+    ) -> SplitData:
+        """Everything that playing a split needs.
 
         Args:
+          houses: only its first so many houses; all if None.
+          language: of VNLA's advisor.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
+
+        Raises:
+          DatasetError: an unknown split, or files that were lost or changed.
         """
-        places: Mapping[str, Place] = worlds or self.places(split)
-        return environment_maker(
+        names = self.names(name)[:houses]
+        places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
+        make_env = environment_maker(
             self.kind,
             places,
-            wording=ANNA_SPLIT.get(split, ""),
+            wording=ANNA_SPLIT.get(name, ""),
             language=language,
-            routes={name: self.routes(name) for name in places} if self.kind == "hanna" else None,
+            routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
             hari=hari,
         )
+        return SplitData(name, places, tuple(t for t in self.tasks(name) if t.world in places), make_env)
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""

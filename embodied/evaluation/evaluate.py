@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
-from embodied.interface import Agent, Episode, Place, SeenPlace, Task
+from embodied.interface import Agent, Episode, SeenPlace, Task
 from embodied.policies.baselines import (
     Forward10,
     HalfwaySkyline,
@@ -25,7 +25,7 @@ from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
 from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Dataset
+    from embodied.datasets.store import SplitData
 
 PLAIN: Mapping[str, Callable[[], Agent]] = {"random walk": RandomWalk, "forward 10": Forward10, "shortest": Shortest}
 AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
@@ -92,8 +92,7 @@ def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
 
 
 def evaluate(
-    data: Dataset,
-    split: str,
+    split: SplitData,
     agents: Mapping[str, Agent],
     *,
     seed: int = 0,
@@ -101,22 +100,20 @@ def evaluate(
     batch: int = 1,
     keep: Callable[[str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
-    worlds: Mapping[str, Place] | None = None,
 ) -> list[Row]:
     """One row per agent, over the same tasks.
 
     Args:
+      limit: at most so many tasks, from all houses alike.
       keep: is given each agent's name and episodes (to save them).
       watch: wraps the iterator over agent names (a progress bar).
-      worlds: worlds with pictures by house name, for agents that look.
     """
-    tasks = spread(data.tasks(split), limit)
-    graphs = {name: data.place(name).graph for name in data.names(split)}
-    make_env = data.environment(split, worlds=worlds)
+    tasks = spread(split.tasks, limit)
+    graphs = {name: world.graph for name, world in split.worlds.items()}
     rows = []
     for name in watch(agents):
-        episodes = play(make_env, agents[name], tasks, seed=seed, batch=batch, agent=name)
-        rows.append(row(name, split, episodes, graphs, seed=seed))
+        episodes = play(split.make_env, agents[name], tasks, seed=seed, batch=batch, agent=name)
+        rows.append(row(name, split.name, episodes, graphs, seed=seed))
         if keep:
             keep(name, episodes)
     return rows

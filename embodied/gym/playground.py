@@ -13,6 +13,7 @@ import numpy as np
 
 from assets.cache import digest, write_bytes
 from assets.catalogue import load_catalogue
+from assets.closure import code_digest
 from assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import DatasetConfig, make_dataset_house
@@ -26,7 +27,7 @@ from embodied.interface import Language, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
-from embodied.world import open_world
+from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -78,7 +79,8 @@ def make_playground(
             names = whole.names(split)
             drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
             worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-        tasks, make_env = whole.tasks(split), whole.environment(split, worlds=worlds)
+        chosen = whole.split(split, worlds=worlds)
+        tasks, make_env = chosen.tasks, chosen.make_env
     features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
     return Playground(worlds, tasks, make_env, features)
 
@@ -112,11 +114,9 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
-    path = (
-        cache
-        / "semantic"
-        / f"{digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes)[:32]}.npy"
-    )
+    code = code_digest(*makers(PictureSettings()), "embodied.render.sightings", "embodied.gym.semantic_features")
+    key = digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes, code)
+    path = cache / "semantic" / f"{key[:32]}.npy"
     with contextlib.suppress(OSError, ValueError, EOFError):  # absent or damaged: made anew
         known = np.load(path, allow_pickle=False)
         if known.ndim == 3 and known.shape[::2] == (len(world.graph.positions), len(classes) + len(ROOM_KINDS)):

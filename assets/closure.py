@@ -1,0 +1,143 @@
+"""What code makes a product: the modules that a module imports, the data beside them, and the libraries they use.
+
+Products that are kept on disk carry `code_digest` of the module that made them in their key, so that none made by
+other code is believed. Comments, docstrings and formatting do not count.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import importlib.metadata
+import sys
+import types
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from assets.cache import digest
+
+ROOT = Path(__file__).resolve().parent.parent
+OURS = ("assets", "embodied", "agents", "viz")
+"""Packages whose modules are followed; all others are libraries."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """All that some modules import, themselves included, late imports inside functions too."""
+
+    modules: Mapping[str, Path]
+    """Module to its file, sorted."""
+    libraries: tuple[str, ...]
+    """Top names of what is neither ours nor Python's, sorted."""
+
+
+def closure(*makers: str, root: Path = ROOT) -> Closure:
+    """The import closure of modules, read from their sources; what is imported for type checkers only is left out.
+
+    Args:
+      makers: dotted names of modules.
+      root: the folder that holds our packages.
+
+    Raises:
+      ModuleNotFoundError: a maker is no module of ours.
+    """
+    found: dict[str, Path] = {}
+    libraries: set[str] = set()
+    waiting = list(makers)
+    for name in makers:
+        if _file_of(name, root) is None:
+            raise ModuleNotFoundError(f"{name!r} is no module in {root}", name=name)
+    while waiting:
+        name = waiting.pop()
+        path = _file_of(name, root)
+        if name in found or path is None:
+            continue
+        found[name] = path
+        names = list(imported(ast.parse(path.read_bytes()), name, package=path.name == "__init__.py"))
+        ours = [n for n in names if n.split(".")[0] in OURS]
+        waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
+        libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in (*OURS, *sys.stdlib_module_names))
+    return Closure(dict(sorted(found.items())), tuple(sorted(libraries)))
+
+
+def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
+    """Dotted names that a module imports when it runs: modules, and what may be modules in packages."""
+    waiting: list[ast.AST] = list(tree.body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
+            waiting += node.orelse
+            continue
+        waiting += ast.iter_child_nodes(node)
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(node, module, package)
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and _last_name(node.func) == "import_module":
+            yield from (a.value for a in node.args[:1] if isinstance(a, ast.Constant) and isinstance(a.value, str))
+
+
+@functools.cache
+def code_digest(*makers: str, root: Path = ROOT) -> str:
+    """Hex digest of what the import closure of `makers` does: its code, data files beside it, versions of libraries."""
+    whole = closure(*makers, root=root)
+    data = sorted({f for path in whole.modules.values() for f in (path.parent / "data").glob("*") if f.is_file()})
+    return digest(
+        {name: _code_of(path) for name, path in whole.modules.items()},
+        {f.relative_to(root).as_posix(): digest(f) for f in data},
+        {name: _version(name) for name in whole.libraries},
+    )[:16]
+
+
+def _last_name(node: ast.expr) -> str:
+    """'b' of the expressions b and a.b; '' of others."""
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+
+
+def _file_of(module: str, root: Path) -> Path | None:
+    path = root.joinpath(*module.split("."))
+    for file in (path / "__init__.py", path.with_suffix(".py")):
+        if module.split(".")[0] in OURS and file.is_file():
+            return file
+    return None
+
+
+def _absolute(node: ast.ImportFrom, module: str, package: bool) -> str:
+    """The module that `from ... import` names, seen from `module`."""
+    if not node.level:
+        return node.module or ""
+    above = module.split(".")[: None if package and node.level == 1 else (1 if package else 0) - node.level]
+    return ".".join([*above, *([node.module] if node.module else [])])
+
+
+@functools.cache
+def _code_of(path: Path) -> str:
+    """Digest of the compiled module, without docstrings and positions."""
+    code = compile(path.read_bytes(), path.name, "exec", dont_inherit=True, optimize=2)
+    return digest(_described(code))
+
+
+def _described(value: object) -> object:
+    """Constants and code objects as plain JSON that says the same in every process."""
+    if isinstance(value, types.CodeType):
+        names = [value.co_names, value.co_varnames, value.co_freevars, value.co_cellvars, value.co_name]
+        counts = [value.co_argcount, value.co_posonlyargcount, value.co_kwonlyargcount, value.co_flags]
+        return [value.co_code.hex(), names, counts, [_described(c) for c in value.co_consts]]
+    if isinstance(value, tuple):
+        return [_described(v) for v in value]
+    if isinstance(value, frozenset):
+        return sorted(repr(v) for v in value)
+    return repr(value)
+
+
+@functools.cache
+def _distributions() -> Mapping[str, list[str]]:
+    return importlib.metadata.packages_distributions()
+
+
+def _version(library: str) -> str:
+    """Version of the distribution that a top name belongs to; '' where it is not installed."""
+    return " ".join(sorted({f"{d} {importlib.metadata.version(d)}" for d in _distributions().get(library, ())}))

@@ -1,0 +1,109 @@
+"""Cache keys follow the code: what a maker imports changes them, what it does not import leaves them."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import assets.closure
+from assets.closure import ROOT, closure, code_digest
+from embodied.render.pictures import PictureSettings
+from embodied.world import makers
+
+TOP = "from __future__ import annotations"
+
+
+@pytest.fixture
+def tree(tmp_path) -> Path:
+    """A copy of the sources, to be edited."""
+    for package in ("assets", "embodied"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "*.npz"))
+    return tmp_path
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def key(root: Path, *modules: str) -> str:
+    """The digest, read anew."""
+    code_digest.cache_clear()
+    assets.closure._code_of.cache_clear()
+    return code_digest(*modules, root=root)
+
+
+def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
+    lit = makers(PictureSettings(quality="normal", backend="filament"))
+    before = key(tree, *lit)
+    edit(tree / "embodied/cli/demo.py", "import argparse", "import argparse\nEXTRA = 1")
+    edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 64  # texels")
+    edit(tree / "embodied/render/filament.py", '"""Colours by Filament', '"""Colors by Filament')
+    assert key(tree, *lit) == before, "code that draws nothing, comments and docstrings"
+    edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 65")
+    assert key(tree, *lit) != before
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("embodied/house/house.py", "inner_wall: float = 0.12", "inner_wall: float = 0.13"),
+        ("embodied/scene/walls.py", TOP, f"{TOP}\nX = 1"),
+        (
+            "assets/importing/meshing.py",
+            "from __future__ import annotations",
+            "from __future__ import annotations\nX = 1",
+        ),
+        ("assets/built/__init__.py", TOP, f"{TOP}\nX = 1"),
+    ],
+)
+def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
+    """The house's record, and what is built by name inside a function (assets.built), count."""
+    unlit = makers(PictureSettings())
+    before = key(tree, *unlit)
+    edit(tree / file, old, new)
+    assert key(tree, *unlit) != before
+
+
+def test_data_beside_the_code_is_in_the_key(tree):
+    before = key(tree, "assets.catalogue")
+    data = next(p for p in sorted((tree / "assets/data").iterdir()) if p.suffix == ".json")
+    data.write_text(data.read_text() + "\n")
+    assert key(tree, "assets.catalogue") != before
+
+
+def test_pictures_depend_on_what_draws_them():
+    unlit, lit = (set(closure(*makers(PictureSettings(quality=q))).modules) for q in ("unlit", "normal"))
+    assert "embodied.light.baking" in lit and not any(m.startswith("embodied.light") for m in unlit)
+    assert "embodied.house.house" in unlit and not any(m.startswith("embodied.generate") for m in lit)
+    assert "embodied.light.reference" in closure(*makers(PictureSettings(quality="glossy"))).modules
+
+
+def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
+    (tmp_path / "embodied").mkdir()
+    files = {
+        "__init__": "",
+        "a": "from typing import TYPE_CHECKING\nfrom . import b\nif TYPE_CHECKING:\n    import embodied.never\n",
+        "b": "def f():\n    from embodied.c import C\n    import numpy.linalg\n    return C\n",
+        "c": "import importlib\nC = importlib.import_module('embodied.d')\n",
+        "d": "",
+        "never": "",
+    }
+    for name, text in files.items():
+        (tmp_path / "embodied" / f"{name}.py").write_text(text)
+    whole = closure("embodied.a", root=tmp_path)
+    assert list(whole.modules) == ["embodied", "embodied.a", "embodied.b", "embodied.c", "embodied.d"]
+    assert whole.libraries == ("numpy",)
+    with pytest.raises(ModuleNotFoundError, match=r"embodied\.nowhere"):
+        closure("embodied.nowhere", root=tmp_path)
+
+
+def test_versions_of_libraries_are_in_the_key(monkeypatch):
+    assert "mujoco" in closure(*makers(PictureSettings())).libraries
+    before = key(ROOT, *makers(PictureSettings()))
+    monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mujoco" else "")
+    assert key(ROOT, *makers(PictureSettings())) != before
+    code_digest.cache_clear()
