@@ -54,7 +54,7 @@ def closure(*makers: str, root: Path = ROOT) -> Closure:
         if name in found or path is None:
             continue
         found[name] = path
-        names = list(imported(ast.parse(path.read_bytes()), name, package=path.name == "__init__.py"))
+        names = _names_in(path.read_bytes(), name, path.name == "__init__.py")
         ours = [n for n in names if n.split(".")[0] in OURS]
         waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
         libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in (*OURS, *sys.stdlib_module_names))
@@ -86,10 +86,15 @@ def code_digest(*makers: str, root: Path = ROOT) -> str:
     whole = closure(*makers, root=root)
     data = sorted({f for path in whole.modules.values() for f in (path.parent / "data").glob("*") if f.is_file()})
     return digest(
-        {name: _code_of(path) for name, path in whole.modules.items()},
+        {name: _code_of(path.read_bytes()) for name, path in whole.modules.items()},
         {f.relative_to(root).as_posix(): digest(f) for f in data},
         {name: _version(name) for name in whole.libraries},
     )[:16]
+
+
+@functools.lru_cache(maxsize=1024)
+def _names_in(source: bytes, module: str, package: bool) -> tuple[str, ...]:
+    return tuple(imported(ast.parse(source), module, package=package))
 
 
 def _last_name(node: ast.expr) -> str:
@@ -113,11 +118,10 @@ def _absolute(node: ast.ImportFrom, module: str, package: bool) -> str:
     return ".".join([*above, *([node.module] if node.module else [])])
 
 
-@functools.cache
-def _code_of(path: Path) -> str:
+@functools.lru_cache(maxsize=1024)
+def _code_of(source: bytes) -> str:
     """Digest of the compiled module, without docstrings and positions."""
-    code = compile(path.read_bytes(), path.name, "exec", dont_inherit=True, optimize=2)
-    return digest(_described(code))
+    return digest(_described(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 
 def _described(value: object) -> object:

@@ -32,7 +32,6 @@ def edit(path: Path, old: str, new: str) -> None:
 def key(root: Path, *modules: str) -> str:
     """The digest, read anew."""
     code_digest.cache_clear()
-    assets.closure._code_of.cache_clear()
     return code_digest(*modules, root=root)
 
 
