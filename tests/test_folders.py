@@ -235,7 +235,7 @@ def test_hannas_forward_ten_walks_through_the_folder_as_ours_walks_through_the_d
     data, home = data_sets["hanna"], folders / "hanna" / "data"
     lists = read(home / "hanna/panoramic_action_space.json")
     for split in ("train", "val_unseen", "test_unseen"):
-        episodes = play(data.environment(split), agent("hanna", "forward 10"), data.tasks(split), seed=0)
+        episodes = play(data.split(split).make_env, agent("hanna", "forward 10"), data.tasks(split), seed=0)
         for item, episode in zip(read(home / f"hanna/hanna_{split}.json"), episodes, strict=True):
             ids = data.place(episode.task.world).graph.ids
             assert forward_ten(lists, item) == [ids[v] for v in metrics.without_repeats(episode.nodes)]

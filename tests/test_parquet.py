@@ -15,7 +15,7 @@ from embodied.records import from_json, save_lines
 
 def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
     data = build(tmp_path / "d", tmp_path / "c")
-    episodes = play(data.environment("val_unseen"), agent("hanna", "ask every 5"), data.tasks("val_unseen"), seed=0)
+    episodes = play(data.split("val_unseen").make_env, agent("hanna", "ask every 5"), data.tasks("val_unseen"), seed=0)
     save_lines(tmp_path / "episodes_val.jsonl", episodes)
     files = export_parquet(data, tmp_path / "out", [tmp_path / "episodes_val.jsonl"])
 
