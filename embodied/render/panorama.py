@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+import threading
 from dataclasses import dataclass
 
 import cv2
@@ -103,49 +104,73 @@ class Panorama:
         return {"rgb": self._rgb, "depth": self._depth, "ids": self._ids}[channel](grid)
 
     @functools.cached_property
-    def _padded_rgb(self) -> np.ndarray:
-        """(6 (s + 2), s + 2, 3): the faces below each other, each with a border taken from its neighbours."""
+    def _padded_rgba(self) -> np.ndarray:
+        """(6 (s + 2), s + 2, 4): the faces below each other, each with a border taken from its neighbours.
+
+        The fourth channel is empty: OpenCV resamples four channels twice as fast as three.
+        """
         s, pad = self.size, pad_grid(self.size)
-        padded = np.empty((6, s + 2, s + 2, 3), np.uint8)
-        padded[:, 1:-1, 1:-1] = self.rgb
-        border = cv2.remap(self.rgb.reshape(6 * s, s, 3), pad.x, pad.y, cv2.INTER_LINEAR)
-        padded[pad.face, pad.row, pad.column] = border.reshape(-1, 3)
-        return padded.reshape(6 * (s + 2), s + 2, 3)
+        padded = np.zeros((6, s + 2, s + 2, 4), np.uint8)
+        padded[:, 1:-1, 1:-1, :3] = self.rgb
+        border = cv2.remap(np.ascontiguousarray(self.rgb).reshape(6 * s, s, 3), pad.x, pad.y, cv2.INTER_LINEAR)
+        padded[pad.face, pad.row, pad.column, :3] = border.reshape(-1, 3)
+        return padded.reshape(6 * (s + 2), s + 2, 4)
 
     @functools.cached_property
     def _padded_nearness(self) -> np.ndarray:
         """(6 (s + 2), s + 2) float32: 1 / depth, which is linear over a plane, with borders as above."""
         s, pad = self.size, pad_grid(self.size)
         padded = np.empty((6, s + 2, s + 2), np.float32)
-        nearness = (1.0 / self.depth).astype(np.float32)
+        nearness = self._nearness.reshape(6, s, s)
         padded[:, 1:-1, 1:-1] = nearness
         border = cv2.remap(nearness.reshape(6 * s, s), pad.x, pad.y, cv2.INTER_NEAREST).reshape(-1)
         padded[pad.face, pad.row, pad.column] = border * pad.ratio
         return padded.reshape(6 * (s + 2), s + 2)
 
+    @functools.cached_property
+    def _nearness(self) -> np.ndarray:
+        """(6 s, s) float32: 1 / depth, 0 where nothing is."""
+        return (1.0 / self.depth).astype(np.float32).reshape(6 * self.size, self.size)
+
+    @functools.cached_property
+    def _ids_as_floats(self) -> np.ndarray:
+        """(6 s, s): the bits of the ids as float32, which OpenCV can copy from place to place."""
+        return np.ascontiguousarray(self.ids, dtype=np.int32).view(np.float32).reshape(6 * self.size, self.size)
+
     def _rgb(self, grid: Grid) -> np.ndarray:
-        return cv2.remap(self._padded_rgb, grid.fixed, grid.fraction, cv2.INTER_LINEAR)
+        rgba = cv2.remap(self._padded_rgba, grid.x, grid.y, cv2.INTER_LINEAR)
+        return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
     def _ids(self, grid: Grid) -> np.ndarray:
-        return self.ids.reshape(-1)[grid.nearest]
+        return cv2.remap(self._ids_as_floats, grid.nearest, None, cv2.INTER_NEAREST).view(np.int32)
 
     def _depth(self, grid: Grid) -> np.ndarray:
-        smooth = cv2.remap(self._padded_nearness, grid.fixed, grid.fraction, cv2.INTER_LINEAR)
-        nearest = (1.0 / self.depth.reshape(-1)[grid.nearest]).astype(np.float32)
-        mixed = np.abs(smooth - nearest) > CREASE * nearest
+        nearest, other, mixed = _scratch(grid.x.shape, threading.get_ident())
+        smooth = cv2.remap(self._padded_nearness, grid.x, grid.y, cv2.INTER_LINEAR)
+        cv2.remap(self._nearness, grid.nearest, None, cv2.INTER_NEAREST, dst=nearest)
+        cv2.absdiff(smooth, nearest, dst=other)
+        cv2.scaleAdd(nearest, -CREASE, other, dst=other)
+        cv2.compare(other, 0.0, cv2.CMP_GT, dst=mixed)
+        cv2.copyTo(nearest, mixed, smooth)
         with np.errstate(divide="ignore"):
-            return (grid.stretch / np.where(mixed, nearest, smooth)).astype(np.float32)
+            return np.divide(grid.stretch, smooth, out=smooth)
+
+
+@functools.lru_cache(maxsize=8)
+def _scratch(shape: tuple[int, int], thread: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two float32 arrays and one uint8 for one thread to work in: fresh memory costs more than what is done with it."""
+    return np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Where the pixels of a picture lie on the faces. (h, w) arrays."""
 
-    fixed: np.ndarray
-    fraction: np.ndarray
-    """The two maps of cv2.remap (16-bit fixed point) into the padded faces."""
+    x: np.ndarray
+    y: np.ndarray
+    """float32: the two maps of cv2.remap into the padded faces."""
     nearest: np.ndarray
-    """int32 index into the flat (6, s, s) faces."""
+    """(h, w, 2) int16: column and row of the nearest pixel of the faces below each other, without borders."""
     stretch: np.ndarray
     """float32 depth in this picture per depth in the face."""
 
@@ -205,10 +230,9 @@ def _grid(s: int, rays: np.ndarray, cosines: np.ndarray) -> Grid:
     face, u, v, along = _face_coordinates(rays)
     x, y = (u + 1) / 2 * s - 0.5, (v + 1) / 2 * s - 0.5
     map_x, map_y = (x + 1).astype(np.float32), (y + 1 + face * (s + 2)).astype(np.float32)
-    fixed, fraction = cv2.convertMaps(map_x, map_y, cv2.CV_16SC2)
-    column, row = np.clip(np.rint(x), 0, s - 1).astype(np.int32), np.clip(np.rint(y), 0, s - 1).astype(np.int32)
-    nearest = ((face * s + row) * s + column).astype(np.int32)
-    return Grid(fixed, fraction, nearest, (cosines / along).astype(np.float32))
+    column, row = np.clip(np.rint(x), 0, s - 1), np.clip(np.rint(y), 0, s - 1) + face * s
+    nearest = np.stack([column, row], axis=-1).astype(np.int16)
+    return Grid(map_x, map_y, nearest, (cosines / along).astype(np.float32))
 
 
 def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
