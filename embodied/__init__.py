@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     from embodied.seeds import stream
     from embodied.world import World, open_world
 
-DISTRIBUTION = "embodied-houses"
-"""What pip calls us; `embodied` on PyPI is another project's."""
-
 __all__ = [
     "House",
     "HouseConfig",

@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from assets.cache import write_bytes
-from embodied import DISTRIBUTION, interface
+from embodied import interface
+from embodied.distribution import DISTRIBUTION
 
 T = typing.TypeVar("T")
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from embodied import DISTRIBUTION
 from embodied.cli.origins import PACKAGES
+from embodied.distribution import DISTRIBUTION
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -13,7 +13,7 @@ from typing import TypeVar
 import torch
 import torch.distributed as dist
 
-from embodied.errors import UnableError
+from agents.device import check_device
 
 T = TypeVar("T")
 
@@ -38,18 +38,6 @@ def join_launcher(device: str) -> str:
         return device
     dist.init_process_group("nccl" if device.startswith("cuda") else "gloo")
     return f"cuda:{dist.get_node_local_rank()}" if device == "cuda" else device
-
-
-def check_device(device: str) -> None:
-    """Refuse a device that PyTorch cannot use here.
-
-    Raises:
-      UnableError: it is none, or there is no GPU.
-    """
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as e:
-        raise UnableError(f"--device {device} cannot be used here ({str(e).splitlines()[0]}); use --device cpu") from e
 
 
 def use_threads(threads: int) -> None:

@@ -15,7 +15,7 @@ import joblib
 import numpy as np
 import torch
 
-from agents.imitation.parallel import check_device
+from agents.device import check_device
 from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features

@@ -13,10 +13,10 @@ import shutil
 import warnings
 from dataclasses import asdict, dataclass
 
-from embodied import DISTRIBUTION
 from embodied.cli import message_of
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 from embodied.cli.origins import REMEDY, strangers
+from embodied.distribution import DISTRIBUTION
 
 LIBRARIES = (
     DISTRIBUTION,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
-from embodied import DISTRIBUTION
+from embodied.distribution import DISTRIBUTION
 
 PACKAGES = ("embodied", "agents", "assets", "viz")
 ROOT = Path(__file__).resolve().parents[2]
