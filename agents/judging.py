@@ -38,7 +38,7 @@ def run_eval(
     torch.set_num_threads(args.threads)
     data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
     rows, extra = [], {}
-    for split in args.split:
+    for split in args.split or ("test_unseen",):
         whole = data.split(split)
         judged = {**_without_learning(), **hanna_policies(agent, split_of(data, split, encoder).bank)}
         names = args.only or list(judged)

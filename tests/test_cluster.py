@@ -54,5 +54,5 @@ def test_every_unit_is_run_once_and_may_be_run_again(monkeypatch):
 
 def test_without_ray_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(UnableError, match=r"embodied\[ray\]"):
+    with pytest.raises(UnableError, match=r"embodied-houses\[ray\]"):
         list(run_on_ray(str, ["a"], (), "local"))

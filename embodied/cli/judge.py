@@ -31,7 +31,6 @@ def run(args: argparse.Namespace) -> int:
         return run_hari(args)
     from agents import judging
 
-    args.split = args.split or ["test_unseen"]
     return judging.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))
 
 
