@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import struct
 
@@ -68,6 +69,15 @@ def test_the_upper_part_of_a_page_stays_the_upper_part_and_z_becomes_y(tmp_path)
 def test_ceilings_can_be_left_out(tmp_path):
     made = tree(export_lit_glb(two_rooms(), lit_pages(), tmp_path / "house.glb", ceilings=False))
     assert not [n for n in made["nodes"] if "ceiling" in n.get("name", "")]
+
+
+def test_far_scenery_is_there_when_asked_for_only(tmp_path):
+    lit = lit_pages()
+    dome = dataclasses.replace(lit.meshes[0], owner="outdoor/sky", kind="outdoor", room="")
+    lit = dataclasses.replace(lit, meshes=(*lit.meshes, dome))
+    for sky in (False, True):
+        made = tree(export_lit_glb(two_rooms(), lit, tmp_path / "house.glb", sky=sky))
+        assert ("outdoor/sky" in [n.get("name") for n in made["nodes"]]) == sky
 
 
 def test_usd_names_the_remedy_where_openusd_is_missing_and_holds_all_meshes_where_it_is_there(tmp_path):

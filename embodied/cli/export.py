@@ -64,6 +64,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             sub.add_argument(
                 "--no-ceilings", action="store_true", help="leave ceilings and roof out, for a look from above"
             )
+            sub.add_argument("--sky", action="store_true", help="keep the dome of far scenery, for a look from inside")
         add_cache(sub)
         add_packs(sub)
         add_json(sub)
@@ -148,7 +149,7 @@ def run_house(args: argparse.Namespace) -> int:
     elif lit is None:
         path = export_glb(house, catalogue, args.out, ceilings=not args.no_ceilings)
     else:
-        path = export_lit_glb(house, lit, args.out, ceilings=not args.no_ceilings)
+        path = export_lit_glb(house, lit, args.out, ceilings=not args.no_ceilings, sky=args.sky)
     facts = {"house": house.digest, "format": args.what, "light": lit.digest if lit else None, "path": str(path)}
     show(args, facts, f"{house.name} as {args.what}: {path}, {path.stat().st_size / 1e6:.1f} MB")
     return 0

@@ -21,21 +21,25 @@ from embodied.scene.lit_pages import LitMesh, LitPages
 
 UNLIT = "KHR_materials_unlit"
 JPEG_QUALITY = 92
+ROOF, SKY = "outdoor/roof", "outdoor/sky"
+VERTICES, INDICES = 34962, 34963
+"""What a buffer view holds, in OpenGL's numbers."""
 UPRIGHT = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
 """z up to y up, as the format asks."""
 
 
-def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = True) -> Path:
+def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = True, sky: bool = False) -> Path:
     """Write the house with its baked light as one binary glTF file.
 
     Args:
       ceilings: False leaves ceilings and roof out, for a look from above.
+      sky: True keeps the dome of far scenery, for a look from inside; viewers frame all there is, and it is 140 m wide.
     """
     extras: dict[str, dict[str, str]] = {}
     scene = trimesh.Scene()
     materials = {}
     for k, mesh in enumerate(lit.meshes):
-        if not ceilings and (mesh.kind == "ceiling" or mesh.owner == "outdoor/roof"):
+        if (not ceilings and (mesh.kind == "ceiling" or mesh.owner == ROOF)) or (not sky and mesh.owner == SKY):
             continue
         key = (mesh.page, mesh.alpha)
         if key not in materials:
@@ -48,6 +52,7 @@ def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = 
         for material in tree["materials"]:
             material["extensions"] = {UNLIT: {}}
         tree["extensionsUsed"] = [UNLIT]
+        _say_what_buffers_hold(tree)
         tree["asset"]["extras"] = {"house": house.name, "house_digest": house.digest, "light": lit.digest}
         for node in tree["nodes"]:
             if node.get("name") in extras:
@@ -56,6 +61,17 @@ def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = 
     data = trimesh.exchange.gltf.export_glb(scene, include_normals=False, tree_postprocessor=finish)
     write_bytes(Path(path), data)
     return Path(path)
+
+
+def _say_what_buffers_hold(tree: dict) -> None:
+    """Mark buffer views as vertices or indices, which the format recommends and trimesh leaves out."""
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            for accessor, target in (
+                (primitive["indices"], INDICES),
+                *((a, VERTICES) for a in primitive["attributes"].values()),
+            ):
+                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
 
 
 def about(house: House, mesh: LitMesh) -> dict[str, str]:
