@@ -119,3 +119,8 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
 
 def test_the_wheel_is_named_after_the_distribution(wheel):
     assert Path(wheel.filename).name.startswith(DISTRIBUTION.replace("-", "_") + "-")
+
+
+def test_the_citation_names_the_version_that_is_packed():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
