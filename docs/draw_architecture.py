@@ -17,6 +17,8 @@ from matplotlib.patches import FancyBboxPatch
 OUT = Path(__file__).with_name("architecture.png")
 PLACE, PLAY, USE, LEARN, SHOW, GROUND = "#dbeafe", "#fef3c7", "#dcfce7", "#fae8ff", "#ffe4e6", "#e5e7eb"
 INK, SOFT = "#1f2937", "#6b7280"
+PITCH = 4.5
+"""From floor to floor."""
 HEAD = {"arrowstyle": "-|>", "color": INK, "lw": 1.4, "shrinkA": 0, "shrinkB": 1}
 
 
@@ -72,12 +74,19 @@ FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "ground",
         GROUND,
-        (("seeds", "streams"), ("geometry", "angles"), ("errors", ""), ("gl", "EGL"), ("locks", "one writer")),
+        (
+            ("seeds", "streams"),
+            ("geometry", "angles"),
+            ("errors", ""),
+            ("distribution", "our name"),
+            ("gl", "EGL"),
+            ("locks", "one writer"),
+        ),
     ),
-    ("ground", PLAY, (("interface", "the nouns of play"),)),
     ("place", PLACE, (("house", "the record"),)),
     ("place", PLACE, (("navigation", "graph, floor"), ("scene", "MjModel"))),
-    ("place", PLACE, (("generate", "seed to house"), ("render", "pixels"))),
+    ("place", PLACE, (("generate", "seed to house"), ("interface", "the nouns of play"))),
+    ("place", PLACE, (("render", "pixels"),)),
     ("place", PLACE, (("light", "baked once"), ("mattersim", "Matterport's API"))),
     ("place", PLACE, (("world", "all of a place"),)),
     ("play", PLAY, (("action_spaces", "moves"), ("language", "words"))),
@@ -91,7 +100,8 @@ FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ("use", USE, (("cli", "alone composes agents and viz"),)),
 )
 """Column, colour, and the rooms (name in embodied/, what it is about) of one floor; each imports only from floors
-that stand to its left, or above it in its own column; play and use see a place through the protocols of interface."""
+that stand to its left, or above it in its own column. The nouns of play stand with the place because pictures count
+their views; what is play sees a place through their protocols."""
 
 
 def draw(path: Path = OUT) -> None:
@@ -134,13 +144,13 @@ def draw_floors(axes: Axes) -> None:
         x, width = columns[column]
         if column == "ground":
             for name, says in rooms:
-                draw_box(axes, Box(name, says, x, 29 - 4.6 * level[column], colour, width, 3.8))
+                draw_box(axes, Box(name, says, x, 29 - PITCH * level[column], colour, width, 3.6))
                 level[column] += 1
             continue
         each = width / len(rooms)
         for k, (name, says) in enumerate(rooms):
-            middle = x - width / 2 + each * (k + 0.5)
-            draw_box(axes, Box(name, says, middle, 29 - 4.6 * level[column], colour, each - 0.8, 3.8))
+            middle, ink = x - width / 2 + each * (k + 0.5), PLAY if name == "interface" else colour
+            draw_box(axes, Box(name, says, middle, 29 - PITCH * level[column], ink, each - 0.8, 3.6))
         level[column] += 1
     for column, (x, _) in columns.items():
         axes.text(x, 32.0, titles[column], ha="center", va="center", fontsize=11, color=INK, weight="bold")

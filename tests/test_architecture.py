@@ -29,19 +29,12 @@ def rooms() -> set[str]:
 
 
 def arrows() -> set[tuple[str, str]]:
-    """(room, room it imports from when it runs) within embodied/; imports for types alone do not count."""
+    """(room, room it imports from) within embodied/, for types, too."""
     found = set()
     for path in (ROOT / "embodied").rglob("*.py"):
         me = path.relative_to(ROOT / "embodied").parts[0].removesuffix(".py")
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        types = {
-            n
-            for i in ast.walk(tree)
-            if isinstance(i, ast.If) and "TYPE_CHECKING" in ast.dump(i.test)
-            for n in ast.walk(i)
-        }
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and node.module and node not in types:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
                 names = [f"{node.module}.{a.name}" for a in node.names] if node.module == "embodied" else [node.module]
                 found |= {(me, n.split(".")[1]) for n in names if n.startswith("embodied.")}
     return {(a, b) for a, b in found if a != b and {a, b} <= rooms()}
@@ -64,7 +57,7 @@ def test_every_file_and_folder_that_the_page_names_is_there():
 
 
 def test_imports_follow_the_floors_of_the_picture(drawing):
-    """Up within a column, left between columns; a place is seen from play by its types only, and cli sees all."""
+    """Up within a column, left between columns."""
     columns = ("ground", "place", "play", "use")
     at = {n: (columns.index(c), k) for k, (c, _, floor) in enumerate(drawing.FLOORS) for n, _ in floor}
     assert not [(me, other) for me, other in arrows() if at[me][0] > 0 and not at[other] < at[me]]
