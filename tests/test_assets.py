@@ -103,6 +103,7 @@ def test_attribution_file_is_up_to_date(catalogue):
 # import
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", SOME)
 def test_imported_models_have_the_size_of_the_catalogue(catalogue, key):
     low, high = bounds(catalogue.mesh(key))
@@ -148,6 +149,7 @@ def test_import_is_the_same_every_time(catalogue, tmp_path):
             np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage", [lambda p: p.write_bytes(p.read_bytes()[:-100]), lambda p: p.unlink(), lambda p: p.write_bytes(b"x" * 50)]
 )

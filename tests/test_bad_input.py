@@ -45,6 +45,7 @@ def said(capsys, *words: str) -> str:
     return err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -229,6 +230,7 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
     assert message in err and "\n" not in err
 
 
+@pytest.mark.slow
 def test_an_optimiser_can_be_made_after_drawing():
     """PyTorch's CUDA build imports triton then, whose LLVM does not get on with that of Mesa's software OpenGL."""
     code = (

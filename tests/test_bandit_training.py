@@ -27,6 +27,8 @@ from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
 
+pytestmark = pytest.mark.slow
+
 GERMAN = ["null", "eins", "zwei", "drei", "vier", "fünf", "sechs", "sieben"]
 ENGLISH = ["zero", "one", "two", "three", "four", "five", "six", "seven"]
 TOY = BanditConfig(

@@ -27,6 +27,7 @@ def catalogue(tmp_path_factory):
     return load_catalogue(tmp_path_factory.mktemp("cache"))
 
 
+@pytest.mark.slow
 def test_every_edge_is_driven_without_a_bump(place, catalogue):
     driver = Driver(place.house, catalogue)
     for a, b in place.graph.edges:
@@ -71,6 +72,7 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
     assert len(envs[1].drives) == len(path) - 1 and envs[1].facts() == {"bumps": 0}
 
 
+@pytest.mark.slow
 def test_gymnasium_plays_on_wheels_too(place, tmp_path):
     blank = {"sees": "features", "source": Blank()}
     env = embodied.gym.env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, **blank)

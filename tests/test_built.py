@@ -101,6 +101,7 @@ CLOSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSED)
 def test_a_primitive_is_closed_faces_outward_and_has_its_volume(name):
     shape, expected = CLOSED[name]
@@ -198,6 +199,7 @@ print(h.hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_another_process_builds_the_same_things():
     runs = [
         subprocess.run([sys.executable, "-c", DIGEST], capture_output=True, text=True, check=True, timeout=60).stdout

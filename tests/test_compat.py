@@ -46,6 +46,7 @@ def test_the_action_list_of_a_node_on_the_line():
     )
 
 
+@pytest.mark.slow
 def test_hannas_files_hold_together(tmp_path):
     data = build(tmp_path / "d", tmp_path / "c")
     export_folder("hanna", data, tmp_path)

@@ -17,6 +17,8 @@ from embodied.datasets.store import Dataset, DatasetError
 from embodied.house.house import HouseError
 from embodied.records import RecordError
 
+pytestmark = pytest.mark.slow
+
 HOUSE = "test_0000"
 TASKS = "tasks_test_unseen.jsonl"
 

@@ -25,6 +25,8 @@ from embodied.render.pictures import PictureSettings
 from embodied.teachers.vnla import VnlaTeacher
 from embodied.world import differing
 
+pytestmark = pytest.mark.slow
+
 
 def test_paper_sizes_are_those_of_tables_4_2_and_e_1_and_of_room_to_room():
     assert [s.tasks for s in PAPER["hanna"][1]] == [82_484, 5_001, 5_017, 5_004, 5_012]
@@ -72,7 +74,9 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
     heard = {}
     for split in ("train", "test_seen"):
-        episodes = play(data.split(split).make_env, PrivilegedAsking(Shortest(), ask_every_5), data.tasks(split), seed=0)
+        episodes = play(
+            data.split(split).make_env, PrivilegedAsking(Shortest(), ask_every_5), data.tasks(split), seed=0
+        )
         heard[split] = {s.reply.subtask.id for e in episodes for s in e.steps if isinstance(s.action, Ask)}
     assert heard["train"] and heard["test_seen"] and not heard["train"] & heard["test_seen"]
 

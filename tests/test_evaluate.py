@@ -35,12 +35,14 @@ def test_ratios_are_sums_over_sums():
     assert r.mean == pytest.approx(0.1) and r.n == 10 and r.half > 0
 
 
+@pytest.mark.slow
 def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
     tasks = build(tmp_path / "d", tmp_path / "c").tasks("train")
     some = spread(tasks, 6)
     assert sorted(t.world for t in some) == ["train_0000"] * 3 + ["train_0001"] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["hanna", "vnla", "hari", "vln"])
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
     data = build(tmp_path / "d", tmp_path / "c", kind)
@@ -57,6 +59,7 @@ def test_the_rows_come_out_as_they_should(kind, tmp_path):
         agent(kind, "nobody")
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     data = build(tmp_path / "d", tmp_path / "c")
     out = tmp_path / "out"

@@ -15,6 +15,8 @@ from embodied.render.filament import Painter
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import owners
 
+pytestmark = pytest.mark.gl
+
 EYE = (2.5, 2.6, 1.2)
 
 

@@ -22,6 +22,8 @@ from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
 
+pytestmark = pytest.mark.slow
+
 KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "iliad-nav": "vln"}
 
 

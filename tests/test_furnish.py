@@ -98,6 +98,7 @@ def of_class(house: House, *names: str):
 BASINS = ("washbasin", "wall washbasin", "bathroom vanity", "double vanity")
 
 
+@pytest.mark.slow
 def test_every_house_is_a_valid_house_that_survives_json():
     for house in houses():
         check(house)
@@ -223,6 +224,7 @@ def test_one_walks_from_every_door_of_a_room_to_every_other():
             assert 0 not in seen and len(seen) <= 1, f"{room.id} of house {house.seed} is cut apart"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ROOM_KINDS)
 def test_a_room_of_every_kind_gets_furniture_and_a_ceiling_lamp(kind):
     for seed in range(3):
@@ -248,6 +250,7 @@ LACKED = ((1434163573, "sink and cooker"), (1583581038, "fridge and bed"), (1652
 """Houses of 90 to 200 m2 whose first plan left no room for something, and what that was."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [s for s, _ in LACKED])
 def test_rooms_are_drawn_anew_until_nothing_is_lacking(seed):
     house = generate_house(seed, HouseConfig(area=(90.0, 200.0)), catalogue())
@@ -258,6 +261,7 @@ def test_rooms_are_drawn_anew_until_nothing_is_lacking(seed):
     assert f"{beds[0].room}: bed" in lacking(robbed)
 
 
+@pytest.mark.slow
 def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
     short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
     monkeypatch.setattr(stages, "lacking", lambda house: next(short))
@@ -346,6 +350,7 @@ def test_rooms_of_one_kind_are_furnished_differently():
     assert len(looks) == 5
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_house_in_another_process():
     code = (
         "from conftest import two_rooms; from assets.catalogue import load_catalogue;"

@@ -53,6 +53,7 @@ def doors_of(house: House) -> dict[str, set[str]]:
     return ways
 
 
+@pytest.mark.slow
 def test_every_house_passes_check_and_survives_json():
     for house in houses():
         check(house)
@@ -72,6 +73,7 @@ def test_corners_lie_on_the_tenth_of_a_metre():
         assert np.allclose(corners * 10, np.round(corners * 10), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_every_room_can_be_entered_on_foot_past_the_open_leaves():
     for house in houses():
         assert unreachable_rooms(house) == ()
@@ -177,6 +179,7 @@ def test_wide_houses_are_not_all_rectangles():
     assert 4 in corners and 6 in corners and 8 in corners
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape, corners", [("rectangle", 4), ("L", 6), ("T", 8), ("U", 8), ("cross", 12)])
 def test_an_asked_shape_is_built(shape, corners):
     house = generate_house(5, HouseConfig(area=(210, 230), shape=shape), stages=BARE)
@@ -184,12 +187,14 @@ def test_an_asked_shape_is_built(shape, corners):
     assert len(outline.exterior.coords) - 1 == corners
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("area", [35, 60, 120, 260, 600])
 def test_an_asked_area_is_met_from_flat_to_mansion(area):
     house = generate_house(3, HouseConfig(area=(area, area)), stages=BARE)
     assert house.area == pytest.approx(area, rel=0.06)
 
 
+@pytest.mark.slow
 def test_asked_rooms_are_counted_as_in_advertisements():
     minor = ("kitchen", "bathroom", "toilet", "hall", "corridor", "laundry_room", "pantry", "closet", "garage")
     for rooms, area in ((2, (38, 44)), (4, (100, 110)), (20, (590, 610))):
@@ -266,6 +271,7 @@ def test_impossible_wishes_are_refused_at_once(options, message):
         HouseConfig(**options)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_house_in_another_process():
     code = (
         "from embodied.generate import *; print(*(generate_house(s, stages={k: v for k, v in STAGES.items() "

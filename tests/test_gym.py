@@ -33,6 +33,7 @@ def tmp(tmp_path) -> str:
     return str(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
@@ -47,6 +48,7 @@ def test_all_are_registered():
         assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym.env:make"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "imports",
     ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"],

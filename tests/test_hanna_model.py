@@ -287,6 +287,7 @@ def test_the_paper_sized_model_has_about_the_fifteen_million_parameters_of_table
     assert sum(p.numel() for p in net.parameters()) == pytest.approx(15.5e6, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [

@@ -120,6 +120,7 @@ def test_stopping_is_the_last_column_of_every_agent_and_padding_is_not_allowed()
 # Networks ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_agent_thinks_the_same_alone_and_beside_others():
     world = grid_world()
     words, moves, say = words_of(world), PanoramicMoves(), Describer(())
@@ -245,6 +246,7 @@ def fork_executor():
     return executor
 
 
+@pytest.mark.slow
 def test_pretraining_learns_a_world_it_can_see(fork_executor):
     lessons = fork_lessons()
     assert pretraining_success(fork_executor, lessons, lessons.validation * 8) > 0.9
@@ -291,6 +293,7 @@ def best_costs() -> float:
     return min(best.values())
 
 
+@pytest.mark.slow
 def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executor):
     """Enumerated: GOAL (or SUB), DO, DONE costs 0.2; going without asking costs 1.1 on average."""
     assert best_costs() == pytest.approx(0.2)
@@ -311,6 +314,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     assert sum(s.cost for e in episodes for s in e.steps) / 2 == pytest.approx(best_costs(), abs=0.11)
 
 
+@pytest.mark.slow
 def test_shaped_costs_of_played_episodes_telescope(fork_executor):
     config = QUICK
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
@@ -321,6 +325,7 @@ def test_shaped_costs_of_played_episodes_telescope(fork_executor):
         assert shaped == pytest.approx(plain - hops[0, episode.task.goal_nodes[0]])
 
 
+@pytest.mark.slow
 def test_an_episode_does_not_depend_on_the_batch_around_it(fork_executor):
     agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
     tasks = [dataclasses.replace(fork_task(1 + k % 2), id=f"fork/{k}") for k in range(6)]
@@ -331,6 +336,7 @@ def test_an_episode_does_not_depend_on_the_batch_around_it(fork_executor):
     assert play(fork_env, ruled, tasks, seed=1, batch=6) == [play(fork_env, ruled, [t], seed=1)[0] for t in tasks]
 
 
+@pytest.mark.slow
 def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
     world, lessons = grid_lessons()
     config = dataclasses.replace(SMALL, iterations=4, dropout=0.1)
@@ -363,6 +369,7 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
         assert torch.equal(a, b)
 
 
+@pytest.mark.slow
 def test_weights_survive_the_disk_and_say_what_they_lack(tmp_path, fork_executor):
     agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
     save_agent(agent, tmp_path / "agent.safetensors")
@@ -378,6 +385,7 @@ def test_weights_survive_the_disk_and_say_what_they_lack(tmp_path, fork_executor
         load_agent(tmp_path / "cut.safetensors")
 
 
+@pytest.mark.slow
 def test_the_skyline_needs_no_execution_policy_on_sub_goals(fork_executor):
     """With random moves on the main goal, SUB then DO still arrives."""
     config = dataclasses.replace(QUICK, perfect=True)

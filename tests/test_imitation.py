@@ -196,6 +196,7 @@ def test_every_pass_of_training_takes_every_task_once():
 # Play --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["hanna", "lstm"])
 def test_an_episode_does_not_depend_on_the_batch_around_it(model):
     split = setting(houses=2)
@@ -306,6 +307,7 @@ def test_labels_line_up_with_what_the_networks_said():
 # Learning ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["hanna", "lstm"])
 def test_it_overfits_one_batch(model):
     """Loss on the same eight episodes falls to a fraction; nothing in the gradient's way is broken."""
@@ -328,6 +330,7 @@ def test_it_overfits_one_batch(model):
     assert np.mean(losses[-5:]) < 0.5 * losses[0], losses
 
 
+@pytest.mark.slow
 def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
     straight, _ = run(tmp_path / "straight")
     half = dataclasses.replace(TINY, iterations=2)
@@ -372,6 +375,7 @@ def test_of_agents_as_good_as_each_other_the_later_is_kept():
     assert as_good(0.0, 0.0, 60) and not as_good(0.9, 1.0, 60)
 
 
+@pytest.mark.slow
 def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
     run(tmp_path)
     before = (tmp_path / "checkpoint.pt").read_bytes()
@@ -450,6 +454,7 @@ def test_table_d1_is_the_default():
     assert TrainingConfig.from_json(d1.to_json()) == d1
 
 
+@pytest.mark.slow
 def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     here = Path(__file__).parent
     code = (
@@ -504,6 +509,7 @@ def save_gradients(path: Path) -> None:
     path.with_suffix(".json").write_text(json.dumps(numbers))
 
 
+@pytest.mark.slow
 def test_two_processes_learn_what_one_would(tmp_path):
     torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=2)
     save_gradients(tmp_path / "alone.pt")

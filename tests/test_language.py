@@ -22,6 +22,8 @@ from embodied.language.templates import SLIPS, TEMPLATES
 from embodied.language.voice import Describer, People
 from embodied.world import open_world
 
+pytestmark = pytest.mark.slow
+
 PATHS = 30
 
 

@@ -26,6 +26,8 @@ from embodied.cli import learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
+pytestmark = pytest.mark.slow
+
 torch.set_num_threads(1)
 SMALL = [
     "--hidden-size",

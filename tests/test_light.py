@@ -42,6 +42,8 @@ from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
 from embodied.navigation.free_space import inward
 from embodied.scene.part import Part
 
+pytestmark = [pytest.mark.slow, pytest.mark.gl]
+
 TINY = Settings(12.0, 400.0, 12, 8, 4, 16, (4, 4, 4, 8, 32), 90)
 DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))
 SRGB_HALF = 0.7353569831

@@ -30,6 +30,8 @@ from viz.recording import Pictures, camera_axes, record
 from viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
 from viz.video import camera_track, write_video
 
+pytestmark = [pytest.mark.slow, pytest.mark.gl]
+
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = HouseConfig(area=(38.0, 46.0))
 

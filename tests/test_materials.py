@@ -41,6 +41,7 @@ def one_of_each_recipe() -> list[str]:
     return keys
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", one_of_each_recipe())
 def test_a_material_tiles_without_a_seam_and_its_maps_are_sane(key):
     n = MATERIALS[key].pixels // 2
@@ -52,6 +53,7 @@ def test_a_material_tiles_without_a_seam_and_its_maps_are_sane(key):
     assert seam_ratio(maps.height[..., None] * 1e3) <= 1.1
 
 
+@pytest.mark.slow
 def test_a_seam_would_be_noticed():
     image = make_maps("oak_planks/0").color.copy()
     ramp = np.linspace(0, 0.3, len(image))[None, :, None]
@@ -106,6 +108,7 @@ def test_the_maps_on_disk_are_whole_or_made_again(tmp_path):
     assert again == first and Path(again.texture).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_another_process_makes_the_same_maps():
     code = (
         "import hashlib; from assets.materials import make_maps, fingerprint; m = make_maps('linen/3');"

@@ -341,6 +341,7 @@ print(name, __name__, sim.getState()[0].viewIndex)
 """
 
 
+@pytest.mark.slow
 def test_a_script_runs_unchanged_with_the_launcher(folder, tmp_path):
     (tmp_path / "train.py").write_text(SCRIPT)
     (tmp_path / "beside.py").write_text("name = 'found'\n")

@@ -57,6 +57,7 @@ def test_two_rooms_are_joined_through_their_door():
     assert np.allclose(graph.positions[:, 2], EYE)
 
 
+@pytest.mark.slow
 def test_every_room_has_a_node_in_it():
     for house, graph in pairs():
         assert set(graph.room_of_node) == {r.id for r in house.rooms}
@@ -106,6 +107,7 @@ def test_viewpoints_have_choices():
     assert np.mean([2 * len(graph.edges) / len(graph.ids) for _, graph in pairs()]) > 2.7
 
 
+@pytest.mark.slow
 def test_a_large_house_has_about_125_nodes():
     house = generate_house(500, HouseConfig(area=(400, 440)), load_catalogue())
     assert 100 <= len(build_graph(house).ids) <= 155

@@ -29,6 +29,8 @@ from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world
 
+pytestmark = pytest.mark.gl
+
 MUG = {"class": "mug", "size": [0.1, 0.1, 0.1]}
 PAINTED = "\n".join(
     ["mtllib a.mtl", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "usemtl paint"]

@@ -106,6 +106,7 @@ def wheel(tmp_path_factory):
         yield z
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {

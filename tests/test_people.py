@@ -158,6 +158,7 @@ def test_whoever_shuts_a_room_steps_aside_alone(seed):
     assert set(both) == {0, 1} and both[0] == met[0] and both[1].position[0] > 4.2
 
 
+@pytest.mark.slow
 def test_where_the_first_figure_does_not_fit_a_slimmer_one_stands():
     world = grid_world(6, spacing=2.2)
     x, y, _ = world.graph.positions[7]

@@ -21,6 +21,8 @@ from embodied.render.pictures import QUALITIES, PictureSettings
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
 
+pytestmark = pytest.mark.gl
+
 EYE = (2.5, 2.6, 1.2)
 
 
@@ -231,6 +233,7 @@ def _draw(queue) -> None:
         queue.put(int(r.panorama(EYE).rgb.astype(np.int64).sum()))
 
 
+@pytest.mark.slow
 def test_a_spawned_worker_draws_the_same(house):
     context = multiprocessing.get_context("spawn")
     queue = context.Queue()

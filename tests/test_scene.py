@@ -100,6 +100,7 @@ class Unpainted:
         return Finish()
 
 
+@pytest.mark.slow
 def test_a_generated_flat_stays_put_for_a_second(tmp_path):
     assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
     catalogue = load_catalogue(tmp_path)

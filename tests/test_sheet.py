@@ -9,6 +9,8 @@ from handmade_models import CUBE, write_own
 from assets.catalogue import load_catalogue
 from embodied.render.contact_sheet import LABEL, TILE, draw_sheets, sheet
 
+pytestmark = pytest.mark.gl
+
 
 @pytest.fixture
 def catalogue(tmp_path):

@@ -174,6 +174,7 @@ def rim_rays(opening: Opening, floor: float, eye: np.ndarray, *, rng: np.random.
     return d / np.linalg.norm(d, axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOUSES)
 def test_no_ray_from_inside_a_room_leaves_the_house_but_through_a_pane(houses, name):
     house, parts = houses[name]

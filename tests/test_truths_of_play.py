@@ -72,6 +72,7 @@ def test_the_expert_solves_every_task(kind):
         assert all(metrics.spl(e, world.graph) == pytest.approx(1) for e in episodes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_agents_episode_depends_on_order_or_batch(kind):
     _, tasks, make = setting(kind)

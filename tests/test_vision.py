@@ -197,6 +197,7 @@ def labelled(n: int, *, seed: int, tell: float) -> Labelled:
     return Labelled(features, visible, room, features[..., 5].copy(), np.arange(n) % 4, position)
 
 
+@pytest.mark.slow
 def test_the_probe_reads_what_is_there_and_nothing_else():
     telling = read(labelled(80, seed=0, tell=4.0), labelled(60, seed=1, tell=4.0), seed=0)
     silent = read(labelled(80, seed=0, tell=0.0), labelled(60, seed=1, tell=0.0), seed=0)
@@ -231,6 +232,7 @@ def strips_of_colours(n: int, *, seed: int) -> labels.HouseStrips:
     )
 
 
+@pytest.mark.slow
 def test_training_the_encoder_lowers_its_loss(tmp_path):
     lines = []
     config = VisionConfig(network="compact", epochs=6, batch=2, least_views=1)

@@ -16,6 +16,8 @@ from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
 
+pytestmark = pytest.mark.gl
+
 NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])
 
 
