@@ -19,7 +19,7 @@ WORDS = ("forward", "left", "right", "up", "down")
 """VNLA's moves, in the order of its candidates; stopping is an action of its own."""
 FIELD = math.radians(40)
 """Half the horizontal field in which 'forward' looks for a node: vfov 60 degrees times 640 / 480,
-halved, the linear rule of the Matterport3D simulator (originals 1.4)."""
+halved, the linear rule of the Matterport3D simulator (docs/sources.md, S1)."""
 
 Reach = tuple[Candidates, tuple[Pose, ...]]
 """What the agent knows about its moves, and the privileged pose that each leads to."""
@@ -47,7 +47,7 @@ class MonocularMoves:
     """Turn or tilt by 30 degrees, or go to the node nearest the middle of the view (VNLA).
 
     Differs from the authors' program, whose 'forward' prefers the next node of the optimal path
-    even at test time (originals X14): here an action never depends on the goal.
+    even at test time (docs/sources.md, S44): here an action never depends on the goal.
     """
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ def directions(graph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """(n,) int64: the views whose centres are nearest in sqrt(dyaw^2 + dpitch^2) (originals 2.2)."""
+    """(n,) int64: the views whose centres are nearest in sqrt(dyaw^2 + dpitch^2) (docs/sources.md, S2)."""
     d_yaw = wrap(yaw[:, None] - VIEW_YAWS)
     d_pitch = pitch[:, None] - VIEW_PITCHES
     return np.argmin(np.round(d_yaw**2 + d_pitch**2, 9), axis=1)
@@ -83,7 +83,7 @@ def bearing_order(bearing: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def panoramic_reach(graph, pose: Pose) -> Reach:
-    """Neighbours sorted by |bearing| from the agent's yaw (originals 2.2); the tilt does not matter."""
+    """Neighbours sorted by |bearing| from the agent's yaw (docs/sources.md, S2); the tilt does not matter."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)
     order = bearing_order(bearing, nodes)

@@ -213,7 +213,7 @@ class Task:
     """Most steps of any kind, H in the dissertation."""
     budget: float | None = None
     """Most requests for help; None is without limit. An episode rounds a fraction up with that
-    probability (VNLA, originals 4.2)."""
+    probability (VNLA; docs/sources.md, S46)."""
 
 
 @dataclass(frozen=True)
@@ -413,7 +413,7 @@ class Step:
     instruction: str
     targets: tuple[int, ...]
     subtask: str
-    """Id of the sub-task, 'none' for every stretch of the main task (originals X7)."""
+    """Id of the sub-task, 'none' for every stretch of the main task (docs/sources.md, S18)."""
     can_ask: tuple[Intention, ...]
     candidate_nodes: tuple[int, ...]
     action: Action

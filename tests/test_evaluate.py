@@ -15,13 +15,21 @@ from embodied.evaluation.evaluate import AGENTS, agent, evaluate, spread
 
 def test_the_interval_of_independent_values_is_the_textbook_one():
     e = tables.estimate([0, 0, 1, 1], ["a"] * 4)
-    assert e.mean == 0.5 and e.half == pytest.approx(1.96 * math.sqrt(1 / 3) / 2)
+    assert e.mean == 0.5 and e.half == pytest.approx(3.182446 * math.sqrt(1 / 3) / 2), (
+        "Student's t of 3 degrees of freedom"
+    )
 
 
 def test_houses_that_agree_within_themselves_widen_the_interval():
     together = tables.estimate([0, 0, 1, 1], ["a", "a", "b", "b"])
     mixed = tables.estimate([0, 1, 0, 1], ["a", "a", "b", "b"])
-    assert together.half == pytest.approx(1.96 * math.sqrt(2 * 1 / 16 * 2)) and mixed.half == 0
+    assert together.half == pytest.approx(12.706205 * math.sqrt(2 * 1 / 16 * 2)) and mixed.half == 0
+
+
+def test_few_houses_widen_the_interval_as_students_t_does():
+    """20 houses that differ by one: standard error sqrt(20 / 19 * 20 / 4) / 20, t of 19 degrees of freedom 2.093."""
+    e = tables.estimate([0, 1] * 10, [str(k) for k in range(20)])
+    assert e.half == pytest.approx(2.093024 * math.sqrt(20 / 19 * 20 / 4) / 20)
 
 
 def test_missing_values_do_not_count():

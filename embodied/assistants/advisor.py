@@ -8,7 +8,7 @@ from embodied.interface import Intention, Language, Reply, Situation, Subtask
 from embodied.teachers.vnla import VnlaTeacher
 
 HELP_STEPS = 4
-"""k: how many actions an instruction describes (originals 4.3)."""
+"""k: how many actions an instruction describes (docs/sources.md, S48)."""
 
 
 class Advisor:

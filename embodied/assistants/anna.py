@@ -36,7 +36,7 @@ class Anna:
         Args:
           graphs, routes: by world name.
           split: whose wordings are spoken ('train_seen', 'train_unseen', 'val', 'test'). The path is
-            chosen among all routes and worded afterwards (originals 3.2), so every path needs a
+            chosen among all routes and worded afterwards (docs/sources.md, S12), so every path needs a
             wording in the split.
 
         Raises:

@@ -18,7 +18,7 @@ FARTHEST = 4
 
 @dataclass(frozen=True)
 class DescriberConfig:
-    """Table E.2, and which of its two radii is used for goals (originals X23: 3 m there, 5 m in 4.3.5)."""
+    """Table E.2, and which of its two radii is used for goals (docs/sources.md, S56)."""
 
     state_radius: float = 5.0
     goal_radius: float = 3.0
@@ -31,7 +31,7 @@ class Describer:
     """rho and rho_A of one or several worlds; what it says depends on the place only.
 
     Directions are absolute (steps of 30 degrees counter-clockwise from +x, as turns are), because
-    a description must mean the same wherever the listener looks (originals, section 6, open 4).
+    a description must mean the same wherever the listener looks (docs/sources.md, S55).
     """
 
     def __init__(self, frequent: Collection[str], config: DescriberConfig = DescriberConfig()) -> None:
@@ -61,7 +61,7 @@ class Describer:
     def pretraining_goal(
         self, world: Place, node: int, start: int, object_class: str, *, rng: np.random.Generator
     ) -> Description:
-        """The goal description of a pre-training task (appendix E, second "For d_t^s", read as d_t^g: X24).
+        """The goal description of a pre-training task (appendix E, second "For d_t^s", read as d_t^g: docs/sources.md, S57).
 
         Dense, or the target object and the room's name, each with probability 1/2; next to the goal
         or at it, the next action is a third possibility of 1/3.

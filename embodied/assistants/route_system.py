@@ -26,7 +26,7 @@ WORDINGS: Mapping[str, tuple[str, ...]] = {
     "test": ("test", "test", "test"),
 }
 """Splits of a path's three wordings, by the split of its house. In training houses one wording of
-every path is held out, which is what Table 4.2's 8,586 : 4,287 amounts to (originals 2.5)."""
+every path is held out, which is what Table 4.2's 8,586 : 4,287 amounts to (docs/sources.md, S15)."""
 
 
 @dataclass(frozen=True)

@@ -114,17 +114,17 @@ class HelpEnv:
             cost += self._cost_of_limit()
         self._steps.append(
             Step(
-                situation.pose,
-                mode,
-                instruction,
-                targets,
-                subtask.id if subtask else "none",
-                before.can_ask,
-                situation.candidate_nodes,
-                action,
-                reply,
-                self.pose,
-                cost,
+                pose=situation.pose,
+                mode=mode,
+                instruction=instruction,
+                targets=targets,
+                subtask=subtask.id if subtask else "none",
+                can_ask=before.can_ask,
+                candidate_nodes=situation.candidate_nodes,
+                action=action,
+                reply=reply,
+                next_pose=self.pose,
+                cost=cost,
             )
         )
         return self._look() if self.ended is None else None
@@ -146,7 +146,9 @@ class HelpEnv:
         """
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
-        return Episode(self.task, tuple(self._steps), self.ended, self.seed, agent, self.budget)
+        return Episode(
+            task=self.task, steps=tuple(self._steps), ended=self.ended, seed=self.seed, agent=agent, budget=self.budget
+        )
 
     # What a rule with help overrides -------------------------------------------------------------
 
@@ -190,7 +192,7 @@ class HelpEnv:
     # Looking -------------------------------------------------------------------------------------
 
     def _budget(self) -> int | None:
-        """The task's budget; a fraction becomes one more request with that probability (originals 4.2)."""
+        """The task's budget; a fraction becomes one more request with that probability (docs/sources.md, S46)."""
         if self.task.budget is None:
             return None
         whole = int(self.task.budget)
@@ -206,35 +208,35 @@ class HelpEnv:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
         self.situation = Situation(
-            self.world,
-            self.task,
-            self.pose,
-            self.mode,
-            self.targets,
-            self.subtask,
-            tuple(p.node for p in poses),
-            candidates,
-            self.time,
-            self.requests,
-            left,
-            tuple(self._trail),
-            self._stack(),
+            world=self.world,
+            task=self.task,
+            pose=self.pose,
+            mode=self.mode,
+            targets=self.targets,
+            subtask=self.subtask,
+            candidate_nodes=tuple(p.node for p in poses),
+            candidates=candidates,
+            time=self.time,
+            requests=self.requests,
+            requests_left=left,
+            trail=tuple(self._trail),
+            goals=self._stack(),
         )
         state, goals = self._descriptions()
         self.observation = Observation(
-            Sight(self.task.world, self.pose.node),
-            self.pose.turn,
-            self.pose.tilt,
-            candidates,
-            self.instruction,
-            self.target,
-            self.mode,
-            self._askable(self.situation),
-            left,
-            self.time,
-            self.time_on_task,
-            state,
-            goals,
+            sight=Sight(self.task.world, self.pose.node),
+            turn=self.pose.turn,
+            tilt=self.pose.tilt,
+            candidates=candidates,
+            instruction=self.instruction,
+            target=self.target,
+            mode=self.mode,
+            can_ask=self._askable(self.situation),
+            requests_left=left,
+            time=self.time,
+            time_on_task=self.time_on_task,
+            state_description=state,
+            goal_descriptions=goals,
         )
         return self.observation
 

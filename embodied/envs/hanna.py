@@ -25,5 +25,5 @@ class HannaEnv(HelpEnv):
         self.mode = Mode.MAIN  # line 20
         self.instruction = self.task.request  # line 21
         self.target = Sight(self.task.world, self.subtask.goal)  # line 22: I^{g*}, Eq 4.7
-        self.targets, self.subtask = (self.subtask.goal,), None  # the program's teacher, originals 3.1
+        self.targets, self.subtask = (self.subtask.goal,), None  # the program's teacher (docs/sources.md, S14)
         self.time_on_task = 0

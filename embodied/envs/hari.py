@@ -67,11 +67,11 @@ class StackedGoal:
 
 
 class HariEnv(HelpEnv):
-    """E-bar of 4.3.4.1. Decisions where the text is open (originals, section 6):
+    """E-bar of 4.3.4.1. Decisions where the text is open:
 
     a sub-goal held for more than 3 times its shortest distance (in DO actions) is popped by itself
-    and at no cost (open 3); reaching the horizon pays the task error, so that shaping telescopes
-    (open 2); sub-goals are described densely (open 9).
+    and at no cost (docs/sources.md, S53); reaching the horizon pays the task error, so that shaping telescopes
+    (docs/sources.md, S54); sub-goals are described densely (docs/sources.md, S58).
     """
 
     def __init__(

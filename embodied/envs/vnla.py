@@ -14,7 +14,7 @@ from embodied.teachers.shortest import nearest
 
 
 class VnlaEnv(HelpEnv):
-    """VNLA as the authors' program plays it (originals 4.3, X13): help costs no step.
+    """VNLA as the authors' program plays it (docs/sources.md, S43): help costs no step.
 
     The sub-goal is put before the request and stays until the next one; stopping ends the
     episode even inside a sub-goal. After a request the same time step goes on with a move.
@@ -36,7 +36,7 @@ class VnlaEnv(HelpEnv):
 
 
 class GoalAwareVnlaEnv(VnlaEnv):
-    """VNLA with the program's 'forward' (X14): it prefers the next node of the optimal path.
+    """VNLA with the program's 'forward' (docs/sources.md, S44): it prefers the next node of the optimal path.
 
     That tells the agent something about the goal whenever it goes forward, at test time too; it
     is here for comparison with the published numbers. Its teacher is `stepwise_action`.

@@ -24,7 +24,7 @@ def navigation_error(episode: Episode, graph: NavGraph) -> float:
 
 
 def success(episode: Episode, graph: NavGraph) -> float:
-    """1 if the episode ended within the radius of a goal, inclusive (originals 3.7); else 0."""
+    """1 if the episode ended within the radius of a goal, inclusive (docs/sources.md, S3); else 0."""
     return float(navigation_error(episode, graph) <= episode.task.radius + 1e-9)
 
 
@@ -35,7 +35,7 @@ def oracle_success(episode: Episode, graph: NavGraph) -> float:
 
 
 def path_length(episode: Episode, graph: NavGraph) -> float:
-    """Metres walked: the sum of graph distances between consecutive nodes (originals 3.7)."""
+    """Metres walked: the sum of graph distances between consecutive nodes (docs/sources.md, S4)."""
     nodes = episode.nodes
     return float(sum(graph.distance[a, b] for a, b in itertools.pairwise(nodes)))
 
@@ -64,7 +64,7 @@ def steps(episode: Episode, graph: NavGraph) -> float:
 
 
 def room_success(episode: Episode, graph: NavGraph) -> float:
-    """1 if the agent ended in a room that holds a goal (VNLA, originals 4.8)."""
+    """1 if the agent ended in a room that holds a goal (VNLA; docs/sources.md, S5)."""
     rooms = graph.room_of_node
     return float(rooms[episode.nodes[-1]] in {rooms[g] for g in episode.task.goal_nodes})
 
@@ -72,7 +72,7 @@ def room_success(episode: Episode, graph: NavGraph) -> float:
 def subtask_success(episode: Episode, graph: NavGraph) -> float:
     """Share of sub-tasks that were left (departed, asked anew, or cut short) within 2 m of their target.
 
-    NaN without any (HANNA, originals 3.7 'target success').
+    NaN without any (HANNA; docs/sources.md, S6).
     """
     outcomes = []
     for i, step in enumerate(episode.steps):
@@ -131,12 +131,12 @@ def dtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph) -> f
 
 
 def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
-    """exp(-DTW / (|R| radius)), 1 for the reference itself (originals 5.2)."""
+    """exp(-DTW / (|R| radius)), 1 for the reference itself (docs/sources.md, S7)."""
     return float(np.exp(-dtw(path, reference, graph) / (len(reference) * radius)))
 
 
 def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
-    """nDTW if the ends are within the radius, else 0 (originals 5.2)."""
+    """nDTW if the ends are within the radius, else 0 (docs/sources.md, S7)."""
     near = graph.distance[path[-1], reference[-1]] <= radius + 1e-9
     return ndtw(path, reference, graph, radius) if near else 0.0
 

@@ -39,7 +39,7 @@ from embodied.teachers.vnla import ask_reason
 
 
 class RandomWalk:
-    """Uniform over the candidates and stop at every step (originals 3.8); never asks."""
+    """Uniform over the candidates and stop at every step (docs/sources.md, S42); never asks."""
 
     def act(
         self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
@@ -48,7 +48,7 @@ class RandomWalk:
 
 
 class Forward10:
-    """The candidate nearest the middle of the view for ten steps, then stop (originals 3.8)."""
+    """The candidate nearest the middle of the view for ten steps, then stop (docs/sources.md, S42)."""
 
     def act(
         self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
@@ -91,7 +91,7 @@ def ask_at_random(observation: Observation, last_asked: int, *, rng: np.random.G
 
 
 def ask_every_5(observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
-    """ASKEVERY5: as soon as five steps have passed since the last request (originals 3.8)."""
+    """ASKEVERY5: as soon as five steps have passed since the last request (docs/sources.md, S42)."""
     return observation.time - last_asked >= 5
 
 
@@ -215,7 +215,7 @@ def _taken(odds: dict[str, float], o: Observation, rng: np.random.Generator) -> 
 
 
 class VnlaAsking:
-    """A VNLA navigation policy with one of the program's askers in front of it (originals 4.6)."""
+    """A VNLA navigation policy with one of the program's askers in front of it (docs/sources.md, S51)."""
 
     def __init__(self, navigation: Agent, ask: str) -> None:
         """`ask`: 'none', 'first', 'random' or 'teacher'.

@@ -67,23 +67,47 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     Raises:
       ValueError: the pool has no such task.
     """
-    goal, start, rng = draw(pool, index, seed=seed, kind="find")
-    what = FindObject(goal.object_class, None, goal.placements)
+    limits = Limits(radius=0.0, horizon=config.horizon)
+    return task_of_pair("find", pool, index, seed=seed, language=language, limits=limits)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Task.radius, horizon and budget."""
+
+    radius: float
+    horizon: int
+    budget: float | None = None
+
+
+def task_of_pair(kind: str, pool: Pool, index: int, *, seed: int, language: Language, limits: Limits) -> Task:
+    """Pair `index` of the pool as a task of a kind, in words.
+
+    Raises:
+      ValueError: the pool has no such pair.
+    """
+    goal, start, rng = draw(pool, index, seed=seed, kind=kind)
+    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
     return Task(
-        f"{pool.world}/find/{index}",
-        "find",
-        pool.world,
-        start,
-        what,
-        goal.goal_nodes,
-        language.request(what, rng=rng),
-        radius=0.0,
-        horizon=config.horizon,
+        id=f"{pool.world}/{kind}/{index}",
+        kind=kind,
+        world=pool.world,
+        start=start,
+        goal=what,
+        goal_nodes=goal.goal_nodes,
+        request=language.request(what, rng=rng),
+        radius=limits.radius,
+        horizon=limits.horizon,
+        budget=limits.budget,
     )
 
 
 def draw(pool: Pool, index: int, *, seed: int, kind: str) -> tuple[GoalClass, Pose, np.random.Generator]:
-    """Pair `index` of the pool with a random heading, and the generator for the rest of its words."""
+    """Pair `index` of the pool with a random heading, and the generator for the rest of its words.
+
+    Raises:
+      ValueError: the pool has no such pair.
+    """
     if not 0 <= index < len(pool):
         raise ValueError(f"world {pool.world!r} has {len(pool)} {kind} tasks, asked for number {index}")
     c, node = (int(x) for x in pool.pairs[index])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from embodied.interface import FindObject, Language, Place, Task
-from embodied.tasks.find import Pool, build_pool, draw
+from embodied.interface import Language, Place, Task
+from embodied.tasks.find import Limits, Pool, build_pool, task_of_pair
 from embodied.tasks.goals import find_instances, goal_classes
 
 
@@ -33,18 +33,7 @@ def hanna_task(pool: Pool, index: int, *, seed: int, language: Language, config:
     """Task `index` of the pool: a pure function of its arguments.
 
     Raises:
-      IndexError: the pool has no such task.
+      ValueError: the pool has no such task.
     """
-    goal, start, rng = draw(pool, index, seed=seed, kind="hanna")
-    what = FindObject(goal.object_class, None, goal.placements)
-    return Task(
-        f"{pool.world}/hanna/{index}",
-        "hanna",
-        pool.world,
-        start,
-        what,
-        goal.goal_nodes,
-        language.request(what, rng=rng),
-        radius=config.radius,
-        horizon=config.horizon,
-    )
+    limits = Limits(config.radius, config.horizon)
+    return task_of_pair("hanna", pool, index, seed=seed, language=language, limits=limits)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from embodied.interface import FindObject, Language, Place, Task
-from embodied.tasks.find import Pool, build_pool, draw
+from embodied.interface import Language, Place, Task
+from embodied.tasks.find import Limits, Pool, build_pool, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances
 
 
@@ -41,18 +41,7 @@ def hari_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     """Task `index` of the pool; success is to end exactly at the intended node.
 
     Raises:
-      IndexError: the pool has no such task.
+      ValueError: the pool has no such task.
     """
-    goal, start, rng = draw(pool, index, seed=seed, kind="hari")
-    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
-    return Task(
-        f"{pool.world}/hari/{index}",
-        "hari",
-        pool.world,
-        start,
-        what,
-        goal.goal_nodes,
-        language.request(what, rng=rng),
-        radius=0.0,
-        horizon=config.horizon,
-    )
+    limits = Limits(radius=0.0, horizon=config.horizon)
+    return task_of_pair("hari", pool, index, seed=seed, language=language, limits=limits)

@@ -12,13 +12,13 @@ HORIZON = 20
 def vln_task(world: str, route: Route) -> Task:
     """The task of following `route` of the house `world`."""
     return Task(
-        f"{world}/vln/{route.id}",
-        "vln",
-        world,
-        Pose(route.path[0], route.turn, route.tilt),
-        FollowRoute(route.id, route.path),
-        (route.path[-1],),
-        route.instruction,
-        RADIUS,
-        HORIZON,
+        id=f"{world}/vln/{route.id}",
+        kind="vln",
+        world=world,
+        start=Pose(route.path[0], route.turn, route.tilt),
+        goal=FollowRoute(route.id, route.path),
+        goal_nodes=(route.path[-1],),
+        request=route.instruction,
+        radius=RADIUS,
+        horizon=HORIZON,
     )

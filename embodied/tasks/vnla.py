@@ -1,4 +1,4 @@
-"""VNLA: 'find a towel in a bathroom' with an advisor and a request budget (dissertation 4.1.2, originals 4)."""
+"""VNLA: 'find a towel in a bathroom' with an advisor and a request budget (dissertation 4.1.2)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.interface import TURNS, VIEWS, FindObject, Language, Place, Task
-from embodied.tasks.find import Pool, build_pool, draw
+from embodied.tasks.find import Limits, Pool, build_pool, draw, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
 
@@ -20,14 +20,14 @@ class VnlaConfig:
 
     fewest_nodes: int = 3
     most_actions: int = 25
-    """Of the teacher, the final stop included, and of an episode (originals 4.2)."""
+    """Of the teacher, the final stop included, and of an episode (docs/sources.md, S45)."""
     radius: float = 2.0
     reach: float = 2.5
     by_room: bool = True
     """False gives the no-room variant: 'find a towel'."""
     help_ratio: float = 0.4
     help_steps: int = 4
-    """Budget 0.4 T / 4 for a time limit of T steps (originals 4.2)."""
+    """Budget 0.4 T / 4 for a time limit of T steps (docs/sources.md, S46)."""
 
 
 def vnla_pool(world: Place, plan: MonocularPlan, *, seed: int, config: VnlaConfig = VnlaConfig()) -> Pool:
@@ -46,7 +46,7 @@ def _in_time(pair: np.ndarray, classes: tuple[GoalClass, ...], plan: MonocularPl
 
 
 def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple[str, str], int]:
-    """Evaluation limits T from training: mean + 1.95 s.e.m. of teacher lengths per key, capped (originals 4.2).
+    """Evaluation limits T from training: mean + 1.95 s.e.m. of teacher lengths per key, capped (docs/sources.md, S45).
 
     Args:
       lengths: (start room kind, end room kind or object class, teacher actions) of training tasks.
@@ -56,7 +56,7 @@ def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple
     for start, end, n in lengths:
         groups.setdefault((start, end), []).append(n)
     return {
-        key: cap if len(v) < 2 else round(min(cap, np.mean(v) + 1.95 * np.std(v, ddof=1) / math.sqrt(len(v))))
+        key: cap if len(v) < 2 else round(min(cap, float(np.mean(v) + 1.95 * np.std(v, ddof=1) / math.sqrt(len(v)))))
         for key, v in sorted(groups.items())
     }
 
@@ -79,29 +79,23 @@ def vnla_task(
     cannot be finished, here none are.
 
     Raises:
-      IndexError: the pool has no such task.
+      ValueError: the pool has no such task.
     """
-    goal, start, rng = draw(pool, index, seed=seed, kind="vnla")
-    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
+    goal, start, _ = draw(pool, index, seed=seed, kind="vnla")
     horizon = plan.count(start, goal.goal_nodes)
     if limits is not None:
-        horizon = max(horizon, limits.get(limit_key(world, start.node, what), config.most_actions))
+        key = room_kind(world, start.node), goal.room_kind or goal.object_class
+        horizon = max(horizon, limits.get(key, config.most_actions))
     budget = config.help_ratio * horizon / config.help_steps
-    return Task(
-        f"{pool.world}/vnla/{index}",
-        "vnla",
-        pool.world,
-        start,
-        what,
-        goal.goal_nodes,
-        language.request(what, rng=rng),
-        radius=config.radius,
-        horizon=horizon,
-        budget=budget,
-    )
+    mine = Limits(config.radius, horizon, budget)
+    return task_of_pair("vnla", pool, index, seed=seed, language=language, limits=mine)
+
+
+def room_kind(world: Place, node: int) -> str:
+    """Kind of the room that a node is in."""
+    return world.house.room_by_id[world.graph.room_of_node[node]].kind
 
 
 def limit_key(world: Place, start: int, goal: FindObject) -> tuple[str, str]:
     """(start room kind, goal room kind), or the object class where no room is named."""
-    room = world.house.room_by_id[world.graph.room_of_node[start]].kind
-    return room, goal.room_kind or goal.object_class
+    return room_kind(world, start), goal.room_kind or goal.object_class

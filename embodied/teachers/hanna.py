@@ -15,7 +15,7 @@ GAMMA = 0.25
 
 
 def lost_as_programmed(distances: Sequence[float]) -> list[bool]:
-    """Steps of a segment strictly after the earliest step of closest approach (originals X4).
+    """Steps of a segment strictly after the earliest step of closest approach (docs/sources.md, S19).
 
     Args:
       distances: to the target at each state of a segment, metres.
@@ -51,7 +51,7 @@ class HannaTeacher:
 
     The default rule for `lost` is the authors' program's, because the text's would teach an agent
     to ask for help when it has arrived. `uncertain_wrong` follows the text: at steps where the
-    agent asked, the program has no reference action and calls every prediction wrong (X5).
+    agent asked, the program has no reference action and calls every prediction wrong (docs/sources.md, S20).
     """
 
     def __init__(self, lost: Callable[[Sequence[float]], list[bool]] = lost_as_programmed) -> None:

@@ -33,7 +33,7 @@ class ShortestTeacher:
     """Labels every step with the reference action; has no opinion about asking.
 
     On a route the reference leads to the departure node by the shortest path, not along the
-    route (originals 3.3).
+    route (docs/sources.md, S13).
     """
 
     def label(self, situation: Situation) -> Label:

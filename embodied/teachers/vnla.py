@@ -1,4 +1,4 @@
-"""VNLA's teachers: the shortest way in turns and steps, and the rules of when to ask (originals 4.1, 4.5)."""
+"""VNLA's teachers: the shortest way in turns and steps, and the rules of when to ask (docs/sources.md, S49, S50)."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def pose_of(state: int) -> Pose:
 
 
 def stepwise_action(graph: NavGraph, pose: Pose, goals: Sequence[int]) -> str:
-    """The authors' teacher (originals 4.1): level, turn, tilt, then 'forward'; for the goal-aware 'forward'.
+    """The authors' teacher (docs/sources.md, S49): level, turn, tilt, then 'forward'; for the goal-aware 'forward'.
 
     Returns:
       One of WORDS, or 'stop'.
@@ -137,7 +137,7 @@ def stepwise_action(graph: NavGraph, pose: Pose, goals: Sequence[int]) -> str:
 
 @dataclass(frozen=True)
 class AskRules:
-    """Thresholds of the help-request teacher (originals 4.5)."""
+    """Thresholds of the help-request teacher (docs/sources.md, S50)."""
 
     deviate: float = 8.0
     """(a) metres from the shortest path."""
@@ -150,7 +150,7 @@ class AskRules:
 
 
 def ask_reason(situation: Situation, thought: Thought | None, rules: AskRules = AskRules()) -> str | None:
-    """The first rule that says to ask, in the order of originals 4.5; None if none does.
+    """The first rule that says to ask, in the order of docs/sources.md, S50; None if none does.
 
     Args:
       thought: what the policy was about to do; without it the rules about it do not fire.
@@ -212,18 +212,18 @@ class VnlaTeacher:
             left = None if episode.budget is None else episode.budget - requests
             candidates, _ = self.moves.at(world, step.pose)
             situation = Situation(
-                world,
-                episode.task,
-                step.pose,
-                step.mode,
-                step.targets,
-                None,
-                step.candidate_nodes,
-                candidates,
-                time,
-                requests,
-                left,
-                tuple(trail),
+                world=world,
+                task=episode.task,
+                pose=step.pose,
+                mode=step.mode,
+                targets=step.targets,
+                subtask=None,
+                candidate_nodes=step.candidate_nodes,
+                candidates=candidates,
+                time=time,
+                requests=requests,
+                requests_left=left,
+                trail=tuple(trail),
             )
             label = self.label(situation, step.action.thought)
             asked = isinstance(step.action, Ask)
