@@ -10,6 +10,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+import cv2
 import networkx as nx
 import numpy as np
 import pytest
@@ -18,9 +19,11 @@ from hand_data import build
 from embodied import mattersim
 from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, subgoal_words
 from embodied.datasets.matterport import scan_name
+from embodied.datasets.skyboxes import write_skybox
 from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
+from embodied.render.panorama import Panorama
 
 pytestmark = pytest.mark.slow
 
@@ -395,6 +398,38 @@ def test_words_are_split_as_room_to_room_splits_them():
     """Signs with a blank between them stay together, as there."""
     words = ["go", "left", ",", "then", "...", "stop", "! (", "don", "'", "t", "run", ".", ")"]
     assert split_sentence("Go left, then... stop! (Don't run.)") == words
+
+
+# The simulator -----------------------------------------------------------------------------------
+
+
+def test_skyboxes_give_back_the_views_of_our_panorama(folders, tmp_path):
+    rng = np.random.default_rng(0)
+    smooth = cv2.resize(rng.integers(0, 255, (6 * 4, 4, 3), np.uint8), (64, 6 * 64), interpolation=cv2.INTER_CUBIC)
+    faces = smooth.reshape(6, 64, 64, 3)
+    panorama = Panorama(faces, np.full((6, 64, 64), 2.0, np.float32), np.zeros((6, 64, 64), np.int32))
+    scan = (folders / "hanna/data/connectivity/scans.txt").read_text().split()[0]
+    home = tmp_path / scan / "matterport_skybox_images"
+    assert {f.name for f in write_skybox(panorama, "n1", home)} >= {"n1_skybox_small.jpg", "n1_skybox5_sami.jpg"}
+    sim = mattersim.module("upstream").Simulator()
+    sim.setNavGraphPath(str(folders / "hanna/data/connectivity"))
+    sim.setDatasetPath(str(tmp_path))
+    sim.setDepthEnabled(True)
+    sim.setDiscretizedViewingAngles(True)
+    for heading in range(12):
+        for elevation in (-1, 0, 1):
+            sim.newEpisode([scan], ["n1"], [heading * math.pi / 6], [elevation * math.pi / 6])
+            yaw, pitch = math.pi / 2 - heading * math.pi / 6, elevation * math.pi / 6
+            rgb, depth, _ = panorama.view(yaw, pitch, 0.8, (240, 320))
+            state = sim.getState()[0]
+            error = np.abs(state.rgb[..., ::-1].astype(int) - rgb)
+            assert error.mean() < 3, "JPEG alone stands between them"
+            assert np.median(np.abs(state.depth[..., 0] / 4000 - depth)) < 0.002
+
+
+def test_skyboxes_want_panoramas(data_sets, tmp_path):
+    with pytest.raises(ValueError, match="--panoramas"):
+        export_folder("matterport", data_sets["hanna"], tmp_path)
 
 
 def test_another_kind_is_refused_with_the_kind_that_is_read(data_sets, tmp_path):
