@@ -19,7 +19,7 @@ from embodied.language.route_clauses import legs_of, shortened
 from embodied.language.seen import Eyes, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import SLIPS, TEMPLATES
-from embodied.language.voice import Describer, People
+from embodied.language.voice import People, RouteDescriber
 from embodied.world import open_world
 
 pytestmark = pytest.mark.slow
@@ -167,8 +167,8 @@ def test_landmarks_are_visible_from_the_route(world, spoken):
 
 def test_any_execution_can_be_described_even_standing_still(world):
     rng = np.random.default_rng(2)
-    assert Describer().describe(world, (0, 0), 0.0, rng=rng)
-    assert Describer().describe(world, (0, *world.graph.path(0, len(world.graph.ids) - 1)), 0.0, rng=rng)
+    assert RouteDescriber().describe(world, (0, 0), 0.0, rng=rng)
+    assert RouteDescriber().describe(world, (0, *world.graph.path(0, len(world.graph.ids) - 1)), 0.0, rng=rng)
 
 
 def test_speakers_have_shares_that_sum_to_one():

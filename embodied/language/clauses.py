@@ -8,7 +8,7 @@ LEFT, RIGHT = "left", "right"
 
 
 @dataclass(frozen=True)
-class Thing:
+class Referent:
     """Something that is spoken of: any object of one of `classes` that has all of `words`."""
 
     classes: tuple[str, ...]
@@ -68,14 +68,14 @@ class Metres:
 class To:
     """Walk up to something."""
 
-    thing: Thing
+    thing: Referent
 
 
 @dataclass(frozen=True)
 class Past:
     """Walk past something."""
 
-    thing: Thing
+    thing: Referent
     side: str | None = None
     """Where it is when one passes it."""
 
@@ -91,14 +91,14 @@ class Avoid:
 class Notice:
     """Something one sees on the way; nothing to do about it."""
 
-    thing: Thing
+    thing: Referent
 
 
 @dataclass(frozen=True)
 class StopBy:
     """The end is beside something."""
 
-    thing: Thing
+    thing: Referent
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,16 @@ Clause = Turn | Exit | Enter | Cross | Forward | Metres | To | Past | Avoid | No
 STOPS = (StopBy, StopIn, StopHere)
 REMARKS = (Avoid, Notice)
 """Clauses that ask for nothing to be done."""
-WALKS = (Exit, Enter, Cross, Forward, Metres, To, Past)
-"""Clauses that take at least one step."""
+
+
+def room_of(clause: Clause) -> str | None:
+    """The kind of room that a clause names, if it names one."""
+    return clause.kind if isinstance(clause, Exit | Enter | Cross | Avoid | StopIn) else None
+
+
+def side_of(clause: Clause) -> str | None:
+    """LEFT or RIGHT where a clause names a side."""
+    return clause.side if isinstance(clause, Turn | Enter | Past) else None
 
 
 @dataclass(frozen=True)

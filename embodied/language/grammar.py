@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,13 +21,15 @@ from embodied.language.clauses import (
     Metres,
     Notice,
     Past,
+    Referent,
     RouteInstruction,
     StopBy,
     StopHere,
     StopIn,
-    Thing,
     To,
     Turn,
+    room_of,
+    side_of,
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.templates import (
@@ -65,20 +67,22 @@ def kind_of(clause: Clause) -> str:
         return "past" if clause.side is None else "past_side"
     if isinstance(clause, Enter):
         return "door" if clause.nth else "enter"
-    return {
-        Exit: "exit",
-        Cross: "cross",
-        Forward: "forward",
-        Metres: "metres",
-        To: "to",
-        Avoid: "avoid",
-        Notice: "notice",
-        StopBy: "stop_by",
-        StopIn: "stop_in",
-        StopHere: "stop_here",
-    }[type(clause)]
+    return KIND_NAMES[type(clause)]
 
 
+KIND_NAMES: Mapping[type, str] = {
+    Exit: "exit",
+    Cross: "cross",
+    Forward: "forward",
+    Metres: "metres",
+    To: "to",
+    Avoid: "avoid",
+    Notice: "notice",
+    StopBy: "stop_by",
+    StopIn: "stop_in",
+    StopHere: "stop_here",
+}
+"""What templates call the clauses that have one name only."""
 _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
     kinds: tuple(t for t in TEMPLATES if t.kinds == kinds) for kinds in {t.kinds: None for t in TEMPLATES}
 }
@@ -93,44 +97,33 @@ PLAIN = 3.0
 
 def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
     """Sentences in the speaker's habits, e.g. 'Leave the bedroom and turn left at once. Stop by the sofa.'"""
-    pieces = []
+    pieces: list[tuple[str, tuple[str, ...]]] = []
     i, again = 0, _again(phrases)
     while i < len(phrases):
-        pair = tuple(kind_of(p.clause) for p in phrases[i : i + 2])
-        if (
-            len(pair) == 2
-            and pair in _BY_KINDS
-            and rng.random() < speaker.joining
-            and not _misleads(pair, phrases[i + 2 :])
-        ):
-            pieces.append(
-                (_fill(_pick(_BY_KINDS[pair], speaker, rng), phrases[i : i + 2], again[i : i + 2], speaker, rng), pair)
-            )
-            i += 2
-        else:
-            pieces.append(
-                (
-                    _fill(_pick(_BY_KINDS[pair[:1]], speaker, rng), phrases[i : i + 1], again[i : i + 1], speaker, rng),
-                    pair[:1],
-                )
-            )
-            i += 1
+        kinds = tuple(kind_of(p.clause) for p in phrases[i : i + 2])
+        known = len(kinds) == 2 and kinds in _BY_KINDS
+        if not (known and rng.random() < speaker.joining and not _misleads(kinds, phrases[i + 2 :])):
+            kinds = kinds[:1]
+        to = i + len(kinds)
+        template = _pick(_BY_KINDS[kinds], speaker, rng)
+        pieces.append((_fill(template, phrases[i:to], again[i:to], speaker, rng), kinds))
+        i = to
     return _slip(_sentences(pieces, speaker, rng), speaker, rng)
 
 
 def _misleads(pair: tuple[str, ...], after: Sequence[Phrase]) -> bool:
-    """Whether the pair in one breath sounds as if nobody walked: 'turn right toward the sofa, then face the other way'."""
+    """Whether the pair in one breath sounds as if nobody walked: 'turn right toward the sofa, then turn around'."""
     return pair[-1] == "to" and bool(after) and kind_of(after[0].clause) == "around"
 
 
 def _again(phrases: Sequence[Phrase]) -> list[str]:
-    """What goes before the room noun of each clause: a room entered from one of its own kind is the next or the other one."""
-    found, here = [], None
+    """What goes before the room noun of each clause: 'next' or 'other' for a room entered from one of its own kind."""
+    found: list[str] = []
+    here: str | None = None
     for p in phrases:
-        kind = getattr(p.clause, "kind", None)
-        found.append(
-            ("next " if kind in PASSAGES else "other ") if kind == here and isinstance(p.clause, Enter) else ""
-        )
+        kind = room_of(p.clause)
+        same = kind == here and isinstance(p.clause, Enter)
+        found.append(("next " if kind in PASSAGES else "other ") if same else "")
         here = kind if isinstance(p.clause, Enter | Exit | Cross) else here
     return found
 
@@ -149,7 +142,7 @@ def _fill(
         "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": SOON[int(rng.integers(len(SOON)))],
     }
-    rooms = [(p.clause.kind, before) for p, before in zip(phrases, again) if hasattr(p.clause, "kind")]
+    rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := room_of(p.clause)) is not None]
     for name, (kind, before) in zip(("room", "other"), rooms):
         nouns = ROOM_NOUNS[kind]
         slots[name] = before + (nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))])
@@ -158,10 +151,10 @@ def _fill(
             n, many = p.clause.count, "s" * (p.clause.count != 1)
             spelt = NUMBERS[n] if n < len(NUMBERS) and (n == 1 or rng.random() < 0.7) else str(n)
             slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
-        if getattr(p.clause, "nth", 0):
+        if isinstance(p.clause, Enter) and p.clause.nth:
             slots["nth"] = ORDINALS[p.clause.nth]
-        if getattr(p.clause, "side", None):
-            slots["side"] = p.clause.side
+        if (side := side_of(p.clause)) is not None:
+            slots["side"] = side
         if p.word is not None:
             slots["thing"] = f"the {p.word}"
     return template.text.format(**slots)
@@ -170,7 +163,8 @@ def _fill(
 def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, rng: np.random.Generator) -> str:
     """Pieces joined by links and full stops; a stop and a warning begin sentences of their own more often."""
     sentences: list[str] = []
-    current, length, hedged, links = "", 0, False, set()
+    links: set[str] = set()
+    current, length, hedged = "", 0, False
     for n, (text, kinds) in enumerate(pieces):
         last, before = pieces[n - 1] if n else ("", ())
         if (
@@ -292,7 +286,7 @@ class _Heard:
     length: int
     """Characters it accounts for."""
     said: dict[str, str]
-    thing: Thing | None
+    thing: Referent | None
 
 
 def _longest(text: str, lexicon: Lexicon) -> _Heard | None:
@@ -357,28 +351,59 @@ def _any(words: Iterable[str]) -> str:
     return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
+class _Slots:
+    """What the slots of a template held when it was heard; rooms are taken in turn."""
+
+    def __init__(self, heard: _Heard) -> None:
+        self._said, self._thing = heard.said, heard.thing
+        nouns = (heard.said.get(slot) for slot in ("room", "other"))
+        self._rooms: Iterator[str] = iter([ROOM_OF_NOUN[noun] for noun in nouns if noun])
+
+    def room(self) -> str:
+        """The kind of the next room."""
+        return next(self._rooms)
+
+    @property
+    def side(self) -> str:
+        return self._said["side"]
+
+    @property
+    def nth(self) -> int:
+        return ORDINALS.index(self._said["nth"])
+
+    @property
+    def metres(self) -> int:
+        count = self._said["n"]
+        return NUMBERS.index(count) if count in NUMBERS else int(count)
+
+    @property
+    def thing(self) -> Referent:
+        assert self._thing is not None  # its template has the slot
+        return self._thing
+
+
+MAKERS: Mapping[str, Callable[[_Slots], Clause]] = {
+    "turn": lambda s: Turn(s.side),
+    "slight": lambda s: Turn(s.side, 45),
+    "around": lambda s: Turn(LEFT, 180),
+    "exit": lambda s: Exit(s.room()),
+    "enter": lambda s: Enter(s.room()),
+    "cross": lambda s: Cross(s.room()),
+    "door": lambda s: Enter(s.room(), s.side, s.nth),
+    "forward": lambda s: Forward(),
+    "metres": lambda s: Metres(s.metres),
+    "to": lambda s: To(s.thing),
+    "past": lambda s: Past(s.thing),
+    "past_side": lambda s: Past(s.thing, s.side),
+    "avoid": lambda s: Avoid(s.room()),
+    "notice": lambda s: Notice(s.thing),
+    "stop_by": lambda s: StopBy(s.thing),
+    "stop_in": lambda s: StopIn(s.room()),
+    "stop_here": lambda s: StopHere(),
+}
+"""The clause that each name of the templates means."""
+
+
 def _clauses(heard: _Heard) -> list[Clause]:
-    said, thing, side = heard.said, heard.thing, heard.said.get("side")
-    rooms = iter([ROOM_OF_NOUN[said[k]] for k in ("room", "other") if said.get(k)])
-    count = said.get("n")
-    number = (NUMBERS.index(count) if count in NUMBERS else int(count)) if count else 0
-    make = {
-        "turn": lambda: Turn(side),
-        "slight": lambda: Turn(side, 45),
-        "around": lambda: Turn(LEFT, 180),
-        "exit": lambda: Exit(next(rooms)),
-        "enter": lambda: Enter(next(rooms)),
-        "cross": lambda: Cross(next(rooms)),
-        "door": lambda: Enter(next(rooms), side, ORDINALS.index(said["nth"])),
-        "forward": Forward,
-        "metres": lambda: Metres(number),
-        "to": lambda: To(thing),
-        "past": lambda: Past(thing),
-        "past_side": lambda: Past(thing, side),
-        "avoid": lambda: Avoid(next(rooms)),
-        "notice": lambda: Notice(thing),
-        "stop_by": lambda: StopBy(thing),
-        "stop_in": lambda: StopIn(next(rooms)),
-        "stop_here": StopHere,
-    }
-    return [make[kind]() for kind in heard.template.kinds]
+    slots = _Slots(heard)
+    return [MAKERS[kind](slots) for kind in heard.template.kinds]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.language.clauses import Thing
+from embodied.language.clauses import Referent
 from embodied.language.nouns import MORE_NOUNS
 from embodied.language.templates import BODY_PRAISE, PRAISE, SEAT_PRAISE, SIZES
 
@@ -144,13 +144,13 @@ class Lexicon:
         """The class's name first, then the asset's synonyms, then what else people say."""
         return (asset.object_class, *asset.synonyms, *MORE_NOUNS.get(asset.object_class, ()))
 
-    def thing(self, word: Word) -> Thing:
+    def thing(self, word: Word) -> Referent:
         """What a word may stand for.
 
         Raises:
           KeyError: no such noun.
         """
-        return Thing(self.classes_of[word.noun], tuple(sorted(w for w in word.adjectives if w not in EMPTY)))
+        return Referent(self.classes_of[word.noun], tuple(sorted(w for w in word.adjectives if w not in EMPTY)))
 
     def words_for(self, asset: Asset, rng: np.random.Generator, *, adjectives: int, ornament: float = 0.0) -> Word:
         """A noun for an asset, with up to `adjectives` of its colour and material words.
@@ -167,7 +167,7 @@ class Lexicon:
         more = [extra[int(rng.integers(len(extra)))]] if rng.random() < ornament else []
         return Word(noun, (*more, *spare[:adjectives]))
 
-    def things_at(self, text: str) -> Iterator[tuple[str, Thing]]:
+    def things_at(self, text: str) -> Iterator[tuple[str, Referent]]:
         """What the beginning of `text` may name, the longest wording first: (words, thing)."""
         tokens = text.split(" ", MOST_WORDS)[:MOST_WORDS]
         for n in range(len(tokens), 0, -1):
@@ -175,12 +175,12 @@ class Lexicon:
             if thing is not None:
                 yield " ".join(tokens[:n]), thing
 
-    def heard(self, tokens: list[str]) -> Thing | None:
+    def heard(self, tokens: list[str]) -> Referent | None:
         """The thing that adjectives and a noun mean, the longest noun at their end; None if they name nothing."""
         for i in range(len(tokens)):
             found = self.classes_of.get(" ".join(tokens[i:]))
             if found is not None and (words := self._adjectives_of(tokens[:i])) is not None:
-                return Thing(found, tuple(sorted(w for w in words if w not in EMPTY)))
+                return Referent(found, tuple(sorted(w for w in words if w not in EMPTY)))
         return None
 
     def _adjectives_of(self, tokens: list[str]) -> list[str] | None:
@@ -208,7 +208,7 @@ def lexicon_of(catalogue: Catalogue) -> Lexicon:
     return Lexicon(catalogue)
 
 
-def says(asset: Asset, thing: Thing) -> bool:
+def says(asset: Asset, thing: Referent) -> bool:
     """Whether `thing` may mean this asset."""
     own = {w.lower() for w in (*asset.colours, *asset.materials)}
     return asset.object_class in thing.classes and all(w in own for w in thing.words)

@@ -11,7 +11,7 @@ import dataclasses
 import heapq
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from embodied.geometry import wrap
@@ -26,6 +26,7 @@ from embodied.language.clauses import (
     Exit,
     Metres,
     Past,
+    Referent,
     RouteInstruction,
     StopBy,
     StopIn,
@@ -34,7 +35,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
-from embodied.language.seen import Eyes, Seen, doorway
+from embodied.language.seen import Eyes, Seen, Way, doorway
 
 LONGEST = 4
 """Most steps that one clause may stand for."""
@@ -70,25 +71,52 @@ def carry_out(eyes: Eyes, instruction: RouteInstruction, start: int, yaw: float)
     """The cheapest walk that fits the clauses, found by uniform-cost search."""
     clauses = runnable(instruction.clauses)
     tie = itertools.count()
-    queue = [(0.0, next(tie), (start,), yaw, 0, 0, 0.0)]
+    queue = [(0.0, next(tie), _Walk((start,), yaw))]
     seen_states: set[tuple] = set()
-    fallback, farthest = (start,), -1
+    fallback: tuple[int, ...] = (start,)
+    farthest = -1
     for _ in range(PATIENCE):
         if not queue:
             break
-        cost, _, path, facing, k, begun, pending = heapq.heappop(queue)
-        if k == len(clauses):
-            return Heard(path, cost, eyes.visited)
-        state = (path[-1], path[-2:-1], k, len(path) - 1 - begun, pending)
-        if state in seen_states:
+        cost, _, walk = heapq.heappop(queue)
+        if walk.clause == len(clauses):
+            return Heard(walk.path, cost, eyes.visited)
+        if walk.state in seen_states:
             continue
-        seen_states.add(state)
-        if k > farthest:
-            fallback, farthest = path, k
-        for step in _onward(eyes, clauses, path, facing, k, begun, pending):
-            added, new_path, new_facing, new_k, new_begun, new_pending = step
-            heapq.heappush(queue, (cost + added, next(tie), new_path, new_facing, new_k, new_begun, new_pending))
+        seen_states.add(walk.state)
+        if walk.clause > farthest:
+            fallback, farthest = walk.path, walk.clause
+        for added, further in _onward(eyes, clauses[walk.clause], walk):
+            heapq.heappush(queue, (cost + added, next(tie), further))
     return Heard(fallback, math.inf, eyes.visited)
+
+
+@dataclass(frozen=True, slots=True)
+class _Walk:
+    """A partial walk, and how far in the instruction it is."""
+
+    path: tuple[int, ...]
+    facing: float
+    """Radians."""
+    clause: int = 0
+    """Index of the clause that is being carried out."""
+    begun: int = 0
+    """Index in `path` where it began."""
+    pending: float = 0.0
+    """Turn that was asked for and not made yet, radians."""
+
+    @property
+    def steps(self) -> int:
+        """Of this clause, so far."""
+        return len(self.path) - 1 - self.begun
+
+    @property
+    def state(self) -> tuple:
+        """Walks that agree in it go on alike."""
+        return self.path[-1], self.path[-2:-1], self.clause, self.steps, self.pending
+
+    def next_clause(self, pending: float) -> _Walk:
+        return _Walk(self.path, self.facing, self.clause + 1, len(self.path) - 1, pending)
 
 
 def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
@@ -99,44 +127,35 @@ def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
     return tuple(kept)
 
 
-def _onward(
-    eyes: Eyes, clauses: Sequence[Clause], path: tuple[int, ...], facing: float, k: int, begun: int, pending: float
-):
-    """All ways to go on: finish this clause, or take a step within it.
-
-    `begun` is the index in `path` where clause k began, `pending` the turn (radians) that was asked
-    for and not made yet.
-    """
-    clause = clauses[k]
+def _onward(eyes: Eyes, clause: Clause, walk: _Walk) -> Iterator[tuple[float, _Walk]]:
+    """All ways to go on, with what they cost: finish this clause, or take a step within it."""
+    path, steps, pending = walk.path, walk.steps, walk.pending
     if isinstance(clause, Turn):
         turned = math.radians(clause.angle) * (1 if clause.side == LEFT else -1)
-        yield 0.0, path, facing, k + 1, len(path) - 1, pending + turned
+        yield 0.0, walk.next_clause(pending + turned)
         return
     if isinstance(clause, STOPS):
-        yield stop_cost(clause, eyes.at(path[-1])), path, facing, k + 1, len(path) - 1, pending
+        yield stop_cost(clause, eyes.at(path[-1])), walk.next_clause(pending)
         return
-    steps = len(path) - 1 - begun
     if steps:
-        yield (
-            walk_cost(clause, eyes, path[begun:]) + count_cost(clause, eyes, path),
-            path,
-            facing,
-            k + 1,
-            len(path) - 1,
-            0.0,
-        )
+        yield walk_cost(clause, eyes, path[walk.begun :]) + count_cost(clause, eyes, path), walk.next_clause(0.0)
     elif isinstance(clause, To | Past):
-        yield 0.8 + walk_cost(clause, eyes, path[begun:]), path, facing, k + 1, len(path) - 1, pending
+        yield 0.8 + walk_cost(clause, eyes, path[walk.begun :]), walk.next_clause(pending)
     if steps < LONGEST:
         for way in eyes.at(path[-1]).ways:
-            turned = wrap(way.yaw - facing)
-            cost = 0.12
-            if not (way.leaves and isinstance(clause, Enter) and clause.nth and (turned > 0) == (clause.side == LEFT)):
-                cost += turn_cost(turned, pending if steps == 0 else 0.0, asked=steps == 0 and pending != 0.0)
-            cost += 1.5 * (way.node in path)
+            added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
             if way.leaves and not isinstance(clause, Exit | Enter):
-                cost += 0.4 * (not isinstance(clause, Cross))
-            yield cost, (*path, way.node), way.yaw, k, begun, 0.0 if steps else pending
+                added += 0.4 * (not isinstance(clause, Cross))
+            yield added, _Walk((*path, way.node), way.yaw, walk.clause, walk.begun, 0.0 if steps else pending)
+
+
+def _step_cost(clause: Clause, way: Way, walk: _Walk) -> float:
+    """Of one step in itself: turns that were not asked for, but for the one into a counted door."""
+    turned = float(wrap(way.yaw - walk.facing))
+    if way.leaves and isinstance(clause, Enter) and clause.nth and (turned > 0) == (clause.side == LEFT):
+        return 0.12
+    wanted = walk.pending if walk.steps == 0 else 0.0
+    return 0.12 + turn_cost(turned, wanted, asked=walk.steps == 0 and walk.pending != 0.0)
 
 
 def turn_cost(turned: float, wanted: float, *, asked: bool) -> float:
@@ -179,7 +198,7 @@ def count_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
     return 2.0 if found is None or found[0] != clause.side else min(1.2 * abs(found[1] - clause.nth), 2.0)
 
 
-def near_cost(seen: Seen, thing) -> float:
+def near_cost(seen: Seen, thing: Referent) -> float:
     """How far one is from being at a thing."""
     found = seen.nearest(thing)
     return MISSING if found is None else min(1.3 * max(found.distance - NEAR, 0.0) + 0.15 * found.distance, MISSING)
@@ -209,7 +228,7 @@ def stop_cost(clause: Clause, seen: Seen) -> float:
     return 0.0
 
 
-def _way(seen: Seen, node: int):
+def _way(seen: Seen, node: int) -> Way:
     return next(w for w in seen.ways if w.node == node)
 
 
@@ -227,7 +246,7 @@ class _Led(Eyes):
 
     def __init__(self, world: SeenPlace, path: Sequence[int]) -> None:
         super().__init__(world)
-        self._next = {a: b for a, b in itertools.pairwise(path)}
+        self._next = dict(itertools.pairwise(path))
 
     def at(self, node: int) -> Seen:
         seen = super().at(node)

@@ -37,7 +37,7 @@ class PlainLanguage:
         return " . ".join([*parts, "stop"]) + " ."
 
     def subgoal(self, words: Sequence[str]) -> str:
-        """VNLA's 'hard' sub-goal language (originals 4.4): 'turn 60 degrees left , go forward 2 steps'.
+        """VNLA's 'hard' sub-goal language (docs/sources.md, S47): 'turn 60 degrees left , go forward 2 steps'.
 
         Differs from the authors' program in one thing: repeated 'look up' or 'look down' becomes
         'look 60 degrees up' instead of being dropped in silence.

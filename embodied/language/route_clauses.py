@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,10 +23,10 @@ from embodied.language.clauses import (
     Metres,
     Notice,
     Past,
+    Referent,
     StopBy,
     StopHere,
     StopIn,
-    Thing,
     To,
     Turn,
 )
@@ -101,42 +101,62 @@ def legs_of(world: SeenPlace, path: Sequence[int], yaw: float) -> list[Leg]:
     return legs
 
 
+@dataclass(frozen=True)
+class _Telling:
+    """A speaker who is finding words for a route."""
+
+    world: SeenPlace
+    eyes: Eyes
+    lexicon: Lexicon
+    speaker: Speaker
+    rng: np.random.Generator
+    used: set[str] = field(default_factory=set)
+    """Placements that were mentioned; a speaker names each once."""
+
+    def chance(self, probability: float) -> bool:
+        return bool(self.rng.random() < probability)
+
+    def kind(self, node: int) -> str:
+        """Of the room that a node is in."""
+        return self.world.house.room_by_id[self.world.graph.room_of_node[node]].kind
+
+
 def plan(
     world: SeenPlace, path: Sequence[int], yaw: float, speaker: Speaker, *, rng: np.random.Generator
 ) -> list[Phrase]:
     """Clauses for `path`, with the nouns that the speaker chooses."""
-    eyes, lexicon, house = Eyes(world), lexicon_of(world.catalogue), world.house
-    kind = lambda node: house.room_by_id[world.graph.room_of_node[node]].kind
+    telling = _Telling(world, Eyes(world), lexicon_of(world.catalogue), speaker, rng)
     phrases: list[Phrase] = []
-    used: set[str] = set()
     legs = legs_of(world, path, yaw)
     for n, leg in enumerate(legs):
         phrases += _turn(leg.turn)
-        start, end, last = leg.nodes[0], leg.nodes[-1], n + 1 == len(legs)
         if leg.crosses:
-            crossing = _crossing(eyes, lexicon, leg, kind(start), kind(end), n == 0, speaker, used, rng)
+            crossing = _crossing(telling, leg, first=n == 0)
             walked = [*itertools.chain.from_iterable(earlier.nodes[:-1] for earlier in legs[:n]), *leg.nodes]
-            if rng.random() < speaker.counts and (counted := _counted(eyes, walked, crossing)):
+            if telling.chance(speaker.counts) and (counted := _counted(telling.eyes, walked, crossing)):
                 while phrases and isinstance(phrases[-1].clause, Turn) and phrases[-1].clause.angle != 180:
                     phrases.pop()
                 crossing = counted
             phrases += crossing
-        elif (mark := _mark(eyes, lexicon, leg, speaker, used, rng, needed=last)) is not None:
-            phrases.append(mark)
-        elif rng.random() < speaker.metres or last:
-            phrases.append(Phrase(Metres(max(round(_length(world, leg.nodes)), 1))))
-        elif kind(start) in PASSAGES and rng.random() < 0.5:
-            phrases.append(Phrase(Cross(kind(start))))
         else:
-            phrases.append(Phrase(Forward()))
-    if rng.random() < speaker.remarks and (remark := _remark(eyes, lexicon, path, speaker, used, rng)) is not None:
+            phrases.append(_within_a_room(telling, leg, last=n + 1 == len(legs)))
+    if telling.chance(speaker.remarks) and (remark := _remark(telling, path)) is not None:
         phrases.append(remark)
-    if rng.random() < speaker.avoids and (wrong := _wrong_room(eyes, path, kind)):
+    if telling.chance(speaker.avoids) and (wrong := _wrong_room(telling, path)):
         phrases.append(Phrase(Avoid(wrong)))
-    phrases.append(
-        _stop(eyes, lexicon, path, kind(path[-1]), legs[-1].crosses if legs else False, phrases, speaker, used, rng)
-    )
+    phrases.append(_stop(telling, path, legs[-1].crosses if legs else False, phrases))
     return phrases
+
+
+def _within_a_room(telling: _Telling, leg: Leg, *, last: bool) -> Phrase:
+    """A leg that leaves no room: to or past something, so many metres, through a passage, or straight on."""
+    mark = _mark(telling, leg, needed=last)
+    if mark is not None:
+        return mark
+    if telling.chance(telling.speaker.metres) or last:
+        return Phrase(Metres(max(round(_length(telling.world, leg.nodes)), 1)))
+    here = telling.kind(leg.nodes[0])
+    return Phrase(Cross(here)) if here in PASSAGES and telling.chance(0.5) else Phrase(Forward())
 
 
 def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
@@ -179,22 +199,13 @@ def _turn(angle: float) -> list[Phrase]:
     return [Phrase(Turn(side, 45))] if abs(angle) >= SLIGHT else []
 
 
-def _crossing(
-    eyes: Eyes,
-    lexicon: Lexicon,
-    leg: Leg,
-    here: str,
-    there: str,
-    first: bool,
-    speaker: Speaker,
-    used: set[str],
-    rng: np.random.Generator,
-) -> list[Phrase]:
+def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
     """Out of one room into another, perhaps past something on the way to the door."""
+    here, there = telling.kind(leg.nodes[0]), telling.kind(leg.nodes[-1])
     phrases = []
-    if len(leg.nodes) > 2 and rng.random() < 0.6 * speaker.landmarks:
-        phrases = _passing(eyes, lexicon, leg.nodes[:-1], speaker, used, rng)
-    if first and here in PRIVATE and there in PASSAGES and rng.random() < 0.7:
+    if len(leg.nodes) > 2 and telling.chance(0.6 * telling.speaker.landmarks):
+        phrases = _passing(telling, leg.nodes[:-1])
+    if first and here in PRIVATE and there in PASSAGES and telling.chance(0.7):
         return [*phrases, Phrase(Exit(here))]
     return [*phrases, Phrase(Enter(there))]
 
@@ -208,12 +219,11 @@ def _counted(eyes: Eyes, walked: Sequence[int], crossing: list[Phrase]) -> list[
     return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
 
 
-def _mark(
-    eyes: Eyes, lexicon: Lexicon, leg: Leg, speaker: Speaker, used: set[str], rng: np.random.Generator, *, needed: bool
-) -> Phrase | None:
+def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
     """Something to walk to, or past, on a leg within one room."""
-    if not needed and rng.random() >= speaker.landmarks:
+    if not needed and not telling.chance(telling.speaker.landmarks):
         return None
+    eyes, used = telling.eyes, telling.used
     start, end = eyes.at(leg.nodes[0]), eyes.at(leg.nodes[-1])
     at_start = {t.placement: t for t in start.things}
     heading = next(w.yaw for w in start.ways if w.node == leg.nodes[1])
@@ -226,18 +236,17 @@ def _mark(
         and abs(float(wrap(at_start[t.placement].yaw - heading))) < math.radians(50)
         and at_start[t.placement].distance > t.distance + 0.4
     ]
-    for thing in _ranked(good, rng):
-        if (word := _name(thing, start, lexicon, speaker, rng)) is not None:
+    for thing in _ranked(good, telling.rng):
+        if (word := _name(telling, thing, start)) is not None:
             used.add(thing.placement)
-            return Phrase(To(lexicon.thing(word)), word)
-    passing = _passing(eyes, lexicon, leg.nodes, speaker, used, rng)
+            return Phrase(To(telling.lexicon.thing(word)), word)
+    passing = _passing(telling, leg.nodes)
     return passing[0] if passing else None
 
 
-def _passing(
-    eyes: Eyes, lexicon: Lexicon, nodes: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator
-) -> list[Phrase]:
+def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
     """Something beside the way, with its side where that is clear."""
+    eyes, used = telling.eyes, telling.used
     found: dict[str, tuple[SeenThing, str, Seen]] = {}
     for a, b in itertools.pairwise(nodes):
         seen = eyes.at(b)
@@ -250,52 +259,41 @@ def _passing(
                 and t.placement not in used
             ):
                 found.setdefault(t.placement, (t, LEFT if bearing > 0 else RIGHT, eyes.at(a)))
-    for thing in _ranked([t for t, _, _ in found.values()], rng):
+    for thing in _ranked([t for t, _, _ in found.values()], telling.rng):
         _, side, before = found[thing.placement]
-        if before.nearest(Thing((thing.asset.object_class,))) is None:
+        if before.nearest(Referent((thing.asset.object_class,))) is None:
             continue
-        if (word := _name(thing, before, lexicon, speaker, rng)) is not None:
+        if (word := _name(telling, thing, before)) is not None:
             used.add(thing.placement)
-            return [Phrase(Past(lexicon.thing(word), side if rng.random() < 0.6 else None), word)]
+            return [Phrase(Past(telling.lexicon.thing(word), side if telling.chance(0.6) else None), word)]
     return []
 
 
-def _stop(
-    eyes: Eyes,
-    lexicon: Lexicon,
-    path: Sequence[int],
-    room: str,
-    crossed: bool,
-    phrases: Sequence[Phrase],
-    speaker: Speaker,
-    used: set[str],
-    rng: np.random.Generator,
-) -> Phrase:
+def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequence[Phrase]) -> Phrase:
     """Where to stop: by something near the end that can be seen before, else in the room, else here."""
-    if phrases and isinstance(phrases[-1].clause, To) and rng.random() < 0.7:
+    last = phrases[-1].clause if phrases else None
+    if isinstance(last, To) and telling.chance(0.7):
         return Phrase(StopHere())
-    crossed = crossed and not (
-        phrases and isinstance(phrases[-1].clause, Enter)
-    )  # 'enter the hall and stop in the hall'
-    end = eyes.at(path[-1])
-    before = {t.placement for n in path[-3:-1] for t in eyes.at(n).things}
+    end = telling.eyes.at(path[-1])
+    before = {t.placement for n in path[-3:-1] for t in telling.eyes.at(n).things}
     near = [t for t in end.things if t.distance <= NEAR]
-    for pool in ([t for t in near if t.placement in before and t.placement not in used], near):
-        for thing in _ranked(pool, rng):
-            if (word := _name(thing, end, lexicon, speaker, rng)) is not None:
-                used.add(thing.placement)
-                return Phrase(StopBy(lexicon.thing(word)), word)
-    return Phrase(StopIn(room)) if crossed else Phrase(StopHere())
+    for pool in ([t for t in near if t.placement in before and t.placement not in telling.used], near):
+        for thing in _ranked(pool, telling.rng):
+            if (word := _name(telling, thing, end)) is not None:
+                telling.used.add(thing.placement)
+                return Phrase(StopBy(telling.lexicon.thing(word)), word)
+    # nobody says 'enter the hall and stop in the hall'
+    return Phrase(StopIn(end.kind)) if crossed and not isinstance(last, Enter) else Phrase(StopHere())
 
 
-def _name(thing: SeenThing, view: Seen, lexicon: Lexicon, speaker: Speaker, rng: np.random.Generator) -> Word | None:
+def _name(telling: _Telling, thing: SeenThing, view: Seen) -> Word | None:
     """A word for a thing that means it and nothing nearer in `view`; None if there is none.
 
     Colours and materials are added where they tell two things apart, or because the speaker likes to.
     """
-    wanted = int(rng.random() < speaker.colours)
-    for adjectives in range(wanted, 3):
-        word = lexicon.words_for(thing.asset, rng, adjectives=adjectives, ornament=speaker.ornament)
+    lexicon, speaker = telling.lexicon, telling.speaker
+    for adjectives in range(int(telling.chance(speaker.colours)), 3):
+        word = lexicon.words_for(thing.asset, telling.rng, adjectives=adjectives, ornament=speaker.ornament)
         if not says(thing.asset, meant := lexicon.thing(word)):
             continue
         others = [
@@ -317,23 +315,22 @@ def _ranked(things: Sequence[SeenThing], rng: np.random.Generator) -> list[SeenT
     return sorted(things, key=lambda t: (-weights[t.placement], t.placement))
 
 
-def _remark(
-    eyes: Eyes, lexicon: Lexicon, path: Sequence[int], speaker: Speaker, used: set[str], rng: np.random.Generator
-) -> Phrase | None:
+def _remark(telling: _Telling, path: Sequence[int]) -> Phrase | None:
     """Any thing in view near the end, large or small."""
-    things = [t for t in eyes.at(path[-1 - int(rng.integers(2))]).things if t.placement not in used]
+    rng = telling.rng
+    things = [t for t in telling.eyes.at(path[-1 - int(rng.integers(2))]).things if t.placement not in telling.used]
     if not things:
         return None
-    word = lexicon.words_for(
-        things[int(rng.integers(len(things)))].asset, rng, adjectives=int(rng.integers(2)), ornament=speaker.ornament
-    )
-    return Phrase(Notice(lexicon.thing(word)), word)
+    asset = things[int(rng.integers(len(things)))].asset
+    ornament = telling.speaker.ornament
+    word = telling.lexicon.words_for(asset, rng, adjectives=int(rng.integers(2)), ornament=ornament)
+    return Phrase(Notice(telling.lexicon.thing(word)), word)
 
 
-def _wrong_room(eyes: Eyes, path: Sequence[int], kind) -> str | None:
+def _wrong_room(telling: _Telling, path: Sequence[int]) -> str | None:
     """A room that one could walk into by mistake near the end."""
-    right = {kind(n) for n in path}
-    wrong = sorted({w.kind for n in path[-3:] for w in eyes.at(n).ways if w.leaves} - right)
+    right = {telling.kind(n) for n in path}
+    wrong = sorted({w.kind for n in path[-3:] for w in telling.eyes.at(n).ways if w.leaves} - right)
     return wrong[0] if wrong else None
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.interface import SeenPlace
-from embodied.language.clauses import LEFT, RIGHT, Thing
+from embodied.language.clauses import LEFT, RIGHT, Referent
 from embodied.language.lexicon import UNFIT, says
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Seen:
     ways: tuple[Way, ...]
     doors: tuple[Door, ...] = ()
 
-    def nearest(self, thing: Thing) -> SeenThing | None:
+    def nearest(self, thing: Referent) -> SeenThing | None:
         """The nearest thing in view that `thing` may mean."""
         fitting = [s for s in self.things if says(s.asset, thing)]
         return min(fitting, key=lambda s: (s.distance, s.placement)) if fitting else None
@@ -134,26 +134,33 @@ def look(world: SeenPlace, node: int) -> Seen:
 
 def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:
     """(id, room beyond, middle in x and y) of the doorways of a room that lead to another."""
-    return [
-        (o.id, o.rooms[0] if o.rooms[1] == room else o.rooms[1], (np.asarray(o.a) + np.asarray(o.b)) / 2)
-        for o in world.house.openings
-        if o.kind == "door" and room in o.rooms and None not in o.rooms
-    ]
+    found = []
+    for o in world.house.openings:
+        first, second = o.rooms
+        if o.kind == "door" and room in o.rooms and second is not None:
+            found.append((o.id, first if second == room else second, (np.asarray(o.a) + np.asarray(o.b)) / 2))
+    return found
 
 
 def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
-    """Which doorway the last step of `path` goes through: (side, its number on that side along the way, doors on that side).
+    """Which doorway the last step of `path` goes through: (side, its number on that side, doors on that side).
 
-    Counted from where the path came into the room that it leaves; None where nobody would count.
+    Counted along the way, from where the path came into the room that it leaves; None where nobody would count.
     """
-    steps = [next((w for w in eyes.at(a).ways if w.node == b), None) for a, b in itertools.pairwise(path)]
-    if not steps or None in steps or steps[-1].door is None:
+    steps: list[Way] = []
+    for a, b in itertools.pairwise(path):
+        way = next((w for w in eyes.at(a).ways if w.node == b), None)
+        if way is None:
+            return None
+        steps.append(way)
+    if not steps or steps[-1].door is None:
         return None
     first = max((i + 1 for i, s in enumerate(steps[:-1]) if s.leaves), default=0)
     along = steps[first:-1] or steps[first - 1 : first]
     if not along:
         return None
-    x, y = (sum(s.length * f(s.yaw) for s in along) for f in (math.cos, math.sin))
+    x = sum(s.length * math.cos(s.yaw) for s in along)
+    y = sum(s.length * math.sin(s.yaw) for s in along)
     size = math.hypot(x, y)
     if size < 0.5:
         return None

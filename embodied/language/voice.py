@@ -16,7 +16,7 @@ from embodied.language.seen import Eyes
 from embodied.language.speakers import draw_speaker
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
-"""Clauses beyond the speaker's own wish in each try, while an imagined listener gets lost: other words first, then more."""
+"""Clauses beyond the speaker's own wish, try by try, while an imagined listener gets lost: other words, then more."""
 ARRIVED = 3.0
 """Metres within which the imagined listener has understood, as in R2R's success."""
 
@@ -64,11 +64,11 @@ class People:
         return self._plain.subgoal(words)
 
 
-class Describer:
+class RouteDescriber:
     """Describes any execution in words, P(d | e): ILIAD's teacher while no describer has been learned.
 
-    Differs from the dissertation (3.2.5), where the describer is learned from human descriptions: this
-    one is the grammar itself, so what it says is always true of the execution.
+    Differs from the dissertation (3.2.5; docs/sources.md, S63), where the describer is learned from human
+    descriptions: this one is the grammar itself, so what it says is always true of the execution.
     """
 
     def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
