@@ -25,8 +25,8 @@ from embodied.generate.furnish.rooms import PROGRAMMES, piece
 from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 from embodied.generate.stages import Draft
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
+from embodied.house.shapes import inward
 from embodied.house.validation import STYLES
-from embodied.navigation.free_space import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
 

@@ -17,6 +17,7 @@ from handmade import HandCatalogue, box_mesh, furnished
 from assets.records import Finish, MeshPart
 from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
+from embodied.house.shapes import inward
 from embodied.light import (
     LightError,
     StaleBake,
@@ -39,7 +40,6 @@ from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
-from embodied.navigation.free_space import inward
 from embodied.scene.part import Part
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]

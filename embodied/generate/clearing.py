@@ -10,7 +10,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from embodied.house.house import House, HouseError
-from embodied.navigation.free_space import HEAD, STEP, footprint
+from embodied.house.shapes import footprint
+from embodied.navigation.free_space import HEAD, STEP
 from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")

@@ -13,7 +13,7 @@ import shapely
 
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
-from embodied.navigation.free_space import footprint
+from embodied.house.shapes import footprint
 from embodied.navigation.graph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 

@@ -24,7 +24,7 @@ from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program
 from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
-from embodied.navigation.free_space import inward
+from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
 

@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 from assets.cache import write_bytes
 from embodied.geometry import rectangle, rotation
 from embodied.house.house import House, Opening, Placement, Room, Stair
+from embodied.house.shapes import footprint, inward
 
 Colour = tuple[int, int, int]
 Point = Sequence[float] | np.ndarray
@@ -209,14 +210,14 @@ def _draw_walls(sheet: _Sheet, house: House, rooms: list[Room]) -> None:
 
 def _frame(house: House, o: Opening) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
     """Jambs a and b, the unit normal into the first room, and the wall's extent along it."""
-    a, b = np.asarray(o.a, float), np.asarray(o.b, float)
-    along = (b - a) / np.linalg.norm(b - a)
-    normal = np.array([-along[1], along[0]])
-    room = shapely.Polygon(house.room_by_id[o.rooms[0]].polygon)
-    if not room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)):
-        normal = -normal
     half = house.inner_wall / 2
-    return a, b, normal, -(half if o.rooms[1] is not None else house.outer_wall - half), half
+    return (
+        np.asarray(o.a, float),
+        np.asarray(o.b, float),
+        inward(house, o),
+        -(half if o.rooms[1] is not None else house.outer_wall - half),
+        half,
+    )
 
 
 def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
@@ -437,11 +438,7 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
 def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float, float]:
     """Near the middle, but off furniture where the room leaves a choice."""
     things = shapely.union_all(
-        [
-            shapely.Polygon(rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw))
-            for p in house.placements
-            if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7
-        ]
+        [footprint(p) for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7]
         or [shapely.Point(1e6, 1e6)]
     )
     x0, y0, x1, y1 = inside.bounds

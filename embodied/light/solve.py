@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.house.house import House
+from embodied.house.shapes import inward
 from embodied.light import denoise, radiosity
 from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
 from embodied.light.backend import array, constant, drjit, mitsuba, r2
@@ -17,7 +18,6 @@ from embodied.light.radiosity import Points, Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
 from embodied.light.unwrap import areas_of
-from embodied.navigation.free_space import inward
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import shapely
 
-from embodied.geometry import rectangle
-from embodied.house.house import DOORS, House, Opening, Placement, Room
+from embodied.house.house import DOORS, House, Opening, Room
+from embodied.house.shapes import footprint, inward
 
 EYE = 1.5
 """Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""
@@ -50,11 +50,6 @@ def obstacles(house: House, storey: int, low: float, high: float) -> list[shapel
     return found
 
 
-def footprint(placement: Placement) -> shapely.Polygon:
-    """The rotated rectangle it covers; for a table that includes the air between the legs."""
-    return shapely.Polygon(rectangle(*placement.position[:2], *placement.size[:2], placement.yaw))
-
-
 def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
     """The one leaf of a door, or two from 1.25 m on, as it stands open."""
     a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
@@ -70,15 +65,6 @@ def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
         tip = start + long * (math.cos(opening.angle) * across + math.sin(opening.angle) * normal)
         found.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
     return found
-
-
-def inward(house: House, opening: Opening) -> np.ndarray:
-    """(2,) unit normal of the opening's wall into its first room."""
-    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
-    along = (b - a) / np.linalg.norm(b - a)
-    normal = np.array([-along[1], along[0]])
-    room = shapely.Polygon(house.room_by_id[opening.rooms[0]].polygon)
-    return normal if room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)) else -normal
 
 
 def doorway(house: House, opening: Opening) -> shapely.Polygon:

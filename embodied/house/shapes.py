@@ -1,0 +1,25 @@
+"""The records of a house as shapes on the floor: what an object covers, which way an opening faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from embodied.geometry import rectangle
+from embodied.house.house import House, Opening, Placement
+
+
+def footprint(placement: Placement) -> shapely.Polygon:
+    """The rotated rectangle that an object covers, metres, world; for a table it includes the air between the legs."""
+    x, y, _ = placement.position
+    width, depth, _ = placement.size
+    return shapely.Polygon(rectangle(x, y, width, depth, placement.yaw))
+
+
+def inward(house: House, opening: Opening) -> np.ndarray:
+    """(2,) unit normal of the opening's wall into its first room."""
+    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    along = (b - a) / np.linalg.norm(b - a)
+    normal = np.array([-along[1], along[0]])
+    room = shapely.Polygon(house.room_by_id[opening.rooms[0]].polygon)
+    return normal if room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)) else -normal
