@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+Color = tuple[float, float, float]
+"""sRGB in [0, 1], or linear radiance where it says so."""
 
 ROOM_KINDS = (
     "living_room",
@@ -83,6 +86,11 @@ class MeshPart:
     uv: np.ndarray
     """(n, 2) float32, u right and v up as in OBJ; may leave [0, 1] where the texture repeats."""
     finish: Finish
+
+
+def bounds(parts: Sequence[MeshPart]) -> np.ndarray:
+    """(2, 3) lowest and highest corner of all parts, metres."""
+    return np.array([np.min([p.vertices.min(0) for p in parts], 0), np.max([p.vertices.max(0) for p in parts], 0)])
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from handmade_models import CUBE, write_own, write_pack
 
 from assets.attribution import attribution
 from assets.catalogue import load_catalogue
-from assets.importing.importer import bounds, finish_parts, read_obj
+from assets.importing.importer import finish_parts, read_obj
 from assets.importing.obj import MeshError, parse_obj
 from assets.importing.packs import find_packs
 from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from assets.importing.support_surfaces import contact, find_surfaces
-from assets.records import ROOM_KINDS, SUPPORTS, Recipe
+from assets.records import ROOM_KINDS, SUPPORTS, Recipe, bounds
 from assets.rows import DATA, CatalogueError
 
 SOME = (

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
-from assets.built import MAKERS
+from assets.built import MAKERS, soft, storage, tableware
 from assets.built.primitives import (
     ball,
     bar,
@@ -28,8 +28,10 @@ from assets.built.primitives import (
     tube,
     turned,
 )
+from assets.built.table import BUILDS, read_makers
 from assets.materials import MATERIALS
 from assets.records import ROOM_KINDS, SUPPORTS, Finish
+from assets.rows import CatalogueError
 
 
 @functools.cache
@@ -189,7 +191,7 @@ def test_params_override_the_look_and_the_seed_changes_only_the_details():
 
 DIGEST = """
 import hashlib, numpy as np
-from assets.built import MAKERS
+from assets.built import MAKERS, soft, storage, tableware
 from assets.records import Finish
 h = hashlib.sha256()
 for key in ("built/curtain_linen_0", "built/book_row_2", "built/coat_hooks_0", "built/potted_plant_broad_grey"):
@@ -226,3 +228,57 @@ def test_what_glows_is_known_as_a_lamp_and_lamps_glow(key):
     maker = MAKERS[key]
     glows = any(p.finish.emission is not None for p in maker.make(maker.asset.size, (), finish))
     assert glows == (maker.asset.emits is not None)
+
+
+# the table
+
+
+def things(**row) -> dict:
+    first = {"class": "vase", "build": "decor.vase", "size": [0.1, 0.1, 0.2], "support": "surface", "on": ["desk"]}
+    return {"sets": {"sky": {"word": "blue", "colours": ["blue"], "look": {"glaze": "blue"}}}, "groups": [first | row]}
+
+
+def test_a_new_row_is_a_new_thing():
+    made = read_makers("table", things(name="{} vase", rows={"a": {"set": "sky"}, "b": {"name": "plain vase"}}))
+    a, b = made["built/a"], made["built/b"]
+    assert (a.asset.name, a.asset.colours, a.asset.licence) == ("blue vase", ("blue",), "Apache-2.0")
+    assert a.look == {"seed": 0.0, "glaze": "blue"} and b.look == {"seed": 0.0} and b.asset.name == "plain vase"
+    assert len(a.make(a.asset.size, (), finish)) == len(MAKERS["built/vase_blue"].make(a.asset.size, (), finish))
+
+
+def test_a_thing_after_a_material_takes_its_words():
+    rows = {"a": {"look": {"cloth": "linen/0"}}}
+    row = {"class": "cushion", "build": "soft.cushion", "name": "{} cushion", "after": "cloth"}
+    (maker,) = read_makers("table", things(rows=rows, **row)).values()
+    linen = MATERIALS["linen/0"]
+    assert maker.asset.name == f"{linen.name} cushion" and maker.asset.materials == linen.materials
+
+
+@pytest.mark.parametrize(
+    ("row", "match"),
+    [
+        ({"build": "decor.vases"}, "decor.vase"),
+        ({"set": "sea"}, r"unknown set 'sea'; use one of \['sky'\]"),
+        ({"after": "cloth"}, "should be a material's key, got None"),
+        ({"emits": "sun"}, "one of .*bulb"),
+        ({"surfaces": "tops"}, "'surfaces' should be"),
+        ({"surfaces": [{"name": "top"}]}, "'surfaces' should be"),
+        ({"look": {"glaze": []}}, "words and numbers"),
+        ({"size": [1, 1]}, "three lengths"),
+        ({"colour": "red"}, "unknown fields"),
+    ],
+)
+def test_a_wrong_row_is_named_with_what_it_should_hold(row, match):
+    with pytest.raises(CatalogueError, match=match) as caught:
+        read_makers("table", things(rows={"a": row}))
+    assert "'a'" in str(caught.value)
+
+
+def test_every_builder_and_every_rug_of_the_materials_is_in_the_table():
+    built = {m.make.args[1] for m in MAKERS.values()}
+    helpers = {storage.shelf_surfaces, soft.layers, tableware.cup}
+    assert set(BUILDS.values()) - helpers == built
+    rugs = {str(m.look["pattern"]) for m in MAKERS.values() if "pattern" in m.look}
+    assert {key for key, m in MATERIALS.items() if m.family == "rug"} <= rugs
+    shown = {str(m.look["art"]) for m in MAKERS.values() if "art" in m.look}
+    assert {key for key, m in MATERIALS.items() if m.family == "art"} <= shown

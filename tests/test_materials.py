@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import subprocess
 import sys
@@ -12,7 +13,9 @@ import pytest
 
 from assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
 from assets.materials.maps import fbm, herringbone, hexagons, noise, planks
+from assets.materials.registry import PAINTERS, painters_of, read_materials
 from assets.materials.wood import SPECIES, boards
+from assets.rows import CatalogueError
 
 PICTURES = ("art", "rug", "label")
 """Families that are shown once, not repeated."""
@@ -29,12 +32,10 @@ def seam_ratio(image: np.ndarray) -> float:
 
 
 def one_of_each_recipe() -> list[str]:
-    """One key per maker function and layout, so that every code path is tried once."""
+    """One key per set of painters, so that every code path is tried once."""
     seen, keys = set(), []
     for key, m in MATERIALS.items():
-        recipe = m.recipe
-        inner = [getattr(getattr(v, "func", v), "__qualname__", "") for v in getattr(recipe, "keywords", {}).values()]
-        path = (getattr(recipe, "func", recipe).__qualname__, *inner)
+        path = frozenset(painters_of(m.told))
         if path not in seen and m.family not in PICTURES:
             seen.add(path)
             keys.append(key)
@@ -145,3 +146,91 @@ def test_every_role_a_house_needs_has_a_choice():
         assert len(of_role(role)) >= 4, role
     assert {"paint_white/0", "oak_planks/0", "oak_planks/1"} <= set(MATERIALS)
     assert len(MATERIALS) >= 90 and len({k.split("/")[0] for k in MATERIALS}) >= 30
+
+
+# the table
+
+
+ROW = {
+    "family": "paint",
+    "name": "lime paint",
+    "roles": ["accent_paint"],
+    "colours": ["green"],
+    "materials": ["paint"],
+    "tile": 1.0,
+    "pixels": 64,
+    "maps": {"by": "surface.paint", "color": [0.6, 0.9, 0.2]},
+}
+
+
+def table(**changes) -> dict:
+    return {"groups": [{"rows": {"paint_lime/0": ROW | changes}}]}
+
+
+def test_a_new_row_is_a_new_material():
+    (material,) = read_materials("table", table()).values()
+    maps = material.recipe(64, 1.0, rng=np.random.default_rng(0))
+    assert material.name == "lime paint" and np.abs(maps.color.mean((0, 1)) - (0.6, 0.9, 0.2)).max() < 0.01
+
+
+def test_what_a_group_shares_may_be_overridden_and_its_recipe_is_filled_up():
+    shared = {k: v for k, v in ROW.items() if k != "maps"} | {"maps": {"by": "surface.paint", "rough": 0.3}}
+    made = read_materials(
+        "table",
+        {"groups": [shared | {"rows": {"a/0": {"maps": {"color": [0.5, 0.5, 0.5]}}, "a/1": {**ROW, "tile": 2}}}]},
+    )
+    rough = made["a/0"].recipe(64, 1.0, rng=np.random.default_rng(0)).roughness.mean()
+    assert abs(rough - 0.3) < 0.02 and (made["a/0"].tile, made["a/1"].tile) == (1.0, 2.0)
+    assert made["a/1"].told == {"by": "surface.paint", "rough": 0.3, "color": [0.6, 0.9, 0.2]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"role": ["rug"]}, "unknown fields"),
+        ({"roles": ["flor"]}, "a list of roles"),
+        ({"tile": 0}, "a length"),
+        ({"pixels": 1.5}, "whole number"),
+        ({"maps": {"by": "surface.print"}}, 'should have a "by" out of'),
+        ({"maps": {}}, 'should have a "by" out of'),
+        ({"maps": {"by": "surface.paint", "colour": [1, 0, 0]}}, r"does not take \['colour'\]"),
+    ],
+)
+def test_a_wrong_row_is_named_with_what_it_should_hold(changes, match):
+    with pytest.raises(CatalogueError, match=match) as caught:
+        read_materials("table", table(**changes))
+    assert "paint_lime/0" in str(caught.value)
+
+
+def test_every_painter_of_the_table_exists_for_a_material():
+    """What no row names is dead: a recipe, layout, face or motif that nobody sees."""
+    named = set().union(*(painters_of(m.told) for m in MATERIALS.values()))
+    helpers = {p for p in PAINTERS if p.startswith("maps.")} | {"wood.boards", "wood.Species"}
+    assert set(PAINTERS) - helpers <= named
+
+
+def test_a_fingerprint_changes_with_the_code_that_draws(monkeypatch):
+    keys, real = ("oak/0", "linen/3"), Path.read_bytes
+
+    def after(changed: str) -> list[bool]:
+        monkeypatch.setattr(Path, "read_bytes", lambda p: real(p) + (b"#" if p.name == changed else b""))
+        fingerprint.cache_clear()
+        return [fingerprint(key) != before[key] for key in keys]
+
+    before = {key: fingerprint(key) for key in keys}
+    seen = {name: after(name) for name in ("wood.py", "textile.py", "maps.py", "art.py")}
+    monkeypatch.undo()
+    fingerprint.cache_clear()
+    assert seen == {
+        "wood.py": [True, False],
+        "textile.py": [False, True],
+        "maps.py": [True, True],
+        "art.py": [False, False],
+    }
+
+
+def test_painters_run_no_code_that_fingerprints_do_not_know():
+    for module in {p.__module__ for p in PAINTERS.values()}:
+        tree = ast.parse(Path(sys.modules[module].__file__).read_text())
+        names = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
+        assert {n for n in names if n.startswith("assets")} <= {"assets.materials.maps", "assets.records"}, module

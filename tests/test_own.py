@@ -20,10 +20,10 @@ from PIL import Image
 
 from assets.catalogue import load_catalogue
 from assets.importing import importer
-from assets.importing.importer import bounds
 from assets.importing.meshing import crease_normals
 from assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
 from assets.importing.sh3f import PackError
+from assets.records import bounds
 from assets.rows import CatalogueError
 from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of

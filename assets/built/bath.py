@@ -48,7 +48,7 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     tap = 0.14
     top = h - tap
     z0, z1, y = 0.28, top - 0.05, -d / 2 + 0.01
-    body = carcass(-w / 2 + 0.01, w / 2 - 0.01, y + 0.02, d / 2, z0, z1, top=False)
+    body = carcass((-w / 2 + 0.01, y + 0.02, z0), (w / 2 - 0.01, d / 2, z1), top=False)
     mid = (z0 + z1) / 2
     doors = [
         front(-w / 2 + 0.01, w / 2 - 0.01, a, b, y, str(look.get("style", "flat"))) for a, b in ((z0, mid), (mid, z1))

@@ -67,15 +67,15 @@ def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     image = whole_image(image, art, x0, x1, z0, z1)
     mat = []
     if m > 0:
-        a, b = _inset(outer, f), _inset(outer, g)
+        rim, hole = _inset(outer, f), _inset(outer, g)
         mat = [
             quads(
                 [
                     [
-                        (a[k][0], y0 + 0.012, a[k][1]),
-                        (a[(k + 1) % 4][0], y0 + 0.012, a[(k + 1) % 4][1]),
-                        (b[(k + 1) % 4][0], y0 + 0.012, b[(k + 1) % 4][1]),
-                        (b[k][0], y0 + 0.012, b[k][1]),
+                        (rim[k][0], y0 + 0.012, rim[k][1]),
+                        (rim[(k + 1) % 4][0], y0 + 0.012, rim[(k + 1) % 4][1]),
+                        (hole[(k + 1) % 4][0], y0 + 0.012, hole[(k + 1) % 4][1]),
+                        (hole[k][0], y0 + 0.012, hole[k][1]),
                     ]
                 ]
             )
@@ -84,7 +84,7 @@ def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     return parts_of((wood, frame), (PAPER, [*mat, back]), (art, image))
 
 
-def _inset(corners, by: float) -> list[tuple[float, float]]:
+def _inset(corners: list[tuple[float, float]], by: float) -> list[tuple[float, float]]:
     (x0, z0), _, (x1, z1), _ = corners
     return [(x0 + by, z0 + by), (x1 - by, z0 + by), (x1 - by, z1 - by), (x0 + by, z1 - by)]
 

@@ -20,7 +20,9 @@ def shoes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         "blue": (0.16, 0.22, 0.34),
     }[str(look.get("colour", "brown"))]
     length, width = d * 0.97, w * 0.44
-    uppers, soles, laces = [], [], []
+    uppers: list[Shape] = []
+    soles: list[Shape] = []
+    laces: list[Shape] = []
     for side in (-1, 1):
         s, t = np.linspace(0, 1, 22), np.linspace(0, np.pi, 13)
         outline = (
@@ -60,9 +62,8 @@ def shoes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         for shape, group in lay:
             group.append(moved(turned(scaled(shape, side, 1, 1), turn), at, rng.normal(0, 0.003)))
     pale = (0.88, 0.87, 0.84) if look.get("colour") in ("white", "blue") else (0.09, 0.08, 0.075)
-    return parts_of(
-        (plain(colour, 0.45), uppers), (plain(pale, 0.7), soles), (plain(tuple(0.7 * c for c in colour), 0.8), laces)
-    )
+    dark = (0.7 * colour[0], 0.7 * colour[1], 0.7 * colour[2])
+    return parts_of((plain(colour, 0.45), uppers), (plain(pale, 0.7), soles), (plain(dark, 0.8), laces))
 
 
 def _sole(outline: np.ndarray, y: np.ndarray) -> Shape:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from assets.built.maker import (
     plain,
 )
 from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube
-from assets.records import MeshPart
+from assets.records import Finish, MeshPart
 
 TOP = 0.038
 """Thickness of the worktop, metres."""
@@ -33,10 +34,16 @@ PLINTH = (0.10, 0.06)
 
 
 def _base(
-    size, look: Look, finish: FinishOf, doors: list[Shape], grips: list[Shape], top: list[Shape] | None, extra=()
+    size: Size,
+    look: Look,
+    finish: FinishOf,
+    doors: list[Shape],
+    grips: list[Shape],
+    top: list[Shape] | None,
+    extra: Sequence[tuple[Finish, list[Shape] | Shape]] = (),
 ) -> list[MeshPart]:
     w, d, h = size
-    body = carcass(-w / 2, w / 2, -d / 2 + 0.022, d / 2, PLINTH[0], h - TOP, top=top is None)
+    body = carcass((-w / 2, -d / 2 + 0.022, PLINTH[0]), (w / 2, d / 2, h - TOP), top=top is None)
     plinth = box([-w / 2, -d / 2 + 0.022 + PLINTH[1], 0], [w / 2, -d / 2 + 0.04 + PLINTH[1], PLINTH[0]])
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)] if top is None else top
     return parts_of(
@@ -103,8 +110,8 @@ def sink(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         box([lo[0], lo[1] - 0.012, h], [hi[0], lo[1] + 0.006, h + 0.004], 0.0015),
         box([lo[0], hi[1] - 0.006, h], [hi[0], hi[1] + 0.012, h + 0.004], 0.0015),
     ]
-    (x0, y0), (x1, y1), t = lo, hi, 0.03
-    f0, f1 = np.array([x0 + t, y0 + t]), np.array([x1 - t, y1 - t])
+    (x0, y0), (x1, y1), rim_width = lo, hi, 0.03
+    f0, f1 = np.array([x0, y0]) + rim_width, np.array([x1, y1]) - rim_width
     top = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
     low = [(f0[0], f0[1]), (f1[0], f0[1]), (f1[0], f1[1]), (f0[0], f1[1])]
     zb = h - deep
@@ -216,7 +223,7 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
             for z in np.linspace(0, h, 4)[1:-1]
         ]
     return parts_of(
-        (WHITE, [carcass(-w / 2, w / 2, y + 0.02, d / 2, 0, h), *inside]),
+        (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
         (material(look, "front", finish, "lacquer_white/0"), doors),
         (metal(look, finish), grips),
         (GLASS, panes),

@@ -138,53 +138,7 @@ def standing(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     tall = h > 0.9
     sh = min(h * (0.22 if tall else 0.45), w * 0.85)
     z0 = h - sh
-    stem: list[Shape] = []
-    if kind == "tripod":
-        for k in range(3):
-            a = 2 * np.pi * k / 3 + 0.5
-            stem.append(
-                tube(
-                    [
-                        (0.02 * np.cos(a), 0.02 * np.sin(a), z0 + 0.02),
-                        (r * 0.92 * np.cos(a), r * 0.92 * np.sin(a), 0.0),
-                    ],
-                    [0.010, 0.014],
-                    8,
-                )
-            )
-        stem.append(moved(cylinder(0.035, 0, 0.03, 0.006, 16), 0, 0, z0 - 0.005))
-    elif kind == "ceramic":
-        t = np.linspace(0, 1, 12)
-        stem.append(
-            lathe(
-                [
-                    (0, 0),
-                    *np.stack([r * (0.28 + 0.30 * np.sin(np.pi * t**0.8)), t * (z0 - 0.03)], 1),
-                    (0.012, z0 - 0.01),
-                    (0.012, z0 + 0.03),
-                    (0, z0 + 0.03),
-                ],
-                28,
-                0.9,
-            )
-        )
-    else:
-        foot = min(0.15 if tall else 0.075, r * 0.75)
-        stem += [
-            lathe(
-                [
-                    (0, 0),
-                    (foot, 0),
-                    (foot, 0.012),
-                    (foot * 0.9, 0.02),
-                    (0.012, 0.03),
-                    (0.011, z0 + 0.05),
-                    (0, z0 + 0.05),
-                ],
-                28,
-                0.8,
-            )
-        ]
+    stem = _stem(kind, r, z0, tall)
     spider = [
         tube([(-r * 0.8, 0, h - 0.03), (r * 0.8, 0, h - 0.03)], 0.002, 5),
         tube([(0, -r * 0.8, h - 0.03), (0, r * 0.8, h - 0.03)], 0.002, 5),
@@ -193,11 +147,41 @@ def standing(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     body = material(look, "body", finish, "brass/0") if "body" in look else metal(look, finish, "brass")
     shade = _drum(r, r * float(look.get("taper", 0.8)), z0, h - 0.004)
     return parts_of(
-        (body, [joined(*stem)]),
+        (body, stem),
         (metal(look, finish, "brass"), spider),
         (_cloth(look, finish), shade),
         (GLOW, _bulb(z0 + sh * 0.45)),
     )
+
+
+def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
+    """What carries a shade of radius `r` that begins at the height `top`: 'tripod', 'ceramic' or 'stem' on a foot."""
+    if kind == "tripod":
+        angles = [2 * np.pi * k / 3 + 0.5 for k in range(3)]
+        legs = [
+            tube(
+                [(0.02 * np.cos(a), 0.02 * np.sin(a), top + 0.02), (r * 0.92 * np.cos(a), r * 0.92 * np.sin(a), 0.0)],
+                [0.010, 0.014],
+                8,
+            )
+            for a in angles
+        ]
+        return joined(*legs, moved(cylinder(0.035, 0, 0.03, 0.006, 16), 0, 0, top - 0.005))
+    if kind == "ceramic":
+        t = np.linspace(0, 1, 12)
+        belly = np.stack([r * (0.28 + 0.30 * np.sin(np.pi * t**0.8)), t * (top - 0.03)], 1)
+        return joined(lathe([(0, 0), *belly, (0.012, top - 0.01), (0.012, top + 0.03), (0, top + 0.03)], 28, 0.9))
+    foot = min(0.15 if tall else 0.075, r * 0.75)
+    profile = [
+        (0, 0),
+        (foot, 0),
+        (foot, 0.012),
+        (foot * 0.9, 0.02),
+        (0.012, 0.03),
+        (0.011, top + 0.05),
+        (0, top + 0.05),
+    ]
+    return joined(lathe(profile, 28, 0.8))
 
 
 def desk_lamp(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, tube, turned
-from assets.records import Asset, Finish, MeshPart, SupportSurface
+from assets.records import Asset, Color, Finish, MeshPart, SupportSurface
 
 Size = tuple[float, float, float]
 """Width, depth, height, metres."""
@@ -39,6 +40,8 @@ METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "whi
 
 @dataclass(frozen=True, eq=False)
 class Maker:
+    """What is built under one key."""
+
     asset: Asset
     """What it makes when nobody asks for anything else."""
     make: Callable[[tuple[float, float, float], tuple[tuple[str, str | float], ...], FinishOf], tuple[MeshPart, ...]]
@@ -65,25 +68,16 @@ def made(
     return fitted(build((float(x), float(y), float(z)), told, finish, rng=rng), size)
 
 
-def plain(color, roughness: float = 0.5, metallic: float = 0.0, emission=None, specular: float = 0.5) -> Finish:
+def plain(
+    color: Color, roughness: float = 0.5, metallic: float = 0.0, emission: Color | None = None, specular: float = 0.5
+) -> Finish:
     """A finish of one colour (sRGB)."""
     return Finish(color=(*color, 1.0), roughness=roughness, metallic=metallic, emission=emission, specular=specular)
 
 
-def tinted(finish: Finish, emission) -> Finish:
+def tinted(finish: Finish, emission: Color) -> Finish:
     """The same finish, glowing."""
-    return Finish(
-        finish.color,
-        finish.texture,
-        finish.normal_map,
-        finish.roughness_map,
-        finish.roughness,
-        finish.metallic,
-        finish.specular,
-        emission,
-        finish.mirror,
-        finish.tile,
-    )
+    return dataclasses.replace(finish, emission=emission)
 
 
 def metal(look: Look, finish: FinishOf, default: str = "steel") -> Finish:
@@ -167,18 +161,10 @@ def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = Fal
     return joined(*ends, grip)
 
 
-def carcass(
-    x0: float,
-    x1: float,
-    y0: float,
-    y1: float,
-    z0: float,
-    z1: float,
-    board: float = 0.018,
-    back: bool = True,
-    top: bool = True,
-) -> Shape:
-    """Open-fronted box: two sides, bottom, and unless told otherwise top and back."""
+def carcass(low: tuple[float, float, float], high: tuple[float, float, float], top: bool = True) -> Shape:
+    """Open-fronted box from corner to corner: two sides, bottom, back, and unless told otherwise a top."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    board = 0.018
     shapes = [
         box([x0, y0, z0], [x0 + board, y1, z1], 0.001),
         box([x1 - board, y0, z0], [x1, y1, z1], 0.001),
@@ -186,8 +172,7 @@ def carcass(
     ]
     if top:
         shapes.append(box([x0 + board, y0, z1 - board], [x1 - board, y1, z1], 0.001))
-    if back:
-        shapes.append(box([x0 + board, y1 - 0.006, z0 + board], [x1 - board, y1, z1 - board]))
+    shapes.append(box([x0 + board, y1 - 0.006, z0 + board], [x1 - board, y1, z1 - board]))
     return joined(*shapes)
 
 

@@ -8,6 +8,20 @@ from assets.built.maker import SOIL, FinishOf, Look, Size, parts_of, plain
 from assets.built.primitives import Shape, lathe, sheet, tube, turned, two_sided
 from assets.records import MeshPart
 
+GREENS = {
+    "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),
+    "grass": ((0.24, 0.40, 0.18), (0.42, 0.55, 0.28)),
+    "trailing": ((0.20, 0.36, 0.16), (0.40, 0.54, 0.26)),
+    "rubber": ((0.09, 0.19, 0.10), (0.14, 0.27, 0.13)),
+}
+"""Kind of plant to its dark and its light leaves, sRGB."""
+POTS = {
+    "white": plain((0.88, 0.87, 0.84), 0.4),
+    "terracotta": plain((0.66, 0.40, 0.28), 0.8),
+    "grey": plain((0.45, 0.45, 0.45), 0.7),
+    "black": plain((0.09, 0.09, 0.10), 0.5),
+}
+
 
 def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A pot with leaves: 'broad', 'grass', 'trailing' or 'rubber'."""
@@ -20,6 +34,20 @@ def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     f = soil.vertices[soil.faces[0]]
     if np.cross(f[1] - f[0], f[2] - f[0])[2] < 0:
         soil = Shape(soil.vertices, soil.faces[:, ::-1], soil.normals, soil.uv)
+    leaves, stems = _leaves(kind, size, ph, rng=rng)
+    dark, light = GREENS[kind]
+    return parts_of(
+        (POTS[str(look.get("pot", "white"))], pot),
+        (SOIL, soil),
+        (plain((0.28, 0.30, 0.16), 0.8), stems),
+        (plain(dark, 0.4), leaves[::2]),
+        (plain(light, 0.45), leaves[1::2]),
+    )
+
+
+def _leaves(kind: str, size: Size, ph: float, *, rng: np.random.Generator) -> tuple[list[Shape], list[Shape]]:
+    """The leaves and the stems of a plant of `size` in a pot `ph` high, metres."""
+    w, _, h = size
     count = {"broad": 16, "grass": 44, "trailing": 26, "rubber": 18}[kind]
     leaves, stems = [], []
     for k in range(count):
@@ -53,29 +81,11 @@ def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         else:
             reach, z = (0.14 + 0.22 * rng.random()) * w, ph + (h - ph) * rng.uniform(0.35, 0.85)
             tip = np.array([reach * np.cos(a), reach * np.sin(a), z])
-            stems.append(tube([(0, 0, ph * 0.8), tip * [0.5, 0.5, 0.75], tip], 0.0035 * w / 0.3, 5))
+            stems.append(tube(np.stack([(0, 0, ph * 0.8), tip * [0.5, 0.5, 0.75], tip]), 0.0035 * w / 0.3, 5))
             leaves.append(_leaf(a, reach, z, 0.26 * w, 0.17 * w, rng.uniform(-0.35, 0.25)))
     if kind == "rubber":
         stems.append(tube([(0, 0, ph * 0.8), (0.01 * w, 0, (h + ph) / 2), (0, 0, h * 0.93)], 0.012 * w / 0.4, 7))
-    dark, light = {
-        "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),
-        "grass": ((0.24, 0.40, 0.18), (0.42, 0.55, 0.28)),
-        "trailing": ((0.20, 0.36, 0.16), (0.40, 0.54, 0.26)),
-        "rubber": ((0.09, 0.19, 0.10), (0.14, 0.27, 0.13)),
-    }[kind]
-    clay = {
-        "white": plain((0.88, 0.87, 0.84), 0.4),
-        "terracotta": plain((0.66, 0.40, 0.28), 0.8),
-        "grey": plain((0.45, 0.45, 0.45), 0.7),
-        "black": plain((0.09, 0.09, 0.10), 0.5),
-    }[str(look.get("pot", "white"))]
-    return parts_of(
-        (clay, pot),
-        (SOIL, soil),
-        (plain((0.28, 0.30, 0.16), 0.8), stems),
-        (plain(dark, 0.4), leaves[::2]),
-        (plain(light, 0.45), leaves[1::2]),
-    )
+    return leaves, stems
 
 
 def _leaf(angle: float, reach: float, z: float, length: float, width: float, rise: float) -> Shape:

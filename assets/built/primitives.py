@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
-from assets.records import Finish, MeshPart
+from assets.records import Finish, MeshPart, bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +91,6 @@ def shifted_uv(shape: Shape, u: float, v: float) -> Shape:
     return Shape(shape.vertices, shape.faces, shape.normals, shape.uv + [u, v])
 
 
-def swapped_uv(shape: Shape) -> Shape:
-    """The same shape with the grain running the other way."""
-    return Shape(shape.vertices, shape.faces, shape.normals, shape.uv[:, ::-1])
-
-
-def bounds(parts: Sequence[MeshPart]) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner (3,) of all parts, metres."""
-    return (np.min([p.vertices.min(0) for p in parts], axis=0), np.max([p.vertices.max(0) for p in parts], axis=0))
-
-
 def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, ...]:
     """`parts` scaled and moved so that their box is exactly `size`, origin at the centre of its base."""
     low, high = bounds(parts)
@@ -117,15 +108,15 @@ def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, 
 # ------------------------------------------------------------------ flat things
 
 
-def quads(corners: np.ndarray, uv: np.ndarray | None = None) -> Shape:
+def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     """Flat quadrilaterals (m, 4, 3), counter-clockwise; uv (m, 4, 2) metres or projected along the face."""
-    corners = np.asarray(corners, float).reshape(-1, 4, 3)
-    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    p = np.asarray(corners, float).reshape(-1, 4, 3)
+    normals = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    m = len(corners)
+    m = len(p)
     base = 4 * np.arange(m)[:, None]
     faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]], axis=1).reshape(-1, 3)
-    vertices, normals = corners.reshape(-1, 3), np.repeat(normals, 4, axis=0)
+    vertices, normals = p.reshape(-1, 3), np.repeat(normals, 4, axis=0)
     uv = projected_uv(vertices, normals) if uv is None else np.asarray(uv, float).reshape(-1, 2)
     return Shape(vertices, faces, normals, uv)
 
@@ -142,7 +133,7 @@ def projected_uv(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 def flat(polygon: shapely.Geometry, z: float = 0.0, up: bool = True) -> Shape:
     """A horizontal polygon (holes allowed) at height z, facing up or down; uv = x, y in metres."""
-    shape_points, faces = [], []
+    shape_points: list[np.ndarray] = []
     triangles = shapely.constrained_delaunay_triangles(polygon)
     for t in shapely.get_parts(triangles):
         ring = np.asarray(t.exterior.coords)[:3]
@@ -151,14 +142,12 @@ def flat(polygon: shapely.Geometry, z: float = 0.0, up: bool = True) -> Shape:
             continue
         if ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0) != up:
             ring = ring[::-1]
-        faces.append(len(shape_points) + np.arange(3))
-        shape_points.extend(ring[:, :2])
-    points = np.asarray(shape_points, float).reshape(-1, 2)
+        shape_points.append(ring[:, :2])
+    points = np.array(shape_points, dtype=np.float64).reshape(-1, 2)
     points, inverse = np.unique(np.round(points, 9), axis=0, return_inverse=True)
     vertices = np.column_stack([points, np.full(len(points), z)])
     normals = np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(points), 1))
-    faces = inverse.reshape(-1)[np.asarray(faces, int).reshape(-1, 3)]
-    return Shape(vertices, faces, normals, points.copy())
+    return Shape(vertices, inverse.reshape(-1, 3), normals, points.copy())
 
 
 def extruded(polygon: shapely.Polygon, z0: float, z1: float, bevel: float = 0.0) -> Shape:
@@ -258,16 +247,16 @@ for shared in (NORMALS, FACES, BEVELLED_FACES):
     shared.setflags(write=False)
 
 
-def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shape:
+def box(low: ArrayLike, high: ArrayLike, bevel: float = 0.0) -> Shape:
     """An axis-aligned box from corner `low` to corner `high`, its edges rounded off by `bevel` metres.
 
     The bevel shares the faces' vertices, so that shading runs smoothly around the edge. The grain
     (u) follows the longest side.
     """
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    half = (high - low) / 2
+    lowest, highest = np.asarray(low, float), np.asarray(high, float)
+    half = (highest - lowest) / 2
     bevel = min(bevel, 0.49 * float(half.min()))
-    vertices = (low + high) / 2 + CORNERS * (half - bevel + bevel * np.abs(NORMALS))
+    vertices = (lowest + highest) / 2 + CORNERS * (half - bevel + bevel * np.abs(NORMALS))
     uv = np.stack([vertices[ROWS, U_AXIS] * U_SIGN, vertices[ROWS, V_AXIS] * V_SIGN], axis=1)
     longest = half.argmax()
     swap = (longest == V_AXIS) | ((longest != U_AXIS) & (half[V_AXIS] > half[U_AXIS]))
@@ -275,22 +264,22 @@ def box(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> Shap
     return Shape(vertices, BEVELLED_FACES if bevel > 0 else FACES, NORMALS, uv)
 
 
-def bar(a: Sequence[float], b: Sequence[float], width: float, height: float, bevel: float = 0.0) -> Shape:
+def bar(a: ArrayLike, b: ArrayLike, width: float, height: float, bevel: float = 0.0) -> Shape:
     """A straight beam from a to b, `width` across (level) and `height` thick (upright), metres."""
-    a, b = np.asarray(a, float), np.asarray(b, float)
-    length = float(np.linalg.norm(b - a))
-    x = (b - a) / length
+    start, end = np.asarray(a, float), np.asarray(b, float)
+    length = float(np.linalg.norm(end - start))
+    x = (end - start) / length
     side = np.cross([0.0, 0.0, 1.0], x)
     side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([0.0, 1.0, 0.0])
     m = np.stack([x, side, np.cross(x, side)], axis=1)
     s = box([0, -width / 2, -height / 2], [length, width / 2, height / 2], bevel)
-    return Shape(s.vertices @ m.T + a, s.faces, s.normals @ m.T, s.uv)
+    return Shape(s.vertices @ m.T + start, s.faces, s.normals @ m.T, s.uv)
 
 
 # ------------------------------------------------------------------ round things
 
 
-def lathe(profile: Sequence[Sequence[float]], segments: int = 24, crease: float = 0.7) -> Shape:
+def lathe(profile: ArrayLike, segments: int = 24, crease: float = 0.7) -> Shape:
     """A surface of revolution about z of `profile` (k, 2): radius, height.
 
     Outside is to the right of the profile's direction: run it bottom-centre, outside, up, and down
@@ -302,21 +291,23 @@ def lathe(profile: Sequence[Sequence[float]], segments: int = 24, crease: float 
     d = np.diff(p, axis=0)
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     outward = np.stack([d[:, 1], -d[:, 0]], axis=1)
-    rows, row_normals, bands = [], [], []
+    points: list[np.ndarray] = []
+    point_normals: list[np.ndarray] = []
+    bands = []
     for i in range(len(d)):
         turn = np.arccos(np.clip(d[i - 1] @ d[i], -1, 1)) if i else np.pi
         if i and turn < crease:
-            first = len(rows) - 1
+            first = len(points) - 1
             mixed = outward[i - 1] + outward[i]
-            row_normals[first] = mixed / np.linalg.norm(mixed)
+            point_normals[first] = mixed / np.linalg.norm(mixed)
         else:
-            first = len(rows)
-            rows.append(p[i])
-            row_normals.append(outward[i])
-        rows.append(p[i + 1])
-        row_normals.append(outward[i])
-        bands.append((first, len(rows) - 1))
-    rows, row_normals = np.asarray(rows), np.asarray(row_normals)
+            first = len(points)
+            points.append(p[i])
+            point_normals.append(outward[i])
+        points.append(p[i + 1])
+        point_normals.append(outward[i])
+        bands.append((first, len(points) - 1))
+    rows, row_normals = np.array(points), np.array(point_normals)
     angle = np.linspace(0, 2 * np.pi, segments + 1)
     c, s = np.cos(angle), np.sin(angle)
     vertices = np.stack([rows[:, :1] * c, rows[:, :1] * s, np.repeat(rows[:, 1:], segments + 1, 1)], axis=-1)
@@ -356,13 +347,7 @@ def ball(radius: float, segments: int = 16, rings: int = 9) -> Shape:
     return lathe(np.column_stack([np.abs(np.cos(t)) * radius * (np.abs(t) < 1.57), np.sin(t) * radius]), segments, 2.0)
 
 
-def tube(
-    path: Sequence[Sequence[float]],
-    radius: float | Sequence[float],
-    segments: int = 8,
-    closed: bool = False,
-    caps: bool = True,
-) -> Shape:
+def tube(path: ArrayLike, radius: ArrayLike, segments: int = 8, closed: bool = False, caps: bool = True) -> Shape:
     """A round pipe along `path` (k, 3); `radius` in metres, one or one per point."""
     p = np.asarray(path, float)
     k = len(p)

@@ -159,7 +159,7 @@ def throw(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     return parts_of((material(look, "cloth", finish, "tweed/0"), layers(size, int(look.get("layers", 4)), rng=rng)))
 
 
-def layers(size, count: int, *, rng: np.random.Generator) -> list[Shape]:
+def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[Shape]:
     """Folded cloth: rounded slabs on one another, each a little off, joined by folds at the front."""
     w, d, h = size
     t = h / count

@@ -86,7 +86,7 @@ def wardrobe(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         )
         if look.get("mirror") and k == leaves // 2:
             glass.append(box([a + 0.02, y - 0.004, low + 0.03], [b - 0.02, y + 0.001, h - 0.05], 0.001))
-    body = carcass(-w / 2, w / 2, y + 0.02, d / 2, low, h)
+    body = carcass((-w / 2, y + 0.02, low), (w / 2, d / 2, h))
     plinth = box([-w / 2 + 0.01, -d / 2 + 0.05, 0], [w / 2 - 0.01, d / 2 - 0.02, low])
     top = box([-w / 2, -d / 2, h - 0.018], [w / 2, d / 2, h], 0.002)
     return parts_of(

@@ -103,8 +103,9 @@ def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
             raise CatalogueError(f"{where}: the look's {out['after']!r} should be a material's key, got {key!r}")
         made_of = MATERIALS[key]
         word = made_of.name
-        out = {"colours": list(made_of.colours), "materials": list(made_of.materials)} | out
-    return out | {"name": out.get("name", out["class"]).replace("{}", word)}
+        out = merged({"colours": list(made_of.colours), "materials": list(made_of.materials)}, out)
+    out["name"] = str(out.get("name", out["class"])).replace("{}", word)
+    return out
 
 
 def _maker(where: str, key: str, row: Row) -> Maker:

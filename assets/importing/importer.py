@@ -24,7 +24,7 @@ from assets.importing.meshing import crease_normals, decimate, indexed, sound_fa
 from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import Material, MeshError, libraries, parse_mtl, parse_obj
 from assets.importing.sh3f import Pack, PackError
-from assets.records import Finish, MeshPart, Recipe
+from assets.records import Finish, MeshPart, Recipe, bounds
 
 VERSION = 3
 """Part of every cache key; raise it when the import changes."""
@@ -207,7 +207,7 @@ def _part(
 
 def _to_size(parts: list, size: tuple[float, float, float]) -> list:
     """Bring a model that decimation shrank by a hair back to its exact bounding box."""
-    low, high = bounds(tuple(p for p, _ in parts)).astype(np.float64)
+    low, high = bounds([p for p, _ in parts]).astype(np.float64)
     stretch = np.where(high - low > 1e-6, np.array(size) / np.maximum(high - low, 1e-6), 1.0)
     stretch = np.clip(stretch, 0.9, 1.1).astype(np.float32)
     origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]], dtype=np.float32)
@@ -233,7 +233,7 @@ def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
             raise
         except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as e:
             raise PackError(f"texture {name} cannot be read ({e}); {remedy}") from e
-    if clear and image.getchannel("A").getextrema()[0] > 250:
+    if clear and np.asarray(image)[..., 3].min() > 250:
         image = image.convert("RGB")
     scale = MAX_TEXTURE / max(image.size)
     if scale < 1.0:
@@ -244,7 +244,10 @@ def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
 
 def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]]) -> None:
     """Write textures, then the arrays, then the manifest that makes both believed."""
-    sums, arrays, finishes, files = {}, {}, [], {}
+    sums: dict[str, str] = {}
+    arrays: dict[str, np.ndarray] = {}
+    files: dict[int, str] = {}
+    finishes = []
     for i, (part, image) in enumerate(parts):
         texture = None
         if image is not None:
@@ -258,7 +261,7 @@ def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | Non
         finishes.append(asdict(replace(part.finish, texture=texture)))
         arrays |= {f"v{i}": part.vertices, f"f{i}": part.faces, f"n{i}": part.normals, f"t{i}": part.uv}
     with atomic_path(folder / f"{stem}.npz") as temporary:
-        np.savez(temporary, **arrays)
+        np.savez(temporary, allow_pickle=False, **arrays)
         sums[f"{stem}.npz"] = digest(temporary.read_bytes())
     write_json(folder / f"{stem}.json", {"finishes": finishes, "sha256": sums})
 
@@ -300,8 +303,3 @@ def scaled(parts: tuple[MeshPart, ...], ratio: tuple[float, float, float]) -> tu
         n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
         out.append(replace(p, vertices=p.vertices * s, normals=n.astype(np.float32)))
     return tuple(out)
-
-
-def bounds(parts: tuple[MeshPart, ...]) -> np.ndarray:
-    """(2, 3) lowest and highest corner, metres."""
-    return np.array([np.min([p.vertices.min(0) for p in parts], 0), np.max([p.vertices.max(0) for p in parts], 0)])

@@ -107,7 +107,7 @@ def _hub_sums(unit: np.ndarray, weight: np.ndarray, least: float) -> np.ndarray:
     cell = cell.reshape(-1)
     sums = np.stack([np.bincount(cell, unit[:, k] * weight) for k in range(3)], axis=1)
     middle = np.stack([np.bincount(cell, unit[:, k]) for k in range(3)], axis=1)
-    middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-30)
+    middle = middle / np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-30)
     smooth = np.concatenate(
         [(rows @ middle.T > least) @ sums for rows in np.array_split(middle, 1 + len(middle) // 512)]
     )

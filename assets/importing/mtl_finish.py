@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from typing import Any
 
 import numpy as np
 
@@ -56,15 +57,16 @@ def finish_of(material: Material, has_texture: bool) -> Finish:
             alpha = min(alpha, 0.35)
     elif SHINY.search(name):
         roughness = min(roughness, 0.4)
+    red, green, blue = (round(float(c), 4) for c in color)
     return Finish(
-        (*(round(float(c), 4) for c in color), round(max(alpha, 0.1), 3)),
+        (red, green, blue, round(max(alpha, 0.1), 3)),
         roughness=round(roughness, 3),
         metallic=metallic,
         specular=specular,
     )
 
 
-LOOKS = {
+LOOKS: dict[str, dict[str, Any]] = {
     "mirror": {"color": (0.9, 0.9, 0.9, 1.0), "roughness": 0.03, "metallic": 1.0, "mirror": True},
     "glass": {"roughness": 0.05, "metallic": 0.0, "specular": 0.5},
     "metal": {"roughness": 0.3, "metallic": 1.0},

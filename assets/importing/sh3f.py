@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from assets.cache import digest
-from assets.records import IDENTITY
+from assets.records import IDENTITY, Color
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
 MAX_ENTRY = 64 * 2**20
@@ -162,7 +162,12 @@ def _entries(path: Path, fields: Mapping[str, str], licence: str) -> dict[str, E
             rows.setdefault(int(m[2]), {})[m[1]] = value
     entries = {}
     for number in sorted(rows):
-        entry = _entry(path, number, rows[number], licence)
+        try:
+            entry = _entry(path, number, rows[number], licence)
+        except PackError:
+            raise
+        except ValueError as e:
+            raise PackError(f"{path.name}: model {number} has no numbers where they belong ({e}); it is damaged") from e
         entries[entry.key] = entry
     return entries
 
@@ -175,7 +180,7 @@ def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Ent
     width, depth, height = (_number(where, row, f) / 100.0 for f in ("width", "depth", "height"))
     if min(width, depth, height) <= 0:
         raise PackError(f"{where} should have a positive size, got {width} x {depth} x {height} m")
-    rotation = IDENTITY
+    rotation: tuple[float, ...] = IDENTITY
     if row.get("modelRotation"):
         rotation = tuple(float(x) for x in row["modelRotation"].split())
         if len(rotation) != 9 or not all(math.isfinite(x) for x in rotation):
@@ -202,11 +207,16 @@ def _lights(row: Mapping[str, str], size: tuple[float, float, float]) -> tuple[L
     return tuple(
         LightSource(
             (float(x) / 100.0 - size[0] / 2, float(y) / 100.0 - size[1] / 2, float(z) / 100.0),
-            tuple((int(color.lstrip("#"), 16) >> s & 255) / 255 for s in (16, 8, 0)),
+            _rgb(int(color.lstrip("#"), 16)),
             float(d) / 100.0 if d else None,
         )
         for x, y, z, color, d in zip(*columns[:4], diameters)
     )
+
+
+def _rgb(color: int) -> Color:
+    red, green, blue = ((color >> shift & 255) / 255 for shift in (16, 8, 0))
+    return red, green, blue
 
 
 def _number(where: str, row: Mapping[str, str], name: str, default: float | None = None) -> float:

@@ -64,8 +64,7 @@ def find_surfaces(parts: Sequence[MeshPart], step: float = 0.01, limit: int = 12
         for least in (1.0, 0.22, MIN_HEADROOM):
             free = np.zeros(len(xs) * len(ys), dtype=bool)
             free[line[chosen & (room >= least)]] = True
-            free = free.reshape(len(xs), len(ys))
-            for i0, j0, i1, j1 in _rectangles(free, step):
+            for i0, j0, i1, j1 in _rectangles(free.reshape(len(xs), len(ys)), step):
                 inside = chosen & (line // len(ys) >= i0) & (line // len(ys) < i1)
                 inside &= (line % len(ys) >= j0) & (line % len(ys) < j1)
                 found.append(
@@ -141,7 +140,8 @@ def _above(line: np.ndarray, z: np.ndarray, nz: np.ndarray) -> tuple[np.ndarray,
 
 def _levels(z: np.ndarray, cell: float) -> list[float]:
     """Heights with much flat area, the largest area first."""
-    left, levels = np.sort(z), []
+    left = np.sort(z)
+    levels: list[float] = []
     while len(left) * cell >= MIN_AREA and len(levels) < 24:
         first = np.searchsorted(left, left - TOLERANCE)
         last = np.searchsorted(left, left + TOLERANCE)
@@ -155,7 +155,8 @@ def _levels(z: np.ndarray, cell: float) -> list[float]:
 
 def _rectangles(free: np.ndarray, step: float, most: int = 6) -> list[tuple[int, int, int, int]]:
     """Disjoint large rectangles of free cells as (i0, j0, i1, j1), ends excluded."""
-    free, out = free.copy(), []
+    free = free.copy()
+    out: list[tuple[int, int, int, int]] = []
     side = int(np.ceil(MIN_SIDE / step))
     while len(out) < most:
         i0, j0, i1, j1 = _largest(free, side)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
 import json
-import types
+import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest, write_json
+from assets.materials import maps
 from assets.materials.maps import Maps, normal_map
 from assets.materials.material import ROLES, Material
-from assets.materials.registry import MATERIALS
+from assets.materials.registry import MATERIALS, PAINTERS, painters_of
 from assets.records import Finish
 
 __all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
@@ -77,27 +77,11 @@ def _material(key: str) -> Material:
 
 @functools.cache
 def fingerprint(key: str) -> str:
-    """Hex digest of all that the maps of `key` depend on: its recipe's arguments and the code it runs."""
+    """Hex digest of all that the maps of `key` depend on: what its recipe is told and the code that it runs."""
     material = _material(key)
-    recipe, modules = _describe(material.recipe)
-    files = [Path(importlib.import_module(m).__file__) for m in sorted({"assets.materials.maps", *modules})]
-    return digest(key, material.pixels, material.tile, recipe, *files)
-
-
-def _describe(value: object) -> tuple[object, tuple[str, ...]]:
-    """A recipe as plain JSON, and the modules whose functions it names."""
-    if isinstance(value, functools.partial):
-        value = [value.func, list(value.args), sorted(value.keywords.items())]
-    elif callable(value):
-        inner = [cell.cell_contents for cell in value.__closure__ or ()]
-        described, modules = _describe(inner)
-        return [value.__module__, value.__qualname__, described], (value.__module__, *modules)
-    if isinstance(value, types.ModuleType):
-        return value.__name__, (value.__name__,)
-    if isinstance(value, (list, tuple)):
-        pairs = [_describe(v) for v in value]
-        return [p[0] for p in pairs], tuple(m for p in pairs for m in p[1])
-    return value, ()
+    modules = {maps.__name__, *(PAINTERS[name].__module__ for name in painters_of(material.told))}
+    files = [Path(sys.modules[name].__file__ or "") for name in sorted(modules)]
+    return digest(key, material.pixels, material.tile, dict(material.told), *files)
 
 
 def _read_mean(folder: Path) -> dict | None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
-from assets.materials.maps import Maps, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, fbm, mix, noise, rgb, smooth_step
+from assets.records import Color
 
 
 def _flat(color: np.ndarray, rough: float = 0.6) -> Maps:
@@ -15,16 +18,18 @@ def _flat(color: np.ndarray, rough: float = 0.6) -> Maps:
     )
 
 
-def _canvas(n: int, color, *, rng: np.random.Generator, grain: float = 0.015) -> np.ndarray:
+def _canvas(n: int, color: Color, *, rng: np.random.Generator, grain: float = 0.015) -> np.ndarray:
     return rgb(color, (n, n)) * (1 + grain * noise(n, 1.2, 1.2, rng=rng))[..., None]
 
 
-def _fill(image: np.ndarray, points: np.ndarray, color, alpha: float = 1.0) -> np.ndarray:
+def _fill(image: np.ndarray, points: np.ndarray, color: Color | np.ndarray, alpha: float = 1.0) -> np.ndarray:
     """A filled polygon (k, 2) in [0, 1] with y down, antialiased, painted into `image`."""
     return _ink(image, points, 0.0, color, alpha, lambda mask, p: cv2.fillPoly(mask, [p], 255, cv2.LINE_AA, 4))
 
 
-def _stroke(image: np.ndarray, points: np.ndarray, width: float, color, alpha: float = 1.0) -> np.ndarray:
+def _stroke(
+    image: np.ndarray, points: np.ndarray, width: float, color: Color | np.ndarray, alpha: float = 1.0
+) -> np.ndarray:
     """A line through points (k, 2) of `width` in [0, 1], painted into `image`."""
     thick = max(1, round(width * len(image)))
     return _ink(
@@ -32,7 +37,14 @@ def _stroke(image: np.ndarray, points: np.ndarray, width: float, color, alpha: f
     )
 
 
-def _ink(image: np.ndarray, points: np.ndarray, margin: float, color, alpha: float, draw) -> np.ndarray:
+def _ink(
+    image: np.ndarray,
+    points: np.ndarray,
+    margin: float,
+    color: Color | np.ndarray,
+    alpha: float,
+    draw: Callable[[np.ndarray, np.ndarray], object],
+) -> np.ndarray:
     """Paint what `draw(mask, points)` marks, touching only the box around the points."""
     n = len(image)
     low = np.clip(np.floor((points.min(0) - margin) * n).astype(int) - 2, 0, n)
@@ -46,7 +58,9 @@ def _ink(image: np.ndarray, points: np.ndarray, margin: float, color, alpha: flo
     return image
 
 
-def _blob(at, radius: float, wobble: float, *, rng: np.random.Generator) -> np.ndarray:
+def _blob(
+    at: np.ndarray | tuple[float, float], radius: float, wobble: float, *, rng: np.random.Generator
+) -> np.ndarray:
     a = np.linspace(0, 2 * np.pi, 120, endpoint=False)
     r = np.ones_like(a)
     for k in range(1, 5):
@@ -57,7 +71,7 @@ def _blob(at, radius: float, wobble: float, *, rng: np.random.Generator) -> np.n
 # ------------------------------------------------------------------ wall art
 
 
-def shapes(n: int, tile: float, ground, colors, *, rng: np.random.Generator) -> Maps:
+def shapes(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random.Generator) -> Maps:
     """Cut-paper shapes and a few lines, as in prints of the 1950s."""
     image = _canvas(n, ground, rng=rng)
     spots = rng.permutation([(0.35, 0.35), (0.65, 0.3), (0.5, 0.62), (0.3, 0.72), (0.72, 0.7)])
@@ -77,7 +91,7 @@ def shapes(n: int, tile: float, ground, colors, *, rng: np.random.Generator) -> 
     return _flat(image * (1 + 0.02 * fbm(n, 8, 120, 1.0, rng=rng))[..., None], 0.85)
 
 
-def fields(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+def fields(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
     """Soft-edged fields of colour, one above the other."""
     y, x = np.mgrid[0:n, 0:n] / n
     warp = 0.012 * fbm(n, 3, 60, 1.4, rng=rng)
@@ -92,7 +106,17 @@ def fields(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
     return _flat(image, 0.8)
 
 
-def hills(n: int, tile: float, sky, far, near, layers: int = 6, sun: bool = True, *, rng: np.random.Generator) -> Maps:
+def hills(
+    n: int,
+    tile: float,
+    sky: Colors,
+    far: Color,
+    near: Color,
+    layers: int = 6,
+    sun: bool = True,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
     """Ridges behind ridges in haze under a graded sky."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
     image = mix(rgb(sky[0], (n, n)), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
@@ -115,7 +139,7 @@ def hills(n: int, tile: float, sky, far, near, layers: int = 6, sun: bool = True
     return _flat(image, 0.5)
 
 
-def sea(n: int, tile: float, sky, water, *, rng: np.random.Generator) -> Maps:
+def sea(n: int, tile: float, sky: Colors, water: Colors, *, rng: np.random.Generator) -> Maps:
     """A level horizon, clouds and glittering water."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
     clouds = smooth_step(fbm(n, 1.5, 60, 1.6, 2.5, rng=rng), 0.2, 2.0)
@@ -128,7 +152,7 @@ def sea(n: int, tile: float, sky, water, *, rng: np.random.Generator) -> Maps:
     return _flat(np.where((y < 0.55)[..., None], up, down), 0.45)
 
 
-def botanical(n: int, tile: float, ground, ink, fern: bool = True, *, rng: np.random.Generator) -> Maps:
+def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True, *, rng: np.random.Generator) -> Maps:
     """One pressed or drawn plant on paper, with a line of writing below."""
     image = _canvas(n, ground, rng=rng)
     t = np.linspace(0, 1, 50)
@@ -159,16 +183,16 @@ def botanical(n: int, tile: float, ground, ink, fern: bool = True, *, rng: np.ra
                 image = _fill(image, _leaf_shape(at, angle, length, 0.24 * length), shade, 0.9)
                 d = np.array([np.cos(angle), np.sin(angle)])
                 image = _stroke(image, at + np.linspace(0, 0.92, 6)[:, None] * d * length, 0.002, rgb(ground) * 0.92)
-    x = 0.40
-    while x < 0.60:
+    pen = 0.40
+    while pen < 0.60:
         w = rng.uniform(0.008, 0.03)
-        line = np.stack([np.linspace(x, x + w, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
+        line = np.stack([np.linspace(pen, pen + w, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
         image = _stroke(image, line, 0.0025, (0.25, 0.23, 0.2), 0.8)
-        x += w + 0.008
+        pen += w + 0.008
     return _flat(image, 0.85)
 
 
-def _leaf_shape(at, angle: float, length: float, half: float) -> np.ndarray:
+def _leaf_shape(at: np.ndarray, angle: float, length: float, half: float) -> np.ndarray:
     t = np.linspace(0, 1, 14)
     w = half * np.sin(np.pi * t) ** 0.85
     p = np.concatenate([np.stack([t * length, w], 1), np.stack([t * length, -w], 1)[::-1]])
@@ -176,7 +200,7 @@ def _leaf_shape(at, angle: float, length: float, half: float) -> np.ndarray:
     return p @ np.array([[c, s], [-s, c]]) + at
 
 
-def brushwork(n: int, tile: float, ground, colors, *, rng: np.random.Generator) -> Maps:
+def brushwork(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random.Generator) -> Maps:
     """Abstract painting: loaded brush strokes over one another, with relief."""
     image = _canvas(n, ground, rng=rng, grain=0.03)
     height = np.zeros((n, n), np.float32)
@@ -200,7 +224,7 @@ def brushwork(n: int, tile: float, ground, colors, *, rng: np.random.Generator) 
     return Maps(done.color, height, done.roughness)
 
 
-def still_life(n: int, tile: float, ground, table, fruit, *, rng: np.random.Generator) -> Maps:
+def still_life(n: int, tile: float, ground: Color, table: Color, fruit: Colors, *, rng: np.random.Generator) -> Maps:
     """A bowl of fruit against a dark wall, in soft paint."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
     image = mix(
@@ -228,7 +252,7 @@ def still_life(n: int, tile: float, ground, table, fruit, *, rng: np.random.Gene
     return _flat(image, 0.5)
 
 
-def poster(n: int, tile: float, ground, ink, accent, *, rng: np.random.Generator) -> Maps:
+def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng: np.random.Generator) -> Maps:
     """A typographic poster: a large shape, a heading and lines of small print."""
     image = _canvas(n, ground, rng=rng, grain=0.008)
     kind = int(rng.integers(3))
@@ -275,7 +299,16 @@ def poster(n: int, tile: float, ground, ink, accent, *, rng: np.random.Generator
 # ------------------------------------------------------------------ rugs, seen from above, u along the length
 
 
-def oriental(n: int, tile: float, field, border, accent, line=(0.12, 0.10, 0.10), *, rng: np.random.Generator) -> Maps:
+def oriental(
+    n: int,
+    tile: float,
+    field: Color,
+    border: Color,
+    accent: Color,
+    line: Color = (0.12, 0.10, 0.10),
+    *,
+    rng: np.random.Generator,
+) -> Maps:
     """A knotted rug: medallion, mirrored field ornaments, main and guard borders."""
     s = n // 4
     y, x = np.mgrid[0:s, 0:s].astype(np.float32) / s
@@ -308,7 +341,7 @@ def oriental(n: int, tile: float, field, border, accent, line=(0.12, 0.10, 0.10)
     return _pile(cv2.resize(image, (n, n), interpolation=cv2.INTER_CUBIC), 0.09, rng=rng)
 
 
-def kilim(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+def kilim(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
     """Flat-woven bands of stepped diamonds."""
     s = 160
     image = np.zeros((s, s, 3), np.float32)
@@ -332,7 +365,7 @@ def kilim(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
     return _pile(image, 0.05, rng=rng)
 
 
-def berber(n: int, tile: float, ground, line, diamonds: int = 3, *, rng: np.random.Generator) -> Maps:
+def berber(n: int, tile: float, ground: Color, line: Color, diamonds: int = 3, *, rng: np.random.Generator) -> Maps:
     """A shaggy light rug with a hand-drawn lattice of dark lines."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
     wob = 0.006 * fbm(n, 3, 40, 1.4, rng=rng)
@@ -341,7 +374,15 @@ def berber(n: int, tile: float, ground, line, diamonds: int = 3, *, rng: np.rand
     return _pile(image, 0.13, rng=rng)
 
 
-def bordered(n: int, tile: float, field, border, bands=((0.0, 0.09),), *, rng: np.random.Generator) -> Maps:
+def bordered(
+    n: int,
+    tile: float,
+    field: Color,
+    border: Color,
+    bands: tuple[tuple[float, float], ...] = ((0.0, 0.09),),
+    *,
+    rng: np.random.Generator,
+) -> Maps:
     """Plain with one or more bands along the edge."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
     edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
@@ -351,7 +392,7 @@ def bordered(n: int, tile: float, field, border, bands=((0.0, 0.09),), *, rng: n
     return _pile(image, 0.09, rng=rng)
 
 
-def modern(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
+def modern(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
     """Large overlapping arcs and fields in a few muted colours."""
     image = rgb(colors[0], (n, n))
     for k in range(6):
@@ -361,7 +402,7 @@ def modern(n: int, tile: float, colors, *, rng: np.random.Generator) -> Maps:
     return _pile(image, 0.09, rng=rng)
 
 
-def striped(n: int, tile: float, colors, count: int = 14, *, rng: np.random.Generator) -> Maps:
+def striped(n: int, tile: float, colors: Colors, count: int = 14, *, rng: np.random.Generator) -> Maps:
     """Cross stripes of several widths."""
     widths = rng.uniform(0.4, 1.6, count)
     edges = np.cumsum(widths) / widths.sum()
@@ -370,7 +411,7 @@ def striped(n: int, tile: float, colors, count: int = 14, *, rng: np.random.Gene
     return _pile(image, 0.06, rng=rng)
 
 
-def rings(n: int, tile: float, colors, count: int = 9, *, rng: np.random.Generator) -> Maps:
+def rings(n: int, tile: float, colors: Colors, count: int = 9, *, rng: np.random.Generator) -> Maps:
     """Concentric rings for a round braided rug."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n - 0.5
     r = np.hypot(x, y) * 2 * count
@@ -394,7 +435,14 @@ def _pile(image: np.ndarray, depth: float, *, rng: np.random.Generator) -> Maps:
 
 
 def dial(
-    n: int, tile: float, face, ink, numerals: bool = True, hour: float = 10.15, *, rng: np.random.Generator
+    n: int,
+    tile: float,
+    face: Color,
+    ink: Color,
+    numerals: bool = True,
+    hour: float = 10.15,
+    *,
+    rng: np.random.Generator,
 ) -> Maps:
     """A clock face with hands."""
     image = rgb(face, (n, n))
@@ -428,7 +476,7 @@ def dial(
     return _flat(image, 0.4)
 
 
-def cover(n: int, tile: float, ground, ink, picture, *, rng: np.random.Generator) -> Maps:
+def cover(n: int, tile: float, ground: Color, ink: Color, picture: Color, *, rng: np.random.Generator) -> Maps:
     """A magazine cover: a title, a photograph of sorts, teasers."""
     sky = mix(
         rgb(picture, (n, n)),

@@ -6,11 +6,16 @@ the image, which is v = 1. Lengths are metres unless a name says pixels.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import scipy.fft
+
+from assets.records import Color
+
+Colors = tuple[Color, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +56,7 @@ def fbm(
     return filtered(n, band, rng=rng)
 
 
-def filtered(n: int, band, *, rng: np.random.Generator) -> np.ndarray:
+def filtered(n: int, band: Callable[[np.ndarray, np.ndarray], np.ndarray], *, rng: np.random.Generator) -> np.ndarray:
     """White noise through the transfer function `band(fx, fy)`, frequencies in cycles per pixel."""
     white = rng.standard_normal((n, n), dtype=np.float32)
     fx = scipy.fft.rfftfreq(n).astype(np.float32)[None]
@@ -90,7 +95,7 @@ def coordinates(n: int, tile: float) -> tuple[np.ndarray, np.ndarray]:
     return u, v
 
 
-def rgb(color, shape: tuple[int, int] | None = None) -> np.ndarray:
+def rgb(color: Color | Colors | np.ndarray, shape: tuple[int, int] | None = None) -> np.ndarray:
     """A colour as float32, (3,) or spread over (n, n, 3)."""
     c = np.asarray(color, np.float32)
     return np.broadcast_to(c, (*shape, 3)).copy() if shape else c
@@ -132,7 +137,7 @@ class Layout:
     count: int
 
 
-def _layout(codes: np.ndarray, along, across, edge) -> Layout:
+def _layout(codes: np.ndarray, along: np.ndarray, across: np.ndarray, edge: np.ndarray) -> Layout:
     names, piece = np.unique(codes, return_inverse=True)
     return Layout(
         piece.reshape(codes.shape),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
 
 from assets.materials.maps import Maps
 
@@ -41,8 +44,16 @@ ROLES = (
 """What a material may be used for."""
 
 
+class Recipe(Protocol):
+    """Draws the maps of a material: n pixels wide, over a square of `tile` metres."""
+
+    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Material:
+    """A procedural material."""
+
     key: str
     """'<maker>/<variant>'."""
     family: str
@@ -56,15 +67,9 @@ class Material:
     tile: float
     """Side of the square the maps cover, metres."""
     pixels: int
-    recipe: Callable[..., Maps]
-    """recipe(pixels, tile, rng=...)."""
+    recipe: Recipe
+    """Draws the maps."""
+    told: Mapping[str, Any]
+    """The row of the table that the recipe was made from: {"by": painter, argument: value, ...}."""
     specular: float = 0.5
     metallic: float = 0.0
-
-
-def listed(stem: str, family: str, role: str, pixels: int, specular: float, rows) -> list[Material]:
-    """Materials '<stem>/0', '<stem>/1', ... of rows (name, colours, material words, recipe), 1 m a tile."""
-    return [
-        Material(f"{stem}/{i}", family, (role,), name, colours, words, 1.0, pixels, recipe, specular)
-        for i, (name, colours, words, recipe) in enumerate(rows)
-    ]

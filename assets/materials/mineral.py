@@ -2,153 +2,194 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
-from assets.materials.maps import Layout, Maps, blurred, coordinates, fbm, look_up, mix, noise, rgb, smooth_step
+from assets.materials.maps import (
+    Color,
+    Colors,
+    Layout,
+    Maps,
+    blurred,
+    bricks,
+    coordinates,
+    fbm,
+    look_up,
+    mix,
+    noise,
+    rgb,
+    smooth_step,
+)
+
+Face = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Colour (n, n, 3), roughness to add (n, n), height (n, n) in metres."""
 
 
-def tiles(
-    n: int,
-    tile: float,
-    layout,
-    surface,
-    grout: tuple[float, float, float] = (0.72, 0.70, 0.66),
-    joint: float = 0.003,
-    bevel: float = 0.0015,
-    tone: float = 0.015,
-    gloss: float = 0.15,
-    waviness: float = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
-    """Tiles laid by `layout(n, tile)` whose faces `surface(x, y, n, rng=rng)` paints.
+@dataclass(frozen=True)
+class Tiles:
+    """Tiles with grout: a recipe."""
 
-    Args:
-      surface: x, y (n, n) in tiles, shifted per piece -> colour (n, n, 3), roughness to add, height.
-      joint: width of the grout, metres.
-      waviness: hand-made unevenness, metres of height per piece.
-    """
-    pieces: Layout = layout(n, tile)
-    pixel = tile / n
+    layout: Callable[[int, float], Layout]
+    surface: Callable[..., Face]
+    """surface(x, y, n, rng=rng) paints the faces: x, y (n, n) in tiles, shifted per piece."""
+    grout: Color = (0.72, 0.70, 0.66)
+    joint: float = 0.003
+    """Width of the grout, metres."""
+    bevel: float = 0.0015
+    tone: float = 0.015
+    """Standard deviation of lightness from tile to tile."""
+    gloss: float = 0.15
+    waviness: float = 0.0
+    """Hand-made unevenness, metres of height per piece."""
+
+    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+        pieces = self.layout(n, tile)
+        pixel = tile / n
+        u, v = coordinates(n, tile)
+        shift = rng.random((pieces.count, 2))
+        x, y = u / tile + shift[pieces.piece, 0], v / tile + shift[pieces.piece, 1]
+        color, rough, height = self.surface(x, y, n, rng=rng)
+        lightness = np.clip(rng.normal(0, self.tone, pieces.count), -2.2 * self.tone, 2.2 * self.tone)
+        color = color * (1 + lightness[pieces.piece])[..., None]
+        half = self.joint / 2
+        inside = smooth_step(pieces.edge, half - pixel * 0.4, half + pixel * 0.6)
+        grain = noise(n, 1.2, 1.2, rng=rng)
+        dirt = fbm(n, 3, 30, 1.0, rng=rng)
+        filler = rgb(self.grout) * (1 + 0.05 * grain + 0.05 * dirt)[..., None]
+        shade = 1 - 0.10 * (1 - smooth_step(pieces.edge, half, half + self.bevel + pixel))
+        color = filler * (1 - inside)[..., None] + color * (inside * shade)[..., None]
+        slope = smooth_step(pieces.edge, half, half + max(self.bevel, pixel))
+        tilt = rng.normal(0, 1, (pieces.count, 2))
+        lie = self.waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
+        height = inside * (height + lie) + 0.0012 * slope
+        rough = np.where(inside > 0.5, self.gloss + rough, 0.88)
+        return Maps(
+            np.clip(color, 0.01, 0.98).astype(np.float32),
+            height.astype(np.float32),
+            np.clip(rough, 0.05, 1).astype(np.float32),
+        )
+
+
+def checker(n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+    """Black and white squares, six to the tile."""
+    layout = functools.partial(bricks, columns=6, rows=6)
+    white = functools.partial(glaze, color=(0.86, 0.85, 0.82), mottle=0.015)
+    made = Tiles(layout, white, tone=0.015, gloss=0.2)(n, tile, rng=rng)
     u, v = coordinates(n, tile)
-    shift = rng.random((pieces.count, 2))
-    x, y = u / tile + shift[pieces.piece, 0], v / tile + shift[pieces.piece, 1]
-    color, rough, height = surface(x, y, n, rng=rng)
-    lightness = np.clip(rng.normal(0, tone, pieces.count), -2.2 * tone, 2.2 * tone)
-    color = color * (1 + lightness[pieces.piece])[..., None]
-    inside = smooth_step(pieces.edge, joint / 2 - pixel * 0.4, joint / 2 + pixel * 0.6)
-    grain = noise(n, 1.2, 1.2, rng=rng)
-    dirt = fbm(n, 3, 30, 1.0, rng=rng)
-    filler = rgb(grout) * (1 + 0.05 * grain + 0.05 * dirt)[..., None]
-    shade = 1 - 0.10 * (1 - smooth_step(pieces.edge, joint / 2, joint / 2 + bevel + pixel))
-    color = filler * (1 - inside)[..., None] + color * (inside * shade)[..., None]
-    slope = smooth_step(pieces.edge, joint / 2, joint / 2 + max(bevel, pixel))
-    tilt = rng.normal(0, 1, (pieces.count, 2))
-    lie = waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
-    height = inside * (height + lie) + 0.0012 * slope
-    rough = np.where(inside > 0.5, gloss + rough, 0.88)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        height.astype(np.float32),
-        np.clip(rough, 0.05, 1).astype(np.float32),
-    )
+    black = ((u // (tile / 6) + v // (tile / 6)) % 2 == 1)[..., None]
+    joint = (layout(n, tile).edge < 0.0015)[..., None]
+    dark = made.color * [0.10, 0.10, 0.105] + 0.01
+    return Maps(np.where(black & ~joint, dark, made.color).astype("float32"), made.height, made.roughness)
 
 
 # ------------------------------------------------------------------ faces of tiles and slabs
 
 
-def glaze(color, mottle: float = 0.008):
+def glaze(
+    x: np.ndarray, y: np.ndarray, n: int, color: Color, mottle: float = 0.008, *, rng: np.random.Generator
+) -> Face:
     """Glazed ceramic, nearly one colour."""
-
-    def surface(x, y, n, *, rng):
-        cloud = look_up(fbm(n, 3, 60, 1.3, rng=rng), x, y)
-        return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud, 2e-5 * cloud
-
-    return surface
+    cloud = look_up(fbm(n, 3, 60, 1.3, rng=rng), x, y)
+    return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud, 2e-5 * cloud
 
 
-def matt(color, speck: float = 0.025, cloudiness: float = 0.016):
+def matt(
+    x: np.ndarray,
+    y: np.ndarray,
+    n: int,
+    color: Color,
+    speck: float = 0.025,
+    cloudiness: float = 0.016,
+    *,
+    rng: np.random.Generator,
+) -> Face:
     """Unglazed stoneware and cement: clouds and fine grain."""
-
-    def surface(x, y, n, *, rng):
-        cloud = look_up(fbm(n, 2, 120, 1.2, rng=rng), x, y)
-        grain = look_up(noise(n, 0.8, 0.8, rng=rng), x, y)
-        return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud, 3e-5 * grain
-
-    return surface
+    cloud = look_up(fbm(n, 2, 120, 1.2, rng=rng), x, y)
+    grain = look_up(noise(n, 0.8, 0.8, rng=rng), x, y)
+    return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud, 3e-5 * grain
 
 
-def marble(base, vein, amount: float = 0.7, second=None):
+def marble(
+    x: np.ndarray, y: np.ndarray, n: int, base: Color, vein: Color, amount: float = 0.7, *, rng: np.random.Generator
+) -> Face:
     """Veined marble: ridges of warped noise, some sharp, most faint."""
-
-    def surface(x, y, n, *, rng):
-        # Whole-number shears keep the period; veins run long along the diagonal.
-        p, q = x + y, 2 * (x - y)
-        wx, wy = fbm(n, 1.5, 14, 1.8, rng=rng), fbm(n, 3, 40, 1.6, rng=rng)
-        p = p + 0.05 * look_up(wx, x, y) + 0.008 * look_up(wy, x, y)
-        q = q + 0.06 * look_up(wx, y, x) + 0.012 * look_up(wy, y, x)
-        x2, y2 = x + 0.03 * look_up(wx, x, y), y + 0.03 * look_up(wy, x, y)
-        wide = np.abs(look_up(fbm(n, 0.9, 7, 2.3, rng=rng), p, q))
-        thin = np.abs(look_up(fbm(n, 1.8, 16, 2.0, rng=rng), p, q + 0.3))
-        presence = smooth_step(look_up(fbm(n, 1.5, 8, 1.3, rng=rng), x, y), -0.6, 1.6)
-        cloud = look_up(fbm(n, 1.5, 90, 1.3, rng=rng), x2, y2)
-        strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
-        faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
-        t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
-        color = mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t)
-        if second is not None:
-            color = mix(color, rgb(second), 0.6 * smooth_step(cloud, 0.7, 2.0))
-        return color, 0.02 * t, 0 * t
-
-    return surface
+    # Whole-number shears keep the period; veins run long along the diagonal.
+    p, q = x + y, 2 * (x - y)
+    wx, wy = fbm(n, 1.5, 14, 1.8, rng=rng), fbm(n, 3, 40, 1.6, rng=rng)
+    p = p + 0.05 * look_up(wx, x, y) + 0.008 * look_up(wy, x, y)
+    q = q + 0.06 * look_up(wx, y, x) + 0.012 * look_up(wy, y, x)
+    x2, y2 = x + 0.03 * look_up(wx, x, y), y + 0.03 * look_up(wy, x, y)
+    wide = np.abs(look_up(fbm(n, 0.9, 7, 2.3, rng=rng), p, q))
+    thin = np.abs(look_up(fbm(n, 1.8, 16, 2.0, rng=rng), p, q + 0.3))
+    presence = smooth_step(look_up(fbm(n, 1.5, 8, 1.3, rng=rng), x, y), -0.6, 1.6)
+    cloud = look_up(fbm(n, 1.5, 90, 1.3, rng=rng), x2, y2)
+    strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
+    faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
+    t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
+    color = mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t)
+    return color, 0.02 * t, 0 * t
 
 
-def slate(base, warm=(0.40, 0.34, 0.28), rust: float = 0.25):
+def slate(
+    x: np.ndarray,
+    y: np.ndarray,
+    n: int,
+    base: Color,
+    warm: Color = (0.40, 0.34, 0.28),
+    rust: float = 0.25,
+    *,
+    rng: np.random.Generator,
+) -> Face:
     """Cleft slate: layered relief and rusty patches."""
-
-    def surface(x, y, n, *, rng):
-        relief = look_up(fbm(n, 2, 150, 1.5, rng=rng), x, y)
-        layers = np.abs((relief * 1.6) % 1.0 - 0.5)
-        cloud = look_up(fbm(n, 2, 40, 1.4, rng=rng), x, y)
-        color = rgb(base) * (1 + 0.10 * relief + 0.05 * cloud)[..., None]
-        color = mix(color, rgb(warm), rust * smooth_step(cloud, 0.6, 2.0))
-        return color, 0.06 * relief, 6e-4 * relief + 3e-4 * layers
-
-    return surface
+    relief = look_up(fbm(n, 2, 150, 1.5, rng=rng), x, y)
+    layers = np.abs((relief * 1.6) % 1.0 - 0.5)
+    cloud = look_up(fbm(n, 2, 40, 1.4, rng=rng), x, y)
+    color = rgb(base) * (1 + 0.10 * relief + 0.05 * cloud)[..., None]
+    color = mix(color, rgb(warm), rust * smooth_step(cloud, 0.6, 2.0))
+    return color, 0.06 * relief, 6e-4 * relief + 3e-4 * layers
 
 
-def terracotta(base=(0.70, 0.42, 0.29), pale=(0.80, 0.58, 0.44)):
+def terracotta(
+    x: np.ndarray,
+    y: np.ndarray,
+    n: int,
+    base: Color = (0.70, 0.42, 0.29),
+    pale: Color = (0.80, 0.58, 0.44),
+    *,
+    rng: np.random.Generator,
+) -> Face:
     """Fired clay: mottled from red to straw."""
-
-    def surface(x, y, n, *, rng):
-        cloud = look_up(fbm(n, 1.5, 50, 1.5, rng=rng), x, y)
-        grain = look_up(noise(n, 0.9, 0.9, rng=rng), x, y)
-        color = mix(rgb(base), rgb(pale), np.clip(0.35 + 0.28 * cloud, 0, 1)) * (1 + 0.025 * grain)[..., None]
-        return color, 0.04 * cloud, 1.5e-4 * cloud + 3e-5 * grain
-
-    return surface
+    cloud = look_up(fbm(n, 1.5, 50, 1.5, rng=rng), x, y)
+    grain = look_up(noise(n, 0.9, 0.9, rng=rng), x, y)
+    color = mix(rgb(base), rgb(pale), np.clip(0.35 + 0.28 * cloud, 0, 1)) * (1 + 0.025 * grain)[..., None]
+    return color, 0.04 * cloud, 1.5e-4 * cloud + 3e-5 * grain
 
 
-def travertine(base=(0.83, 0.76, 0.66), dark=(0.70, 0.60, 0.48)):
+def travertine(
+    x: np.ndarray,
+    y: np.ndarray,
+    n: int,
+    base: Color = (0.83, 0.76, 0.66),
+    dark: Color = (0.70, 0.60, 0.48),
+    *,
+    rng: np.random.Generator,
+) -> Face:
     """Layered limestone with small holes."""
-
-    def surface(x, y, n, *, rng):
-        bands = look_up(fbm(n, 2, 60, 1.2, 7.0, rng=rng), x, y)
-        cloud = look_up(fbm(n, 2, 100, 1.3, rng=rng), x, y)
-        pits = smooth_step(look_up(noise(n, 5.0, 1.4, rng=rng), x, y) + 0.4 * bands, 2.1, 2.6)
-        color = (
-            mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
-        )
-        return color, 0.2 * pits, -6e-4 * pits
-
-    return surface
+    bands = look_up(fbm(n, 2, 60, 1.2, 7.0, rng=rng), x, y)
+    cloud = look_up(fbm(n, 2, 100, 1.3, rng=rng), x, y)
+    pits = smooth_step(look_up(noise(n, 5.0, 1.4, rng=rng), x, y) + 0.4 * bands, 2.1, 2.6)
+    color = mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
+    return color, 0.2 * pits, -6e-4 * pits
 
 
 # ------------------------------------------------------------------ without joints
 
 
-def slab(n: int, tile: float, surface, gloss: float, *, rng: np.random.Generator) -> Maps:
+def slab(n: int, tile: float, surface: Callable[..., Face], gloss: float, *, rng: np.random.Generator) -> Maps:
     """One endless face of stone."""
     u, v = coordinates(n, tile)
     color, rough, height = surface(u / tile, v / tile, n, rng=rng)
@@ -160,7 +201,14 @@ def slab(n: int, tile: float, surface, gloss: float, *, rng: np.random.Generator
 
 
 def granite(
-    n: int, tile: float, colors, weights, grain: float = 0.004, gloss: float = 0.12, *, rng: np.random.Generator
+    n: int,
+    tile: float,
+    colors: Colors,
+    weights: tuple[float, ...],
+    grain: float = 0.004,
+    gloss: float = 0.12,
+    *,
+    rng: np.random.Generator,
 ) -> Maps:
     """Crystals of several minerals: each pixel shows the mineral whose noise is largest there."""
     size = grain / (tile / n)
@@ -177,7 +225,14 @@ def granite(
 
 
 def terrazzo(
-    n: int, tile: float, base, chips, size: float = 0.009, cover: float = 0.45, *, rng: np.random.Generator
+    n: int,
+    tile: float,
+    base: Color,
+    chips: Colors,
+    size: float = 0.009,
+    cover: float = 0.45,
+    *,
+    rng: np.random.Generator,
 ) -> Maps:
     """Broken stone chips in cement, ground flat."""
     color = np.round(rgb(base, (n, n)) * 255).astype(np.uint8)
@@ -196,8 +251,8 @@ def terrazzo(
         spin = rng.uniform(0, 6.28)
         shape = shape @ np.array([[np.cos(spin), -np.sin(spin)], [np.sin(spin), np.cos(spin)]])
         at = rng.random(2) * n
-        tint = rgb(chips[rng.integers(len(chips))]) * rng.normal(1, 0.06)
-        tint = tuple(float(c) for c in np.clip(tint * 255, 4, 250))
+        chip = rgb(chips[rng.integers(len(chips))]) * rng.normal(1, 0.06)
+        tint = tuple(float(c) for c in np.clip(chip * 255, 4, 250))
         for dx in (-n, 0, n):
             for dy in (-n, 0, n):
                 p = shape + at + [dx, dy]
@@ -213,7 +268,7 @@ def terrazzo(
 def concrete(
     n: int,
     tile: float,
-    base=(0.60, 0.59, 0.57),
+    base: Color = (0.60, 0.59, 0.57),
     contrast: float = 0.03,
     gloss: float = 0.75,
     *,
@@ -235,55 +290,56 @@ def concrete(
     )
 
 
-def brick(
-    n: int,
-    tile: float,
-    columns: int,
-    rows: int,
-    color,
-    mortar=(0.70, 0.67, 0.62),
-    spread: float = 0.10,
-    painted: bool = False,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
-    """Brickwork in running bond with rough edges; `painted` covers bricks and mortar with one coat."""
-    u, v = coordinates(n, tile)
-    wave_x, wave_y = fbm(n, 8, 200, 1.0, rng=rng), fbm(n, 8, 200, 1.0, rng=rng)
-    width, height = tile / columns, tile / rows
-    uu, vv = u + 0.0011 * wave_x, v + 0.0011 * wave_y
-    r = np.floor(vv / height).astype(int)
-    x = uu + (r % 2) * 0.5 * width
-    c = np.floor(x / width).astype(int)
-    a, b = x - c * width, vv - r * height
-    edge = np.minimum(np.minimum(a, width - a), np.minimum(b, height - b))
-    piece = (r % rows) * columns + c % columns
-    count = rows * columns
-    face = smooth_step(edge, 0.0045, 0.0075)
-    cloud, grain = fbm(n, 4, 150, 1.1, rng=rng), noise(n, 1.0, 1.0, rng=rng)
-    tone = np.clip(rng.normal(0, spread, count), -0.22, 0.2)
-    burnt = (rng.random(count) < 0.10) * rng.uniform(0.1, 0.3, count)
-    clay = rgb(color) * (1 + tone[piece] - burnt[piece] + 0.05 * cloud + 0.03 * grain)[..., None]
-    clay = clay * (1 + rng.normal(0, 0.025, (count, 1)) * [1.0, 0.0, -1.0])[piece]
-    filler = rgb(mortar) * (1 + 0.04 * grain + 0.05 * cloud)[..., None]
-    relief = 0.005 * face + 5e-4 * cloud * face + 1.2e-4 * grain
-    mixed = filler * (1 - face)[..., None] + clay * face[..., None]
-    if painted:
-        shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
-        mixed = rgb(color) * (shade * (1 + 0.012 * cloud))[..., None]
-    return Maps(
-        np.clip(mixed, 0.02, 0.97).astype(np.float32),
-        relief.astype(np.float32),
-        np.full((n, n), 0.6 if painted else 0.88, np.float32),
-    )
+@dataclass(frozen=True)
+class Brick:
+    """Brickwork in running bond with rough edges: a recipe."""
+
+    columns: int
+    rows: int
+    color: Color
+    mortar: Color = (0.70, 0.67, 0.62)
+    spread: float = 0.10
+    """Standard deviation of lightness from brick to brick."""
+    painted: bool = False
+    """One coat covers bricks and mortar."""
+
+    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+        u, v = coordinates(n, tile)
+        wave_x, wave_y = fbm(n, 8, 200, 1.0, rng=rng), fbm(n, 8, 200, 1.0, rng=rng)
+        width, height = tile / self.columns, tile / self.rows
+        uu, vv = u + 0.0011 * wave_x, v + 0.0011 * wave_y
+        r = np.floor(vv / height).astype(int)
+        x = uu + (r % 2) * 0.5 * width
+        c = np.floor(x / width).astype(int)
+        a, b = x - c * width, vv - r * height
+        edge = np.minimum(np.minimum(a, width - a), np.minimum(b, height - b))
+        piece = (r % self.rows) * self.columns + c % self.columns
+        count = self.rows * self.columns
+        face = smooth_step(edge, 0.0045, 0.0075)
+        cloud, grain = fbm(n, 4, 150, 1.1, rng=rng), noise(n, 1.0, 1.0, rng=rng)
+        tone = np.clip(rng.normal(0, self.spread, count), -0.22, 0.2)
+        burnt = (rng.random(count) < 0.10) * rng.uniform(0.1, 0.3, count)
+        clay = rgb(self.color) * (1 + tone[piece] - burnt[piece] + 0.05 * cloud + 0.03 * grain)[..., None]
+        clay = clay * (1 + rng.normal(0, 0.025, (count, 1)) * [1.0, 0.0, -1.0])[piece]
+        filler = rgb(self.mortar) * (1 + 0.04 * grain + 0.05 * cloud)[..., None]
+        relief = 0.005 * face + 5e-4 * cloud * face + 1.2e-4 * grain
+        mixed = filler * (1 - face)[..., None] + clay * face[..., None]
+        if self.painted:
+            shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
+            mixed = rgb(self.color) * (shade * (1 + 0.012 * cloud))[..., None]
+        return Maps(
+            np.clip(mixed, 0.02, 0.97).astype(np.float32),
+            relief.astype(np.float32),
+            np.full((n, n), 0.6 if self.painted else 0.88, np.float32),
+        )
 
 
 def rubble(
     n: int,
     tile: float,
-    base=(0.62, 0.57, 0.50),
+    base: Color = (0.62, 0.57, 0.50),
     across: int = 5,
-    mortar=(0.64, 0.61, 0.56),
+    mortar: Color = (0.64, 0.61, 0.56),
     *,
     rng: np.random.Generator,
 ) -> Maps:

@@ -1,33 +1,112 @@
-"""All materials by key."""
+"""The table of materials, assets/data/materials.json, read into MATERIALS. docs/assets.md says what a row may hold."""
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
-from assets.materials.list_art import art_materials
-from assets.materials.list_cloth import cloth_materials
-from assets.materials.list_floors import floor_materials
-from assets.materials.list_outdoor import outdoor_materials
-from assets.materials.list_rugs import rug_materials
-from assets.materials.list_walls import wall_materials
-from assets.materials.material import ROLES, Material
+from assets.materials import art, maps, mineral, surface, textile, wood
+from assets.materials.material import ROLES, Material, Recipe
+from assets.rows import DATA, WORD, WORDS, CatalogueError, Field, Row, check_row, is_list, is_number, merged, read_json
+
+PAINTERS: Mapping[str, Any] = MappingProxyType(
+    {
+        f"{module.__name__.rpartition('.')[2]}.{name}": painter
+        for module in (art, maps, mineral, surface, textile, wood)
+        for name, painter in vars(module).items()
+        if callable(painter) and getattr(painter, "__module__", "") == module.__name__ and not name.startswith("_")
+    }
+)
+"""What a row may name with "by", as '<module>.<name>': recipes, and the layouts, faces, motifs and cloths they take."""
+MATERIAL_FIELDS = {
+    "family": WORD,
+    "name": WORD,
+    "roles": Field(
+        f"a list of roles out of {', '.join(ROLES)}", lambda v: is_list(v, lambda r: r in ROLES) and bool(v)
+    ),
+    "colours": WORDS,
+    "materials": WORDS,
+    "tile": Field("a length from 0.01 to 10 metres", lambda v: is_number(v, 0.01, 10.0)),
+    "pixels": Field("a whole number from 64 to 4096", lambda v: isinstance(v, int) and 64 <= v <= 4096),
+    "specular": Field("a number from 0 to 1", lambda v: is_number(v, 0.0, 1.0)),
+    "metallic": Field("a number from 0 to 1", lambda v: is_number(v, 0.0, 1.0)),
+    "maps": Field('an object with "by" and what that is told', lambda v: isinstance(v, dict)),
+}
 
 
-def _build() -> Mapping[str, Material]:
-    made = [
-        *wall_materials(),
-        *floor_materials(),
-        *cloth_materials(),
-        *art_materials(),
-        *rug_materials(),
-        *outdoor_materials(),
-    ]
-    keys = [m.key for m in made]
-    assert len(set(keys)) == len(keys), sorted(k for k in keys if keys.count(k) > 1)
-    assert all(r in ROLES for m in made for r in m.roles)
-    return MappingProxyType({m.key: m for m in sorted(made, key=lambda m: m.key)})
+def read_materials(where: str, table: Row) -> Mapping[str, Material]:
+    """The materials of a table {"groups": [...]} by key, keys sorted.
+
+    Args:
+      where: name of the file, for error messages.
+
+    Raises:
+      CatalogueError: a field that is unknown, missing, or holds what it should not; a key twice.
+    """
+    materials: dict[str, Material] = {}
+    for group in table["groups"]:
+        shared = {name: value for name, value in group.items() if name != "rows"}
+        for key, row in group["rows"].items():
+            if key in materials:
+                raise CatalogueError(f"{where}: {key!r} stands there twice; give one of them another key")
+            materials[key] = _material(f"{where}: {key!r}", key, merged(shared, row, deep=("maps",)))
+    return MappingProxyType(dict(sorted(materials.items())))
 
 
-MATERIALS: Mapping[str, Material] = _build()
+def _material(where: str, key: str, row: Row) -> Material:
+    check_row(where, row, MATERIAL_FIELDS)
+    if missing := sorted(set(MATERIAL_FIELDS) - {"specular", "metallic"} - set(row)):
+        raise CatalogueError(f"{where} should also say {missing}, itself or its group")
+    return Material(
+        key=key,
+        family=row["family"],
+        roles=tuple(row["roles"]),
+        name=row["name"],
+        colours=tuple(row["colours"]),
+        materials=tuple(row["materials"]),
+        tile=float(row["tile"]),
+        pixels=row["pixels"],
+        recipe=recipe_of(where, row["maps"]),
+        told=row["maps"],
+        specular=float(row.get("specular", 0.5)),
+        metallic=float(row.get("metallic", 0.0)),
+    )
+
+
+def recipe_of(where: str, told: Row) -> Recipe:
+    """What {"by": painter, argument: value, ...} stands for: a function that knows these arguments, or the record of
+    a class; values may be such objects themselves, lists become tuples.
+
+    Raises:
+      CatalogueError: an unknown painter, an argument it does not take.
+    """
+    arguments = dict(told)
+    name = arguments.pop("by", None)
+    if name not in PAINTERS:
+        raise CatalogueError(f'{where} should have a "by" out of {", ".join(sorted(PAINTERS))}, got {name!r}')
+    painter = PAINTERS[name]
+    taken = [p.name for p in inspect.signature(painter).parameters.values()]
+    if unknown := sorted(set(arguments) - set(taken)):
+        raise CatalogueError(f"{where}: {name} does not take {unknown}; it takes {taken}")
+    values = {argument: _value(where, value) for argument, value in arguments.items()}
+    return painter(**values) if isinstance(painter, type) else functools.partial(painter, **values)
+
+
+def painters_of(told: object) -> set[str]:
+    """Every painter that a recipe of the table names."""
+    if isinstance(told, dict):
+        return {told["by"]}.union(*(painters_of(value) for value in told.values()))
+    return set()
+
+
+def _value(where: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return recipe_of(where, value)
+    return tuple(_value(where, v) for v in value) if isinstance(value, list) else value
+
+
+MATERIALS: Mapping[str, Material] = read_materials("materials.json", read_json(DATA / "materials.json"))
 """Every material by key, keys sorted."""

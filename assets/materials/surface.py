@@ -7,10 +7,13 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from assets.materials.maps import Maps, blurred, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, blurred, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.records import Color
 
 
-def paint(n: int, tile: float, color, rough: float = 0.85, nap: float = 1.0, *, rng: np.random.Generator) -> Maps:
+def paint(
+    n: int, tile: float, color: Color, rough: float = 0.85, nap: float = 1.0, *, rng: np.random.Generator
+) -> Maps:
     """Wall paint from a roller: one colour, a fine orange peel, hardly any shade."""
     peel = fbm(n, 40, 220, 0.6, rng=rng)
     cloud = fbm(n, 4, 12, 1.0, rng=rng)
@@ -22,7 +25,7 @@ def paint(n: int, tile: float, color, rough: float = 0.85, nap: float = 1.0, *, 
     )
 
 
-def gloss_paint(n: int, tile: float, color, rough: float = 0.35, *, rng: np.random.Generator) -> Maps:
+def gloss_paint(n: int, tile: float, color: Color, rough: float = 0.35, *, rng: np.random.Generator) -> Maps:
     """Satin paint on joinery, with faint brush marks along u."""
     brush = noise(n, 40, 1.2, rng=rng)
     out = rgb(color) * (1 + 0.0022 * brush)[..., None]
@@ -34,7 +37,7 @@ def gloss_paint(n: int, tile: float, color, rough: float = 0.35, *, rng: np.rand
 
 
 def plaster(
-    n: int, tile: float, color, relief: float = 1.0, mottle: float = 0.009, *, rng: np.random.Generator
+    n: int, tile: float, color: Color, relief: float = 1.0, mottle: float = 0.009, *, rng: np.random.Generator
 ) -> Maps:
     """Trowelled lime plaster or roughcast: sweeps, grain, soft clouds."""
     sweep = fbm(n, 5, 90, 1.2, 1.6, rng=rng)
@@ -50,7 +53,7 @@ def plaster(
 def metal(
     n: int,
     tile: float,
-    color,
+    color: Color,
     rough: float = 0.28,
     brushed: float = 1.0,
     stain: float = 0.0,
@@ -70,7 +73,7 @@ def metal(
     )
 
 
-def wicker(n: int, tile: float, color, strands: int = 24, *, rng: np.random.Generator) -> Maps:
+def wicker(n: int, tile: float, color: Color, strands: int = 24, *, rng: np.random.Generator) -> Maps:
     """Basketwork: level strands over and under upright stakes."""
     u, v = coordinates(n, tile)
     y = v / tile * strands + 0.5
@@ -95,8 +98,8 @@ def wicker(n: int, tile: float, color, strands: int = 24, *, rng: np.random.Gene
 def wallpaper(
     n: int,
     tile: float,
-    ground,
-    inks,
+    ground: Color,
+    inks: Colors,
     motif: Callable[..., list[np.ndarray]],
     woven: float = 0.5,
     *,
@@ -116,16 +119,12 @@ def wallpaper(
     )
 
 
-def stripes(count: int, share: float = 0.5, pin: bool = False):
+def stripes(n: int, count: int, share: float = 0.5, pin: bool = False, *, rng: np.random.Generator) -> list[np.ndarray]:
     """Upright stripes; `pin` sets a thin line beside each."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        x = (np.arange(n) + 0.5) / n * count % 1
-        wide = smooth_step(share / 2 - np.abs(x - 0.5), -0.01, 0.01)
-        thin = smooth_step(0.012 - np.abs(np.abs(x - 0.5) - share / 2 - 0.06), -0.006, 0.006)
-        return [np.broadcast_to(m[None], (n, n)) for m in ([wide, thin] if pin else [wide])]
-
-    return motif
+    x = (np.arange(n) + 0.5) / n * count % 1
+    wide = smooth_step(share / 2 - np.abs(x - 0.5), -0.01, 0.01)
+    thin = smooth_step(0.012 - np.abs(np.abs(x - 0.5) - share / 2 - 0.06), -0.006, 0.006)
+    return [np.broadcast_to(m[None], (n, n)) for m in ([wide, thin] if pin else [wide])]
 
 
 class _Print:
@@ -157,7 +156,7 @@ class _Print:
         return cv2.resize(self.mask, (self.n, self.n), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
 
 
-def _leaf(at, angle: float, length: float, width: float, bend: float = 0.0) -> np.ndarray:
+def _leaf(at: np.ndarray, angle: float, length: float, width: float, bend: float = 0.0) -> np.ndarray:
     t = np.linspace(0, 1, 14)
     half = width * np.sin(np.pi * t) ** 0.8 * (1 - 0.35 * t)
     mid = np.stack([t * length, bend * length * t * t], 1)
@@ -166,54 +165,46 @@ def _leaf(at, angle: float, length: float, width: float, bend: float = 0.0) -> n
     return shape @ np.array([[c, s], [-s, c]]) + at
 
 
-def floral(stems: int = 5, scale: float = 1.0):
+def floral(n: int, stems: int = 5, scale: float = 1.0, *, rng: np.random.Generator) -> list[np.ndarray]:
     """Climbing stems with leaves and flowers: inks are leaves, petals, hearts."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        green, petals, hearts = _Print(n), _Print(n), _Print(n)
-        for k in range(stems):
-            x0, phase = (k + rng.uniform(-0.1, 0.1)) / stems, rng.uniform(0, 6.28)
-            t = np.linspace(0, 1, 60)
-            stem = np.stack([x0 + 0.035 * np.sin(2 * np.pi * t + phase) + 0.012 * np.sin(6 * np.pi * t), 1 - t], 1)
-            green.line(stem, 0.004 * scale + 0.002)
-            for i in range(2, 60, 6):
-                side = 1 if (i // 6) % 2 else -1
-                angle = -np.pi / 2 + side * rng.uniform(0.7, 1.2)
-                green.fill(
-                    _leaf(stem[i], angle, scale * rng.uniform(0.05, 0.075), 0.013 * scale, side * 0.25),
-                    rng.uniform(0.6, 1.0),
-                )
-            for i in rng.choice(np.arange(4, 58), 2, replace=False):
-                centre = stem[i] + rng.normal(0, 0.02, 2)
-                r, spin = scale * rng.uniform(0.028, 0.042), rng.uniform(0, 6)
-                for j in range(6):
-                    petals.fill(_leaf(centre, spin + j * np.pi / 3, r, r * 0.42), 0.75 + 0.25 * (j % 2))
-                a = np.linspace(0, 2 * np.pi, 16)
-                hearts.fill(centre + 0.24 * r * np.stack([np.cos(a), np.sin(a)], 1))
-        return [green.done(), petals.done(), hearts.done()]
-
-    return motif
+    green, petals, hearts = _Print(n), _Print(n), _Print(n)
+    for k in range(stems):
+        x0, phase = (k + rng.uniform(-0.1, 0.1)) / stems, rng.uniform(0, 6.28)
+        t = np.linspace(0, 1, 60)
+        stem = np.stack([x0 + 0.035 * np.sin(2 * np.pi * t + phase) + 0.012 * np.sin(6 * np.pi * t), 1 - t], 1)
+        green.line(stem, 0.004 * scale + 0.002)
+        for i in range(2, 60, 6):
+            side = 1 if (i // 6) % 2 else -1
+            angle = -np.pi / 2 + side * rng.uniform(0.7, 1.2)
+            green.fill(
+                _leaf(stem[i], angle, scale * rng.uniform(0.05, 0.075), 0.013 * scale, side * 0.25),
+                rng.uniform(0.6, 1.0),
+            )
+        for i in rng.choice(np.arange(4, 58), 2, replace=False):
+            centre = stem[i] + rng.normal(0, 0.02, 2)
+            r, spin = scale * rng.uniform(0.028, 0.042), rng.uniform(0, 6)
+            for j in range(6):
+                petals.fill(_leaf(centre, spin + j * np.pi / 3, r, r * 0.42), 0.75 + 0.25 * (j % 2))
+            a = np.linspace(0, 2 * np.pi, 16)
+            hearts.fill(centre + 0.24 * r * np.stack([np.cos(a), np.sin(a)], 1))
+    return [green.done(), petals.done(), hearts.done()]
 
 
-def damask(columns: int = 3):
+def damask(n: int, columns: int = 3, *, rng: np.random.Generator) -> list[np.ndarray]:
     """Mirrored ogee ornaments in half drop, tone on tone."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        out = _Print(n)
-        w = 1.0 / columns
-        curls = [(rng.uniform(0.10, 0.3), rng.uniform(0.15, 0.85), rng.uniform(0.3, 1.3)) for _ in range(5)]
-        for c in range(columns):
-            for r in range(columns):
-                centre = np.array([(c + 0.5 * (r % 2) * (columns % 2 == 0)) * w, r * w])
-                for drop in (0, 1):
-                    o = centre + ([0.5 * w, 0.5 * w] if drop else [0, 0])
-                    _ornament(out, o, w, curls)
-        return [out.done()]
-
-    return motif
+    out = _Print(n)
+    w = 1.0 / columns
+    curls = [(rng.uniform(0.10, 0.3), rng.uniform(0.15, 0.85), rng.uniform(0.3, 1.3)) for _ in range(5)]
+    for c in range(columns):
+        for r in range(columns):
+            centre = np.array([(c + 0.5 * (r % 2) * (columns % 2 == 0)) * w, r * w])
+            for drop in (0, 1):
+                o = centre + ([0.5 * w, 0.5 * w] if drop else [0, 0])
+                _ornament(out, o, w, curls)
+    return [out.done()]
 
 
-def _ornament(out: _Print, o: np.ndarray, w: float, curls) -> None:
+def _ornament(out: _Print, o: np.ndarray, w: float, curls: list[tuple[float, float, float]]) -> None:
     t = np.linspace(0, 1, 24)
     for side in (-1, 1):
         flip = np.array([side, 1.0])
@@ -231,76 +222,64 @@ def _ornament(out: _Print, o: np.ndarray, w: float, curls) -> None:
     out.fill(_leaf(o + np.array([0, 0.12 * w]), -np.pi / 2, 0.36 * w, 0.045 * w))
 
 
-def scallops(columns: int = 8):
+def scallops(n: int, columns: int = 8, *, rng: np.random.Generator) -> list[np.ndarray]:
     """Overlapping fans, as on paper of the 1920s: lines only."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        u, v = coordinates(n, 1.0)
-        a = 1.0 / columns
-        x, y = u / a, v / a * 2
-        lines, done = np.zeros((n, n)), np.zeros((n, n), bool)
-        for step in (1, 0, -1):
-            row = np.floor(y) + step
-            cx = np.round(x - 0.5 * (row % 2)) + 0.5 * (row % 2)
-            d = np.hypot(x - cx, (y - row - 0.0) / 2)
-            inside = (d < 0.5) & ~done
-            rings = np.min([np.abs(d - r) for r in (0.485, 0.36, 0.24, 0.12)], axis=0)
-            lines = np.where(inside, 1 - smooth_step(rings, 0.010, 0.025), lines)
-            done |= inside
-        return [lines]
-
-    return motif
+    u, v = coordinates(n, 1.0)
+    a = 1.0 / columns
+    x, y = u / a, v / a * 2
+    lines, done = np.zeros((n, n)), np.zeros((n, n), bool)
+    for step in (1, 0, -1):
+        row = np.floor(y) + step
+        cx = np.round(x - 0.5 * (row % 2)) + 0.5 * (row % 2)
+        d = np.hypot(x - cx, (y - row - 0.0) / 2)
+        inside = (d < 0.5) & ~done
+        rings = np.min([np.abs(d - r) for r in (0.485, 0.36, 0.24, 0.12)], axis=0)
+        lines = np.where(inside, 1 - smooth_step(rings, 0.010, 0.025), lines)
+        done |= inside
+    return [lines]
 
 
-def trellis(columns: int = 6, width: float = 0.09):
+def trellis(n: int, columns: int = 6, width: float = 0.09, *, rng: np.random.Generator) -> list[np.ndarray]:
     """A rounded lattice: level sets of a sum of cosines."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        u, v = coordinates(n, 1.0)
-        f = (
-            np.cos(2 * np.pi * columns * u)
-            + np.cos(2 * np.pi * columns * v)
-            + 0.35 * np.cos(4 * np.pi * columns * u) * np.cos(4 * np.pi * columns * v)
-        )
-        slope = np.hypot(*np.gradient(f)) * n / columns / 6.28
-        return [1 - smooth_step(np.abs(f) / np.maximum(slope, 0.25), width * 0.7, width)]
-
-    return motif
+    u, v = coordinates(n, 1.0)
+    f = (
+        np.cos(2 * np.pi * columns * u)
+        + np.cos(2 * np.pi * columns * v)
+        + 0.35 * np.cos(4 * np.pi * columns * u) * np.cos(4 * np.pi * columns * v)
+    )
+    slope = np.hypot(*np.gradient(f)) * n / columns / 6.28
+    return [1 - smooth_step(np.abs(f) / np.maximum(slope, 0.25), width * 0.7, width)]
 
 
-def leaves(count: int = 60):
+def leaves(n: int, count: int = 60, *, rng: np.random.Generator) -> list[np.ndarray]:
     """Scattered sprigs in two tones."""
-
-    def motif(n: int, *, rng: np.random.Generator) -> list[np.ndarray]:
-        pale, dark = _Print(n), _Print(n)
-        side = int(np.ceil(np.sqrt(count)))
-        for i in range(side):
-            for j in range(side):
-                at = (np.array([i + 0.5 * (j % 2), j]) + rng.uniform(-0.22, 0.22, 2)) / side
-                angle = rng.uniform(0, 2 * np.pi)
-                reach = 0.8 / side * rng.uniform(0.75, 1.1)
-                layer = pale if (i + j) % 2 else dark
-                d = np.array([np.cos(angle), np.sin(angle)])
-                layer.line(at + np.linspace(0, 1, 8)[:, None] * d * reach, 0.006)
-                for k in range(1, 6):
-                    for s in (-1, 1):
-                        layer.fill(
-                            _leaf(
-                                at + d * reach * k / 6,
-                                angle + s * 0.75,
-                                reach * 0.42 * (1 - 0.08 * k),
-                                reach * 0.085,
-                                s * 0.15,
-                            ),
-                            0.9,
-                        )
-                layer.fill(_leaf(at + d * reach * 0.9, angle, reach * 0.32, reach * 0.08), 0.9)
-        return [pale.done(), dark.done()]
-
-    return motif
+    pale, dark = _Print(n), _Print(n)
+    side = int(np.ceil(np.sqrt(count)))
+    for i in range(side):
+        for j in range(side):
+            at = (np.array([i + 0.5 * (j % 2), j]) + rng.uniform(-0.22, 0.22, 2)) / side
+            angle = rng.uniform(0, 2 * np.pi)
+            reach = 0.8 / side * rng.uniform(0.75, 1.1)
+            layer = pale if (i + j) % 2 else dark
+            d = np.array([np.cos(angle), np.sin(angle)])
+            layer.line(at + np.linspace(0, 1, 8)[:, None] * d * reach, 0.006)
+            for k in range(1, 6):
+                for s in (-1, 1):
+                    layer.fill(
+                        _leaf(
+                            at + d * reach * k / 6,
+                            angle + s * 0.75,
+                            reach * 0.42 * (1 - 0.08 * k),
+                            reach * 0.085,
+                            s * 0.15,
+                        ),
+                        0.9,
+                    )
+            layer.fill(_leaf(at + d * reach * 0.9, angle, reach * 0.32, reach * 0.08), 0.9)
+    return [pale.done(), dark.done()]
 
 
-def grasscloth(n: int, tile: float, color, *, rng: np.random.Generator) -> Maps:
+def grasscloth(n: int, tile: float, color: Color, *, rng: np.random.Generator) -> Maps:
     """Woven grass on paper: level fibres of uneven thickness and colour."""
     long, fine = noise(n, 120, 1.3, rng=rng), noise(n, 40, 0.6, rng=rng)
     upright = noise(n, 0.8, 60, rng=rng)

@@ -2,94 +2,107 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
-from assets.materials.maps import Maps, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.records import Color
 
 
-def weave(
-    n: int,
-    tile: float,
-    warp,
-    weft,
-    threads: int,
-    over: int = 1,
-    irregular: float = 0.05,
-    slubs: float = 0.3,
-    fuzz: float = 0.05,
-    rough: float = 0.92,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
-    """Warp and weft threads crossing: plain weave (over=1) or twill (over=2 or 3).
+@dataclass(frozen=True)
+class Weave:
+    """Warp and weft threads crossing: a recipe."""
 
-    Args:
-      warp, weft: sRGB of the upright and the level threads, or tuples of colours cycled thread by thread.
-      threads: threads per tile in each direction; a multiple of 2 * over * the number of colours.
-      slubs: how uneven the threads' thickness is.
-    """
-    u, v = coordinates(n, tile)
-    x, y = u / tile * threads, v / tile * threads
-    swing = fbm(n, 3, 40, 1.2, rng=rng)
-    x, y = x + 0.12 * swing, y + 0.12 * np.roll(swing, n // 2, 1)
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = x - i - 0.5, y - j - 0.5
-    i, j = i % threads, j % threads
-    up = ((i + j) % 2 == 0) if over == 1 else ((i + j) % (2 * over) < over)
-    round_warp, round_weft = np.cos(np.pi * fx) ** 0.7, np.cos(np.pi * fy) ** 0.7
-    tone_warp, tone_weft = rng.normal(0, irregular, threads), rng.normal(0, irregular, threads)
-    fibre_up, fibre_level = noise(n, 0.6, 9, rng=rng), noise(n, 9, 0.6, rng=rng)
-    thick_up, thick_level = noise(n, 1.5, 40, rng=rng), noise(n, 40, 1.5, rng=rng)
-    lift_warp = np.cos(np.pi * fy * (1 if over == 1 else 0.6))
-    lift_weft = np.cos(np.pi * fx * (1 if over == 1 else 0.6))
-    a = _cycle(warp)[i % len(_cycle(warp))] * (1 + tone_warp[i] + fuzz * fibre_up + 0.10 * slubs * thick_up)[..., None]
-    b = (
-        _cycle(weft)[j % len(_cycle(weft))]
-        * (1 + tone_weft[j] + fuzz * fibre_level + 0.10 * slubs * thick_level)[..., None]
-    )
-    shade_a = 0.62 + 0.38 * round_warp * (0.7 + 0.3 * lift_warp)
-    shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
-    color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
-    height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
-    height = height * 0.35 * tile / threads + 0.02 * tile / threads * (fibre_up + fibre_level)
-    return Maps(
-        np.clip(color, 0.01, 0.97).astype(np.float32), height.astype(np.float32), np.full((n, n), rough, np.float32)
-    )
+    warp: Color | Colors
+    """The upright threads, sRGB: one colour, or several that take turns."""
+    weft: Color | Colors
+    """The level threads, likewise."""
+    threads: int
+    """Per tile in each direction; a multiple of 2 * over * the number of colours."""
+    over: int = 1
+    """1 is plain weave, 2 or 3 twill."""
+    irregular: float = 0.05
+    """Standard deviation of lightness from thread to thread."""
+    slubs: float = 0.3
+    """How uneven the threads' thickness is."""
+    fuzz: float = 0.05
+    rough: float = 0.92
+
+    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+        u, v = coordinates(n, tile)
+        x, y = u / tile * self.threads, v / tile * self.threads
+        swing = fbm(n, 3, 40, 1.2, rng=rng)
+        x, y = x + 0.12 * swing, y + 0.12 * np.roll(swing, n // 2, 1)
+        i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+        fx, fy = x - i - 0.5, y - j - 0.5
+        i, j = i % self.threads, j % self.threads
+        up = ((i + j) % 2 == 0) if self.over == 1 else ((i + j) % (2 * self.over) < self.over)
+        round_warp, round_weft = np.cos(np.pi * fx) ** 0.7, np.cos(np.pi * fy) ** 0.7
+        tone_warp, tone_weft = rng.normal(0, self.irregular, self.threads), rng.normal(0, self.irregular, self.threads)
+        fibre_up, fibre_level = noise(n, 0.6, 9, rng=rng), noise(n, 9, 0.6, rng=rng)
+        thick_up, thick_level = noise(n, 1.5, 40, rng=rng), noise(n, 40, 1.5, rng=rng)
+        lift_warp = np.cos(np.pi * fy * (1 if self.over == 1 else 0.6))
+        lift_weft = np.cos(np.pi * fx * (1 if self.over == 1 else 0.6))
+        a = (
+            _cycle(self.warp)[i % len(_cycle(self.warp))]
+            * (1 + tone_warp[i] + self.fuzz * fibre_up + 0.10 * self.slubs * thick_up)[..., None]
+        )
+        b = (
+            _cycle(self.weft)[j % len(_cycle(self.weft))]
+            * (1 + tone_weft[j] + self.fuzz * fibre_level + 0.10 * self.slubs * thick_level)[..., None]
+        )
+        shade_a = 0.62 + 0.38 * round_warp * (0.7 + 0.3 * lift_warp)
+        shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
+        color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
+        height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
+        height = height * 0.35 * tile / self.threads + 0.02 * tile / self.threads * (fibre_up + fibre_level)
+        return Maps(
+            np.clip(color, 0.01, 0.97).astype(np.float32),
+            height.astype(np.float32),
+            np.full((n, n), self.rough, np.float32),
+        )
 
 
-def _cycle(color) -> np.ndarray:
+def _cycle(color: Color | Colors) -> np.ndarray:
     c = np.asarray(color, np.float32)
     return c[None] if c.ndim == 1 else c
 
 
-def pile(
-    n: int,
-    tile: float,
-    color,
-    second=None,
-    loop: float = 0.004,
-    depth: float = 0.12,
-    tracks: float = 0.02,
-    rough: float = 0.97,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
-    """Carpet: tufts of `loop` metres, each catching the light a little differently."""
-    size = loop / (tile / n)
-    tuft = noise(n, size, size, rng=rng)
-    fine = noise(n, size * 0.35, size * 0.35, rng=rng)
-    brushed = fbm(n, 3, 20, 1.2, rng=rng)
-    base = rgb(color, (n, n))
-    if second is not None:
-        base = mix(base, rgb(second), smooth_step(noise(n, size * 0.8, size * 0.8, rng=rng), -0.3, 0.9))
-    color = base * (1 + depth * (0.6 * tuft + 0.55 * fine) / 1.6 + tracks * brushed)[..., None]
-    height = loop * 0.25 * (tuft + 0.5 * fine)
-    return Maps(
-        np.clip(color, 0.01, 0.97).astype(np.float32), height.astype(np.float32), np.full((n, n), rough, np.float32)
-    )
+@dataclass(frozen=True)
+class Pile:
+    """Carpet, towelling, grass: tufts that each catch the light a little differently. A recipe."""
+
+    color: Color
+    second: Color | None = None
+    """Of some of the tufts."""
+    loop: float = 0.004
+    """Size of a tuft, metres."""
+    depth: float = 0.12
+    """How much the tufts' lightness varies."""
+    tracks: float = 0.02
+    """How much the lightness varies with the way the pile is brushed."""
+    rough: float = 0.97
+
+    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+        size = self.loop / (tile / n)
+        tuft = noise(n, size, size, rng=rng)
+        fine = noise(n, size * 0.35, size * 0.35, rng=rng)
+        brushed = fbm(n, 3, 20, 1.2, rng=rng)
+        base = rgb(self.color, (n, n))
+        if self.second is not None:
+            base = mix(base, rgb(self.second), smooth_step(noise(n, size * 0.8, size * 0.8, rng=rng), -0.3, 0.9))
+        out = base * (1 + self.depth * (0.6 * tuft + 0.55 * fine) / 1.6 + self.tracks * brushed)[..., None]
+        height = self.loop * 0.25 * (tuft + 0.5 * fine)
+        return Maps(
+            np.clip(out, 0.01, 0.97).astype(np.float32),
+            height.astype(np.float32),
+            np.full((n, n), self.rough, np.float32),
+        )
 
 
-def sisal(n: int, tile: float, color=(0.70, 0.61, 0.47), ribs: int = 64, *, rng: np.random.Generator) -> Maps:
+def sisal(n: int, tile: float, color: Color = (0.70, 0.61, 0.47), ribs: int = 64, *, rng: np.random.Generator) -> Maps:
     """Boucle of plant fibre in level ribs."""
     u, v = coordinates(n, tile)
     bumps = ribs * 1
@@ -107,7 +120,9 @@ def sisal(n: int, tile: float, color=(0.70, 0.61, 0.47), ribs: int = 64, *, rng:
     )
 
 
-def felt(n: int, tile: float, color, mottle: float = 0.012, rough: float = 0.95, *, rng: np.random.Generator) -> Maps:
+def felt(
+    n: int, tile: float, color: Color, mottle: float = 0.012, rough: float = 0.95, *, rng: np.random.Generator
+) -> Maps:
     """Velvet, felt, fleece: no threads to see, soft shading in the nap."""
     nap = noise(n, 1.6, 2.4, rng=rng)
     cloud = fbm(n, 5, 60, 1.2, rng=rng)
@@ -119,7 +134,7 @@ def felt(n: int, tile: float, color, mottle: float = 0.012, rough: float = 0.95,
     )
 
 
-def leather(n: int, tile: float, color, gloss: float = 0.45, *, rng: np.random.Generator) -> Maps:
+def leather(n: int, tile: float, color: Color, gloss: float = 0.45, *, rng: np.random.Generator) -> Maps:
     """Grained leather: a net of fine creases around pebbles."""
     a, b = noise(n, 4.5, 4.5, rng=rng), noise(n, 4.5, 4.5, rng=rng)
     crease = np.exp(-((np.abs(a) / 0.16) ** 1.2)) + np.exp(-((np.abs(b) / 0.16) ** 1.2))
@@ -132,10 +147,19 @@ def leather(n: int, tile: float, color, gloss: float = 0.45, *, rng: np.random.G
     )
 
 
-def printed(base: Maps, motif: np.ndarray, color) -> Maps:
-    """`base` cloth with `motif` (n, n) in [0, 1] printed in `color`, the threads still showing."""
+def printed(
+    n: int,
+    tile: float,
+    cloth: Callable[..., Maps],
+    motif: Callable[[int], np.ndarray],
+    color: Color,
+    *,
+    rng: np.random.Generator,
+) -> Maps:
+    """`cloth` with `motif(n)` (n, n) in [0, 1] printed in `color`, the threads still showing."""
+    base = cloth(n, tile, rng=rng)
     shade = base.color.mean(-1, keepdims=True) / max(float(base.color.mean()), 1e-6)
-    t = motif[..., None]
+    t = motif(n)[..., None]
     return Maps(
         np.clip(base.color * (1 - t) + rgb(color) * shade * t, 0.01, 0.97).astype(np.float32),
         base.height,

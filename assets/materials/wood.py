@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,14 +51,21 @@ SPECIES = {
 
 
 def floor(
-    n: int, tile: float, layout, species: str, gloss: float = 0.38, groove: float = 0.0012, *, rng: np.random.Generator
+    n: int,
+    tile: float,
+    layout: Callable[..., Layout],
+    species: str,
+    gloss: float = 0.38,
+    groove: float = 0.0012,
+    *,
+    rng: np.random.Generator,
 ) -> Maps:
     """A wooden floor: `layout(n, tile)` or `layout(n, tile, rng=rng)` gives the boards."""
     pieces = layout(n, tile, rng=rng) if _draws(layout) else layout(n, tile)
     return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
 
 
-def _draws(layout) -> bool:
+def _draws(layout: Callable[..., Layout]) -> bool:
     inner = layout.func if isinstance(layout, functools.partial) else layout
     return inner is planks
 
@@ -82,9 +91,7 @@ def furniture(
         k % strips, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips
     )
     kind = SPECIES[species]
-    calm = Species(
-        kind.early, kind.late, kind.pore, kind.contrast, kind.pores, kind.ring, kind.tone * 0.25, kind.rays, 0.0
-    )
+    calm = dataclasses.replace(kind, tone=kind.tone * 0.25, knots=0.0)
     maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=rng)
     return Maps(maps.color, maps.height * (1 - lacquer), maps.roughness * (1 - 0.4 * lacquer))
 
@@ -102,11 +109,60 @@ def boards(
 ) -> Maps:
     """Every piece of `layout` sawn from its own place of its own log.
 
-    A board cuts the growth rings, cylinders about the pith, in a plane at some distance from it:
-    near the pith that draws cathedrals, far from it straight lines.
+    Args:
+      groove: width of the cut around each board, metres; 0 for none.
+      endless: the grain runs on over the tile's border.
     """
-    count, pixel = layout.count, tile / n
     piece = layout.piece
+    grain = _sawn(n, tile, layout, species, endless, rng=rng)
+    streak = look_up(noise(n, 70, 0.7, rng=rng), grain.x, grain.y)
+    hair = look_up(noise(n, 22, 0.35, rng=rng), grain.x, grain.y)
+    late = np.clip(species.contrast * grain.dark + 0.09 * streak + 0.06 * grain.fine, 0, 1.15)
+    color = mix(rgb(species.early), rgb(species.late), late)
+    pore = species.pores * smooth_step(hair + 0.8 * (grain.dark - 0.4), 1.0, 2.4)
+    color = mix(color, rgb(species.pore), 0.75 * pore)
+    if species.rays:
+        fleck = look_up(noise(n, 3.0, 1.2, rng=rng), grain.x, grain.y)
+        color += (species.rays * 0.05 * smooth_step(fleck, 1.5, 2.6) * (~grain.plain)[piece])[..., None]
+    if species.knots:
+        color = _knots(color, layout, species, tile, rng=rng)
+    tone = np.clip(rng.normal(0, species.tone, layout.count), -2 * species.tone, 2 * species.tone)
+    warmth = np.clip(rng.normal(0, 0.1 * species.tone, layout.count), -0.01, 0.01)
+    color = color * (1 + tone[piece])[..., None] * (1 + warmth[piece][..., None] * rgb((1.0, 0.0, -1.0)))
+    height = -2.5e-5 * grain.dark - 5e-5 * pore + 1e-5 * streak
+    rough = gloss + 0.05 * grain.dark + 0.10 * pore + 0.02 * streak
+    if groove > 0:
+        pixel = tile / n
+        cut = 1 - smooth_step(layout.edge, groove * 0.35, groove * 0.35 + max(groove, pixel * 0.9))
+        color = color * (1 - 0.55 * cut)[..., None]
+        rough = rough + 0.25 * cut
+        height = height - 6e-4 * cut + rng.normal(0, 5e-5, layout.count)[piece] * (1 - cut)
+    return Maps(
+        np.clip(color, 0.01, 0.98).astype(np.float32),
+        height.astype(np.float32),
+        np.clip(rough, 0.08, 1).astype(np.float32),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Grain:
+    """How the wood of every board runs; arrays (n, n) but for `plain`."""
+
+    x: np.ndarray
+    """Where noise is looked up along the boards, tiles."""
+    y: np.ndarray
+    dark: np.ndarray
+    """Summer wood, 0 to 1."""
+    fine: np.ndarray
+    """Fine noise along the grain."""
+    plain: np.ndarray
+    """(count,) bool: boards sawn beside the pith, the others towards it."""
+
+
+def _sawn(n: int, tile: float, layout: Layout, species: Species, endless: bool, *, rng: np.random.Generator) -> _Grain:
+    """A board cuts the growth rings, cylinders about the pith, in a plane at some distance from it:
+    near the pith that draws cathedrals, far from it straight lines."""
+    count, pixel, piece = layout.count, tile / n, layout.piece
     plain = rng.random(count) < 0.6
     pith_across = np.where(
         plain, rng.normal(0, 0.035, count), rng.choice([-1, 1], count) * rng.uniform(0.10, 0.35, count)
@@ -116,16 +172,13 @@ def boards(
     flip = rng.choice([-1.0, 1.0], count)
     start, lane = rng.random(count), rng.random(count)
     ring = species.ring * rng.uniform(0.75, 1.35, count)
-
-    along, across = layout.along, layout.across
-    x = along / tile + start[piece] if not endless else along / tile
-    y = across / tile + lane[piece]
-    if endless:
-        x = x + np.round(start[piece] * n) / n
+    # Over the border an endless board goes on at the next pixel.
+    x = layout.along / tile + (np.round(start[piece] * n) / n if endless else start[piece])
+    y = layout.across / tile + lane[piece]
     slow = look_up(fbm(n, 1.0, 24, 1.8, 4.0, rng=rng), x, y * 3)
     fine = look_up(fbm(n, 4.0, 200, 1.2, 14.0, rng=rng), x, y)
-    depth = pith_depth[piece] + slope[piece] * along + 0.010 * slow
-    radius = np.hypot(across * flip[piece] - pith_across[piece], depth)
+    depth = pith_depth[piece] + slope[piece] * layout.along + 0.010 * slow
+    radius = np.hypot(layout.across * flip[piece] - pith_across[piece], depth)
     phase = radius / ring[piece] + 0.10 * fine
     drift = np.abs(np.gradient(phase, axis=1)) + np.abs(np.gradient(phase, axis=0))
     visible = np.clip(1.5 - 2.6 * drift, 0.0, 1) * np.clip(
@@ -135,35 +188,7 @@ def boards(
     dark = np.where(f < 0.85, (f / 0.85) ** 2.4, 1 - (f - 0.85) / 0.15)
     each = look_up(noise(n, 1, 1, rng=rng), np.floor(phase) * 0.137 + lane[piece], lane[piece] * np.ones_like(phase))
     dark = dark * (0.75 + 0.3 * np.tanh(each)) * visible + 0.33 * (1 - visible)
-
-    streak = look_up(noise(n, 70, 0.7, rng=rng), x, y)
-    hair = look_up(noise(n, 22, 0.35, rng=rng), x, y)
-    color = mix(
-        rgb(species.early), rgb(species.late), np.clip(species.contrast * dark + 0.09 * streak + 0.06 * fine, 0, 1.15)
-    )
-    pore = species.pores * smooth_step(hair + 0.8 * (dark - 0.4), 1.0, 2.4)
-    color = mix(color, rgb(species.pore), 0.75 * pore)
-    if species.rays:
-        fleck = look_up(noise(n, 3.0, 1.2, rng=rng), x, y)
-        color += (species.rays * 0.05 * smooth_step(fleck, 1.5, 2.6) * (~plain)[piece])[..., None]
-    if species.knots:
-        color = _knots(color, layout, species, tile, rng=rng)
-    tone = np.clip(rng.normal(0, species.tone, count), -2 * species.tone, 2 * species.tone)
-    warmth = np.clip(rng.normal(0, 0.1 * species.tone, count), -0.01, 0.01)
-    color = color * (1 + tone[piece])[..., None] * (1 + warmth[piece][..., None] * rgb((1.0, 0.0, -1.0)))
-    height = -2.5e-5 * dark - 5e-5 * pore + 1e-5 * streak
-    rough = gloss + 0.05 * dark + 0.10 * pore + 0.02 * streak
-    if groove > 0:
-        cut = 1 - smooth_step(layout.edge, groove * 0.35, groove * 0.35 + max(groove, pixel * 0.9))
-        color = color * (1 - 0.55 * cut)[..., None]
-        height = height - 6e-4 * cut
-        rough = rough + 0.25 * cut
-        height = height + rng.normal(0, 5e-5, count)[piece] * (1 - cut)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        height.astype(np.float32),
-        np.clip(rough, 0.08, 1).astype(np.float32),
-    )
+    return _Grain(x, y, dark, fine, plain)
 
 
 def _knots(color: np.ndarray, layout: Layout, species: Species, tile: float, *, rng: np.random.Generator) -> np.ndarray:
