@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +32,7 @@ from assets.built.primitives import (
 )
 from assets.built.table import BUILDS, read_makers
 from assets.materials import MATERIALS
+from assets.materials.registry import read_materials
 from assets.records import ROOM_KINDS, SUPPORTS, Finish
 from assets.rows import CatalogueError
 
@@ -282,3 +285,12 @@ def test_every_builder_and_every_rug_of_the_materials_is_in_the_table():
     assert {key for key, m in MATERIALS.items() if m.family == "rug"} <= rugs
     shown = {str(m.look["art"]) for m in MAKERS.values() if "art" in m.look}
     assert {key for key, m in MATERIALS.items() if m.family == "art"} <= shown
+
+
+def test_the_rows_that_the_documentation_shows_are_good_rows():
+    text = (Path(__file__).parent.parent / "docs" / "assets.md").read_text()
+    groups = [json.loads(block.split("```")[0]) for block in text.split("```json\n")[2:]]
+    things, materials = groups
+    assert list(read_makers("docs", {"sets": {}, "groups": [things]})) == ["built/vase_blue", "built/vase_white"]
+    (lime,) = read_materials("docs", {"groups": [materials]}).values()
+    assert lime.recipe(64, lime.tile, rng=np.random.default_rng(0)).color.shape == (64, 64, 3)

@@ -185,10 +185,10 @@ def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True,
                 image = _stroke(image, at + np.linspace(0, 0.92, 6)[:, None] * d * length, 0.002, rgb(ground) * 0.92)
     pen = 0.40
     while pen < 0.60:
-        w = rng.uniform(0.008, 0.03)
-        line = np.stack([np.linspace(pen, pen + w, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
+        word = rng.uniform(0.008, 0.03)
+        line = np.stack([np.linspace(pen, pen + word, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
         image = _stroke(image, line, 0.0025, (0.25, 0.23, 0.2), 0.8)
-        pen += w + 0.008
+        pen += word + 0.008
     return _flat(image, 0.85)
 
 
