@@ -1,7 +1,7 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help; light compares the ways of drawing with a path tracer. Close other programs first: the
+with help, seen with pixels; light compares the ways of drawing with a path tracer. Close other programs first: the
 numbers are only as good as the quiet. freeze measures nothing: it prints digests of houses, a lit flat,
 data sets, episodes and tables, and with --against what has changed since a file of them was written.
 """
@@ -20,7 +20,7 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-PARTS = ("houses", "pictures", "steps", "plays", "memory", "light", "freeze")
+PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "freeze")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied import gl
-    from embodied.bench import episodes, timing, world
+    from embodied.bench import episodes, seen, timing, world
 
     catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality),
         "steps": lambda: world.steps(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
+        "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
     measures = []

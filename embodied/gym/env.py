@@ -38,7 +38,7 @@ from embodied.gym.eyes import (
 from embodied.gym.playground import make_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
-from embodied.house.floor_plan import paint_plan, font
+from embodied.house.floor_plan import font, paint_plan
 from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.render.pictures import PictureSettings
 from embodied.world import World
@@ -236,7 +236,12 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
         return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
 
     refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
-    return SyncVectorEnv([one] * num_envs)
+    return in_step(one, num_envs)
+
+
+def in_step(make_one: Callable[[], HelpGymEnv], num_envs: int) -> SyncVectorEnv:
+    """Environments that take their steps together, in one process."""
+    return SyncVectorEnv([make_one] * num_envs)
 
 
 COPIES = 3

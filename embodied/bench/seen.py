@@ -1,0 +1,101 @@
+"""Benchmarks of environments with pixels: steps per second on one core, and the naive way beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from assets.catalogue import Catalogue
+from embodied.bench.timing import Measure, measure, ratio
+from embodied.envs.base import HelpEnv
+from embodied.generate import HouseConfig, generate_house
+from embodied.gym.env import HelpGymEnv, in_step
+from embodied.gym.eyes import Eyes, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.spaces import Layout
+from embodied.interface import Task
+from embodied.language.plain import PlainLanguage
+from embodied.seeds import stream
+from embodied.tasks.find import find_pool, find_task
+from embodied.world import World, open_world
+
+FLAT = HouseConfig(area=(70.0, 110.0))
+"""Where the agent walks."""
+STEPS = 200
+"""Of one timed call."""
+BATCH = 64
+"""Environments of the vectorised line."""
+LINES = (
+    ("rgb, 128 x 128", ("rgb",), ViewSettings(), 4000.0),
+    ("rgb, depth and ids, 128 x 128", ("rgb", "depth", "ids"), ViewSettings(), 2000.0),
+    ("rgb, the 36 views at 128 x 128", ("rgb",), ViewSettings("views36"), 60.0),
+)
+"""What is seen, and how many steps per second the project promises with it."""
+
+
+def seen(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
+    """Random walks through one flat whose panoramas are in memory, on one core."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality) as world:
+            yield from _measures(world, seed)
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _measures(world: World, seed: int) -> Iterator[Measure]:
+    world.render_all()
+    store, pool = PanoramaStore({world.name: world}), find_pool(world, seed=seed)
+    tasks = [find_task(pool, i, seed=seed, language=PlainLanguage()) for i in range(50)]
+    for name, channels, view, aim in LINES:
+        env = _env(world, tasks, PictureEyes(store, channels, view))
+        steps = 40 if view.frame == "views36" else STEPS
+        line = measure(f"steps, {name}", lambda env=env, n=steps: _walk(env, n, seed), "1/s", per=steps, aim=aim)
+        yield line
+    envs = in_step(lambda: _env(world, tasks, PictureEyes(store, ("rgb",), ViewSettings())), BATCH)
+    yield measure(
+        f"steps of {BATCH} environments, rgb, 128 x 128", lambda: _walk_together(envs), "1/s", per=10 * BATCH, aim=None
+    )
+    plain = _env(world, tasks, PictureEyes(store, ("rgb",), ViewSettings()))
+    resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
+    naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
+    yield naive
+    yield ratio("resampled against drawn", resampled, naive)
+
+
+def _env(world: World, tasks: list[Task], eyes: Eyes) -> HelpGymEnv:
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, eyes, layout=Layout())
+
+
+def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
+    """Random moves, a new task when one ends; never stops of its own."""
+    rng = stream(seed, "bench", "walk")
+    o, _ = env.reset(seed=seed)
+    for _ in range(steps):
+        possible = np.flatnonzero(o["action_mask"][: Layout().candidates])
+        o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
+        if terminated or truncated:
+            o, _ = env.reset()
+
+
+def _walk_together(envs: Any) -> None:
+    o, _ = envs.reset(seed=0)
+    for _ in range(10):
+        o, *_ = envs.step(o["action_mask"].argmax(1))
+
+
+def _draw(env: HelpGymEnv, world: World, steps: int, seed: int) -> None:
+    """The same walk, but every view is drawn from the model."""
+    rng = stream(seed, "bench", "walk")
+    o, _ = env.reset(seed=seed)
+    for _ in range(steps):
+        possible = np.flatnonzero(o["action_mask"][: Layout().candidates])
+        o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
+        pose = env._env.pose
+        world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))
+        if terminated or truncated:
+            o, _ = env.reset()
