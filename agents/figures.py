@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from assets.cache import atomic_path
@@ -87,7 +88,7 @@ def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path
     _save(figure, path)
 
 
-def _pairs(axes, conditions: Sequence[Mapping[str, Any]], fields: Sequence[str], labels: Sequence[str]) -> None:
+def _pairs(axes: Axes, conditions: Sequence[Mapping[str, Any]], fields: Sequence[str], labels: Sequence[str]) -> None:
     width = 0.8 / len(fields)
     for k, (name, label) in enumerate(zip(fields, labels, strict=True)):
         heights = [100 * (c[name] or 0.0) for c in conditions]  # None: the condition was never true or never said

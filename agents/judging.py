@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import json
 import math
@@ -18,13 +19,18 @@ from assets.cache import write_json
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
-from embodied.evaluation.tables import as_json, markdown, save
+from embodied.evaluation.tables import Row, as_json, markdown, save
 from embodied.interface import Agent, Episode, Place
+from embodied.locks import locked
 from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
+Places = Mapping[str, Place]
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
 """Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
+
+
+COLUMNS = ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")
 
 
 def run_eval(
@@ -34,64 +40,53 @@ def run_eval(
 
     Args:
       watch: wraps the iterator over agent names (a progress bar).
+
+    Raises:
+      LockedError: another process writes to args.out.
     """
     torch.set_num_threads(args.threads)
     data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
-    rows, extra = [], {}
-    for split in args.split or ("test_unseen",):
-        whole = data.split(split)
-        judged = {**_without_learning(), **hanna_policies(agent, split_of(data, split, encoder).bank)}
-        names = args.only or list(judged)
-        if unknown := sorted(set(names) - set(judged)):
-            raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
+    rows: list[Row] = []
+    extra: dict[str, object] = {}
+    with locked(args.out) if args.out else contextlib.nullcontext():
+        for split in args.split or ("test_unseen",):
+            whole, bank = data.split(split), split_of(data, split, encoder, quality=args.quality).bank
+            judged = _asked_for({**_without_learning(), **hanna_policies(agent, bank)}, args.only)
 
-        def keep(
-            name: str, episodes: Sequence[Episode], split: str = split, worlds: Mapping[str, Place] = whole.worlds
-        ) -> None:
-            if args.out:
-                save_lines(args.out / episodes_file(split, name), episodes)
-            if name == "learned":
-                extra[split] = about(episodes, worlds)
+            def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds: Places = whole.worlds) -> None:
+                if args.out:
+                    save_lines(args.out / episodes_file(split, name), episodes)
+                if name == "learned":
+                    extra[split] = about(episodes, worlds)
 
-        rows += evaluate(
-            whole,
-            {n: judged[n] for n in names},
-            seed=args.seed,
-            limit=args.tasks,
-            batch=args.batch,
-            keep=keep,
-            watch=watch,
-        )
-    facts = {"rows": json.loads(as_json(rows)), "behaviour": extra}
-    if args.json:
-        note(json.dumps(facts, indent=1))
-    else:
-        note(
-            markdown(
-                rows,
-                (
-                    "success",
-                    "spl",
-                    "navigation error",
-                    "requests",
-                    "oracle success",
-                    "mistake repeat",
-                    "request repeat",
-                ),
+            rows += evaluate(
+                whole, judged, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep, watch=watch
             )
-        )
-        note(json.dumps(extra, indent=1))
-    if args.out:
-        save(rows, args.out, "table")
-        write_json(args.out / "behaviour.json", facts, indent=1)
+        facts = {"rows": json.loads(as_json(rows)), "behaviour": extra}
+        if args.out:
+            save(rows, args.out, "table")
+            write_json(args.out / "behaviour.json", facts, indent=1)
+    for text in (json.dumps(facts, indent=1),) if args.json else (markdown(rows, COLUMNS), json.dumps(extra, indent=1)):
+        note(text)
     return 0
+
+
+def _asked_for(judged: Mapping[str, Agent], names: Sequence[str] | None) -> dict[str, Agent]:
+    """The rows `names`, or all of them.
+
+    Raises:
+      ValueError: a row that is none.
+    """
+    if unknown := sorted(set(names or ()) - set(judged)):
+        raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
+    return {name: judged[name] for name in names or judged}
 
 
 def _without_learning() -> Mapping[str, Agent]:
     return {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
 
 
-def about(episodes: Sequence[Episode], worlds) -> dict[str, object]:
+def about(episodes: Sequence[Episode], worlds: Places) -> dict[str, object]:
     """Figures D.1 and D.2 and the kinds of failure, as numbers."""
     conditions = [{**dataclasses.asdict(p), "f1": p.f1} for p in predictions(episodes, worlds)]
     return {

@@ -7,8 +7,8 @@ comparable in shape, not in level.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +19,7 @@ import torch
 from agents.failures import hanna_policies
 from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.run import split_of, train_agent
+from agents.hanna.run import Lessons, split_of, train_agent
 from agents.hanna.training_config import TrainingConfig
 from agents.judging import about
 from agents.vision.encoder import Encoder, load_encoder
@@ -29,7 +29,8 @@ from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, save, shown
 from embodied.interface import Agent, Episode
-from embodied.records import episodes_file, save_lines
+from embodied.locks import locked
+from embodied.records import episodes_file, parse, save_lines
 
 Note = Callable[[str], None]
 
@@ -264,6 +265,7 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
 
     Raises:
       ValueError: an unknown study.
+      LockedError: another process writes to the study's folder.
     """
     if unknown := [n for n in names if n not in TABLES]:
         raise ValueError(f"unknown studies {unknown}; there are {list(TABLES)}")
@@ -271,11 +273,12 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
     tables = {n: _possible(TABLES[n], setting, len(data.names("train"))) for n in names}
     wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
     jobs = (joblib.delayed(_train)(setting, v, note if workers == 1 else None) for v in wanted)
-    for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
-        note(line)
-    curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
-    judged = _Judge(setting, data, note)
-    return {name: _write(setting, name, table, judged) for name, table in tables.items()}
+    with locked(setting.out):
+        for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+            note(line)
+        curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
+        judged = _Judge(setting, data, note)
+        return {name: _write(setting, name, table, judged) for name, table in tables.items()}
 
 
 def _possible(table: Table, setting: Setting, houses: int) -> Table:
@@ -290,17 +293,20 @@ def _train(setting: Setting, variant: str, note: Note | None) -> str:
     torch.set_num_threads(setting.threads)
     data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant)
     config = setting.config_of(variant)
-    if note is None:
-        folder.mkdir(parents=True, exist_ok=True)
-        log = open(folder / "log.txt", "a", buffering=1)  # noqa: SIM115 - lives as long as this training
-        note = lambda line: print(line, file=log)
-    progress = train_agent(data, encoder, config, folder, device=setting.device, note=note)
-    return f"{variant}: {progress.update} updates, best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
+    with contextlib.ExitStack() as stack:
+        if note is None:
+            folder.mkdir(parents=True, exist_ok=True)
+            log = stack.enter_context(open(folder / "log.txt", "a", buffering=1, encoding="utf-8"))
+            note = lambda line: print(line, file=log)
+        progress = train_agent(Lessons(data, encoder, device=setting.device), config, folder, note=note)
+    best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
+    return f"{variant}: {progress.update} updates, {best}"
 
 
 def _validations(folder: Path) -> list[dict[str, float]]:
     """How a training went, validation by validation."""
-    lines = (json.loads(line) for line in (folder / "validation.jsonl").read_text(encoding="utf-8").splitlines())
+    path = folder / "validation.jsonl"
+    lines = [parse(line, f"{path}: a validation") for line in path.read_text(encoding="utf-8").splitlines()]
     return list({line["update"]: line for line in lines}.values())  # a resumed run may have validated twice
 
 

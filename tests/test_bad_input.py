@@ -60,10 +60,10 @@ def said(capsys, *words: str) -> str:
         (("bench", "nothing"), "unknown benchmark"),
         (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),
         (("nonsense",), "invalid choice: 'nonsense'"),
-        (("rollout", "--seed", "3", "--size", "0"), "a cube face needs 8 to 4096"),
+        (("rollout", "--seed", "3", "--size", "0"), "--size: should be a whole number of at least 8 and at most 4096"),
         (("train", "hanna", "--data", "x", "--out", "y", "--nothing"), "`embodied --help` explains"),
         (("dataset", "find", "--out", "x", "--area", "5", "10"), "area should be"),
-        (("dataset", "find", "--out", "x", "--workers", "0"), "--workers should be at least 1"),
+        (("dataset", "find", "--out", "x", "--workers", "0"), "--workers: should be a whole number of at least 1"),
     ],
 )
 def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_path, monkeypatch):

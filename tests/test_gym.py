@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import subprocess
 import sys
 import warnings
@@ -17,7 +18,7 @@ from hand_worlds import grid_world
 import embodied.gym.env
 from embodied.envs.base import ActionError
 from embodied.gym.registration import IDS
-from embodied.gym.spaces import Layout, Numbers, decode, number, text_of
+from embodied.gym.spaces import Layout, Numbers, decode, number, text_of, word_number, words
 from embodied.interface import Ask, Intention, Move, Stop
 from embodied.teachers.shortest import shortest_action
 
@@ -168,3 +169,24 @@ def test_a_learner_off_the_shelf_trains_on_it(tmp):
     assert any((a != b).any() for a, b in zip(before, model.policy.parameters(), strict=True))
     action, _ = model.predict(env.reset(seed=1)[0])
     assert env.action_space.contains(int(action))
+
+
+def test_words_of_descriptions_have_the_numbers_of_the_catalogue_in_every_process():
+    code = (
+        "from embodied.gym.spaces import word_number, words\n"
+        "print([word_number(w) for w in ('mug', 'kitchen', 'go', 'rug', 'my own thing')], len(words()))"
+    )
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+        ).stdout
+        for seed in (1, 2)
+    }
+    assert len(said) == 1
+    numbers = [word_number(w) for w in words()]
+    assert numbers == list(range(1, len(words()) + 1)), "every word a number of its own, whatever was met first"
+    assert word_number("my own thing") > len(words())

@@ -46,6 +46,7 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
+from embodied.locks import LockedError, locked
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher
 
@@ -394,6 +395,22 @@ def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
         run(tmp_path)
 
 
+def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
+    agent, _ = run(tmp_path, dataclasses.replace(TINY, iterations=1))
+    for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", load_agent)):
+        body = bytearray((tmp_path / name).read_bytes())
+        body[len(body) // 2] ^= 1
+        (tmp_path / name).write_bytes(body)
+        with pytest.raises(ValueError, match="checksum"):
+            read(tmp_path / name)
+
+
+def test_a_second_training_in_the_same_folder_is_refused(tmp_path):
+    with locked(tmp_path), pytest.raises(LockedError, match=f"written by process {os.getpid()}"):
+        run(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_path):
     run(tmp_path, dataclasses.replace(TINY, iterations=2))
     before = (tmp_path / "checkpoint.pt").read_bytes()
@@ -427,7 +444,7 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
         ({"ask_rule": "often"}, "ask_rule must be one of"),
         ({"batch": 0}, "batch must be at least 1"),
         ({"learning_rate": 0.0}, "learning_rate must be positive"),
-        ({"alpha": -1.0}, "alpha must not be negative"),
+        ({"alpha": -1.0}, "alpha must be at least 0"),
     ],
 )
 def test_impossible_settings_are_refused(change, message):

@@ -23,6 +23,7 @@ from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_en
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
 from embodied.cli import learning
+from embodied.cli.options import chosen
 from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
@@ -58,7 +59,7 @@ SMALL = [
 
 
 def train_hanna(arguments, note=print, **more):
-    return run_train_hanna(arguments, learning.chosen(arguments, SCALES[arguments.scale]), note, **more)
+    return run_train_hanna(arguments, chosen(arguments, SCALES[arguments.scale]), note, **more)
 
 
 def parsed(add, *words):
@@ -120,7 +121,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
-    config = learning.chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
+    config = chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
     bank = split_of(data, "test_unseen", random_encoder(seed=0)).bank
     agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
     agent.network.eval()
@@ -151,7 +152,7 @@ def study(data, tmp_path):
         save_features(
             feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest
         )
-    config = learning.chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
+    config = chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
     config = dataclasses.replace(config, iterations=2)
     return Setting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
 
@@ -211,10 +212,11 @@ def test_missing_features_and_wrong_rows_are_named(data, tmp_path):
     if SHIPPED.exists():
         with pytest.raises(FileNotFoundError, match="embodied features"):
             train_hanna(arguments, lambda line: None)
-    with pytest.raises(ValueError, match="unknown network 'resnet1'"):
-        encoder_of(
-            parsed(learning.add_features, "--data", data.folder, "--encoder", _empty(tmp_path), "--network", "resnet1")
-        )
+    words = ("--data", data.folder, "--encoder", _empty(tmp_path), "--network")
+    with pytest.raises(SystemExit):
+        parsed(learning.add_features, *words, "resnet1")
+    with pytest.raises(ValueError, match="not the weights of resnet18"):
+        encoder_of(parsed(learning.add_features, *words, "resnet18"))
 
 
 def _empty(folder):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +14,14 @@ import torch
 
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
-from agents.vision.config import VisionConfig
+from agents.vision.config import NETWORKS, PLAIN, VisionConfig, drawing
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
-from agents.vision.features import load_bank, load_features, save_features
+from agents.vision.features import feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, read_weights
 from agents.vision.training import train_encoder, turned
 from embodied.interface import Sight
+from embodied.render.pictures import PictureSettings
 
 
 def torchvision_layout(name: str) -> dict[str, tuple[int, ...]]:
@@ -257,7 +261,7 @@ def test_an_encoder_file_knows_its_digest_and_notices_damage(tmp_path):
     body = bytearray(path.read_bytes())
     body[-1] ^= 0x40
     path.write_bytes(body)
-    with pytest.raises(ValueError, match="do not fit the digest"):
+    with pytest.raises(ValueError, match="do not fit its checksum"):
         load_encoder(path)
     path.write_bytes(body[:2000])
     with pytest.raises(ValueError, match="cannot be read"):
@@ -276,6 +280,13 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
         load_features(path, source="another house")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         load_features(tmp_path / "nothing.safetensors")
+    with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_192; .*--quality normal"):
+        load_features(path, pictures=PictureSettings(192, "normal"))
+    body = bytearray(path.read_bytes())
+    body[-9] ^= 0x10
+    (tmp_path / "flipped.safetensors").write_bytes(body)
+    with pytest.raises(ValueError, match="do not fit its checksum.*embodied features"):
+        load_features(tmp_path / "flipped.safetensors")
     bank = load_bank({"house": path})
     assert np.array_equal(bank.features(Sight("house", 2)), features[2].astype(np.float32))
     assert torch.equal(bank.gather([None, Sight("house", 1)])[0], torch.zeros(36, encoder.size))
@@ -299,3 +310,44 @@ def test_encoder_moves_between_settings_without_changing_features():
     assert np.allclose(together[1:], alone, atol=1e-4)
     shifted = Encoder(encoder.network, encoder.name, "views", torch.ones(encoder.size), 2 * torch.eye(encoder.size))
     assert np.allclose(shifted.encode_views(views), 2 * (together - 1), atol=1e-3)
+
+
+def test_every_way_of_drawing_has_its_own_features():
+    ways = [("unlit",), ("fast",), ("normal",), ("normal", "classic", "fast"), ("glossy",), ("normal", "filament")]
+    paths = {feature_path(Path("f"), "d" * 64, "house", PictureSettings(192, *way)) for way in ways}
+    assert len(paths) == len(ways) and feature_path(Path("f"), "d" * 64, "house", PLAIN) in paths
+    assert drawing(PLAIN) == "unlit_192" != drawing(PictureSettings(256, "unlit"))
+
+
+def test_the_settings_name_the_networks_that_there_are():
+    assert set(NETWORKS) == set(ARCHITECTURES)
+    with pytest.raises(ValueError, match="network must be one of"):
+        VisionConfig(network="nope")
+    with pytest.raises(ValueError, match="learning_rate"):
+        VisionConfig(learning_rate=float("nan"))
+
+
+FULL = """
+import resource, signal, sys, torch
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
+from agents.imitation.checkpoint import write_checkpoint
+from agents.vision.encoder import random_encoder, save_encoder
+from embodied import cli
+from embodied.cli import doctor
+encoder = random_encoder(seed=0)
+writes = {"encoder.safetensors": lambda path: save_encoder(encoder, path),
+          "checkpoint.pt": lambda path: write_checkpoint(path, "k", {"x": torch.zeros(100_000)})}
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+doctor.run = lambda args: writes[sys.argv[1]](sys.argv[2])
+raise SystemExit(cli.main(["doctor"]))
+"""
+
+
+@pytest.mark.parametrize("name", ["encoder.safetensors", "checkpoint.pt"])
+def test_a_full_disk_is_one_line_that_names_the_file_of_weights(name, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, name, str(tmp_path / name)], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith(f"error: {tmp_path / name}: File too large")
+    assert not list(tmp_path.iterdir())

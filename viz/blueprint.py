@@ -36,19 +36,7 @@ def episode_blueprint(
       probabilities: plot the policy's own probabilities.
       stack: show HARI's goals.
     """
-    corners = np.array([c for r in house.rooms for c in r.polygon])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    centre, span = (low + high) / 2, float(max(high - low))
-    world = rrb.Spatial3DView(
-        origin="/",
-        name="House",
-        contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
-        eye_controls=rrb.EyeControls3D(
-            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1)
-        ),
-        background=(245, 246, 248),
-        line_grid=False,
-    )
+    world = _house_view(house)
     sees = rrb.Spatial2DView(origin="/agent/camera/image", name="What the agent sees")
     panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
     looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else [sees]
@@ -61,21 +49,7 @@ def episode_blueprint(
             rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
-    plots = [
-        rrb.TimeSeriesView(
-            origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
-        ),
-        rrb.StateTimelineView(origin="/mode", name="Mode"),
-    ]
-    if probabilities:
-        plots.append(
-            rrb.TimeSeriesView(
-                origin="/plot/probability",
-                name="Probability of asking",
-                axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
-            )
-        )
+    plots = _plots(probabilities)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(*looks),
@@ -96,3 +70,40 @@ def episode_blueprint(
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
     )
+
+
+def _house_view(house: House) -> rrb.Spatial3DView:
+    """The house in 3D, seen from above its southern side."""
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre, span = (low + high) / 2, float(max(high - low))
+    return rrb.Spatial3DView(
+        origin="/",
+        name="House",
+        contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
+        eye_controls=rrb.EyeControls3D(
+            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1)
+        ),
+        background=(245, 246, 248),
+        line_grid=False,
+    )
+
+
+def _plots(probabilities: bool) -> list[rrb.View]:
+    """Distance and mode over time, and how likely asking was."""
+    plots: list[rrb.View] = [
+        rrb.TimeSeriesView(
+            origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
+        ),
+        rrb.StateTimelineView(origin="/mode", name="Mode"),
+    ]
+    if probabilities:
+        plots.append(
+            rrb.TimeSeriesView(
+                origin="/plot/probability",
+                name="Probability of asking",
+                axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+            )
+        )
+    return plots

@@ -108,7 +108,7 @@ def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh | LitSur
 def lit_meshes(
     lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET
 ) -> tuple[LightMesh | LitSurface, ...]:
-    """The same from baked pages: objects with colours in their vertices, walls and floors with their light as a picture."""
+    """The same from baked pages: objects with colours in their vertices, walls and floors with light as a picture."""
     by_owner: dict[tuple[str, str, bool], list[LitMesh]] = {}
     for mesh in lit.meshes:
         if mesh.kind not in ("ceiling", "outdoor") and mesh.owner not in hidden:
@@ -148,7 +148,8 @@ def _share(owner: str, budget: int, meshes: int) -> int:
 
 
 SPOTS = np.array([(1, 1, 1), (4, 1, 1), (1, 4, 1), (1, 1, 4), (2, 2, 1), (2, 1, 2), (1, 2, 2)], np.float32)
-"""Where in a face its colour is read, barycentric up to scale: never on its rim, beside which a page may hold something else."""
+"""Where in a face its colour is read, barycentric up to scale: never on its rim, beside which a page may hold something
+else."""
 
 
 def _lit_piece(mesh: LitMesh, page: np.ndarray, budget: int) -> tuple:

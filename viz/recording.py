@@ -10,7 +10,7 @@ Entity tree (timeline 'step'):
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -20,8 +20,11 @@ from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
+from embodied.navigation.free_space import EYE
 from embodied.world import World
+from viz.blueprint import blueprint_of
 from viz.house3d import light_meshes, lit_meshes, log_house
+from viz.sinks import Sinks, open_recording
 from viz.story import Story
 
 PALETTE = {
@@ -33,6 +36,8 @@ PALETTE = {
     "agent": (31, 119, 255),
     "person": (255, 120, 0),
 }
+HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20}
+"""Metres above the floor that things are drawn at, so that none hides another."""
 VFOV = np.deg2rad(75.0)
 SHORT = 60
 """Letters of a request that is shown as a heading."""
@@ -85,12 +90,31 @@ def record(
         log_end(recording, world, task, state, pictures)
 
 
+def record_episode(
+    world: World, episode: Episode, sinks: Sinks, *, watch: Callable[[Sequence[Step]], Iterable[Step]] = iter
+) -> None:
+    """Record a finished episode of `world`, with the layout that suits it.
+
+    Args:
+      watch: wraps the iterator over steps (a progress bar).
+
+    Raises:
+      OSError: the file could not be written to its end, or a viewer went away.
+    """
+    about = {name: str(value) for name, value in world.fingerprint.items()}
+    with open_recording(
+        sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=about
+    ) as recording:
+        for _ in record(recording, world, episode.task, watch(episode.steps)):
+            pass
+
+
 def log_world(recording: rr.RecordingStream, world: World) -> None:
     """The house without ceilings, and its navigation graph, for all times."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     hung = frozenset(p.id for p in world.house.placements if world.catalogue.assets[p.asset].support == "ceiling")
     log_house(recording, light_meshes(world.parts, hung) if world.lit is None else lit_meshes(world.lit, hung))
-    floor = world.graph.positions - [0, 0, 1.45]
+    floor = on_floor(world.graph.positions, HEIGHTS["node"])
     recording.log("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]), static=True)
     strips = floor[np.asarray(world.graph.edges)]
     recording.log("graph/edges", rr.LineStrips3D(strips, radii=0.012, colors=(*PALETTE["graph"], 130)), static=True)
@@ -99,7 +123,7 @@ def log_world(recording: rr.RecordingStream, world: World) -> None:
 def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
     """Request, goal and start, for all times."""
     at = world.graph.positions
-    goals = at[list(task.goal_nodes)] - [0, 0, 1.44]
+    goals = on_floor(at[list(task.goal_nodes)], HEIGHTS["mark"])
     recording.log("task/goal", rr.Points3D(goals, radii=0.16, colors=PALETTE["goal"]), static=True)
     sought = [
         world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id
@@ -119,7 +143,9 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
             static=True,
         )
     recording.log(
-        "task/start", rr.Points3D(at[task.start.node] - [0, 0, 1.44], radii=0.13, colors=PALETTE["start"]), static=True
+        "task/start",
+        rr.Points3D(on_floor(at[task.start.node], HEIGHTS["mark"]), radii=0.13, colors=PALETTE["start"]),
+        static=True,
     )
     heading = "## " if len(task.request) <= SHORT else ""
     recording.log(
@@ -212,13 +238,20 @@ def log_sight(
     eye = world.graph.positions[node]
     recording.log(
         "agent/body",
-        rr.Capsules3D(lengths=1.0, radii=0.2, translations=[eye - [0, 0, 1.3]], colors=(*PALETTE["agent"], 200)),
+        rr.Capsules3D(
+            lengths=1.0, radii=0.2, translations=[on_floor(eye, HEIGHTS["body"])], colors=(*PALETTE["agent"], 200)
+        ),
     )
+
+
+def on_floor(eyes: np.ndarray, height: float) -> np.ndarray:
+    """(..., 3) points `height` metres above the floor below `eyes`, positions of viewpoints."""
+    return np.asarray(eyes) - [0.0, 0.0, EYE - height]
 
 
 def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> None:
     """The path walked so far."""
-    points = world.graph.positions[nodes if len(nodes) > 1 else 2 * nodes] - [0, 0, 1.4]
+    points = on_floor(world.graph.positions[nodes if len(nodes) > 1 else 2 * nodes], HEIGHTS["path"])
     recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
 
 
@@ -227,7 +260,8 @@ def log_aim(recording: rr.RecordingStream, world: World, state: Story, pictures:
     if state.image is not None:
         recording.log("view/target", encoded(sight_picture(world, state.image, pictures.panorama), pictures.jpeg))
     if state.route:
-        points = world.graph.positions[list(state.route if len(state.route) > 1 else 2 * state.route)] - [0, 0, 1.37]
+        nodes = list(state.route if len(state.route) > 1 else 2 * state.route)
+        points = on_floor(world.graph.positions[nodes], HEIGHTS["route"])
         recording.log("agent/route", rr.LineStrips3D([points], radii=0.035, colors=PALETTE["route"]))
     else:
         recording.log("agent/route", rr.Clear(recursive=False))
@@ -312,8 +346,3 @@ def encoded(rgb: np.ndarray, quality: int) -> rr.EncodedImage:
             f"a picture of shape {rgb.shape} and type {rgb.dtype} cannot be encoded; expected (h, w, 3) uint8"
         )
     return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
-
-
-def summary(episode: Episode) -> str:
-    """One line about an episode, for lists."""
-    return f"{episode.task.id}: “{episode.task.request}”, {len(episode.steps)} steps, {episode.requests} requests, ended by {episode.ended}"

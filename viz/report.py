@@ -5,19 +5,18 @@ from __future__ import annotations
 import base64
 import html
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from assets.cache import write_bytes
 from embodied.interface import Ask, Episode
-from embodied.records import episodes_file, load_lines
+from embodied.records import RecordError, episodes_file, load_lines, parse_file
 
-matplotlib.use("Agg")
+mpl.use("Agg")
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;color:#222}
 table{border-collapse:collapse;width:100%}td,th{padding:.3rem .6rem;border-bottom:1px solid #ddd;text-align:left}
 img{max-width:100%}.q{color:#555;font-style:italic}.n{text-align:right}"""
@@ -47,7 +46,8 @@ def load_run(folder: Path) -> list[Listed]:
     files = sorted(folder.glob("episodes*.jsonl"))
     if not files:
         raise FileNotFoundError(
-            f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd file"
+            f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd "
+            "file"
         )
     found = []
     for path in files:
@@ -64,7 +64,8 @@ def summary_line(number: int, listed: Listed) -> str:
     """One line of the list."""
     e = listed.episode
     end = "at a goal" if listed.arrived else e.ended
-    return f"{number:4}  {end:<10} {len(e.steps):3} steps {e.requests:2} requests  {listed.agent:<28} {e.task.id:<28} {e.task.request}"
+    counts = f"{len(e.steps):3} steps {e.requests:2} requests"
+    return f"{number:4}  {end:<10} {counts}  {listed.agent:<28} {e.task.id:<28} {e.task.request}"
 
 
 def write_page(folder: Path, found: Sequence[Listed]) -> Path:
@@ -86,9 +87,10 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
             ),
             "",
         )
+        end = html.escape("at a goal" if x.arrived else x.episode.ended)
         rows.append(
             f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td><td>{html.escape(x.episode.task.request)}"
-            f"<div class=q>{html.escape(asked)}</div></td><td>{'at a goal' if x.arrived else x.episode.ended}</td>"
+            f"<div class=q>{html.escape(asked)}</div></td><td>{end}</td>"
             f"<td class=n>{len(x.episode.steps)}</td><td class=n>{x.episode.requests}</td><td>{link}</td></tr>"
         )
     page = (
@@ -109,14 +111,17 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
     table = Path(folder) / "table.json"
     if not table.exists():
         return {}
-    rows = json.loads(table.read_text())
-    return {
-        _name(episodes_file(r["split"], r["agent"])): (
-            100 * r["values"]["success"]["mean"],
-            100 * r["values"]["success"]["half_width_95"],
-        )
-        for r in rows
-    }
+    rows = parse_file(table)
+    try:
+        return {
+            _name(episodes_file(r["split"], r["agent"])): (
+                100 * float(r["values"]["success"]["mean"]),
+                100 * float(r["values"]["success"]["half_width_95"]),
+            )
+            for r in rows
+        }
+    except (KeyError, TypeError, AttributeError, ValueError) as e:
+        raise RecordError(f"{table} is no table of `embodied eval` or `judge` ({e!r}); make it again") from e
 
 
 def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str, tuple[float, float]]) -> str:

@@ -21,11 +21,17 @@ from assets.cache import atomic_path
 from embodied.errors import UnableError
 
 APPLICATION = "embodied"
-MEMORY_LIMIT = "1GiB"
+LIMITS = ("--memory-limit", "1GiB", "--server-memory-limit", "1GiB")
 """What a viewer or server that we start may keep before it drops the oldest data."""
+
+EVERYWHERE = "0.0.0.0"
+"""All addresses of this machine."""
 
 PORT, WEB_PORT = 9876, 9090
 """Rerun's own: where viewers and servers listen for recordings, where a browser finds the web viewer."""
+
+HERE = "127.0.0.1"
+"""Where we listen unless told otherwise: nobody on other machines can look or write."""
 
 PATIENCE = 60.0
 """Seconds that a viewer may take to accept the last of a recording."""
@@ -45,13 +51,16 @@ class Sinks:
 
 
 @contextlib.contextmanager
-def open_viewers(*, spawn: bool = False, connect: str | None = None, serve: bool = False) -> Iterator[tuple[str, ...]]:
+def open_viewers(
+    *, spawn: bool = False, connect: str | None = None, serve: bool = False, bind: str = HERE
+) -> Iterator[tuple[str, ...]]:
     """URLs for `Sinks.viewers`; what cannot be watched is said before any work is done.
 
     Args:
       spawn: open the native viewer; it stays open afterwards. One that runs already is used.
       connect: URL of a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy.
       serve: serve the web viewer while the body runs, and then until Ctrl-C.
+      bind: address of this machine to serve at; all but the default lets others look and write.
 
     Raises:
       ValueError: `connect` is no URL of a viewer.
@@ -62,17 +71,22 @@ def open_viewers(*, spawn: bool = False, connect: str | None = None, serve: bool
         urls.append(_checked(connect))
     if spawn:
         urls.append(_spawned())
-    host = _serve() if serve else None
-    if host is not None:
-        urls.append(_url(PORT))
-        page = f"http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}"
-        print(f"watch in a browser: {page}", flush=True)
-    yield tuple(dict.fromkeys(urls))
-    if host is not None:
-        print(f"still served at {page}; Ctrl-C ends it", flush=True)
+    if not serve:
+        yield tuple(dict.fromkeys(urls))
+        return
+    with _serve(bind):
+        print(f"watch in a browser: {page(bind)}", flush=True)
+        yield tuple(dict.fromkeys([*urls, _url(PORT)]))
+        print(f"still served at {page(bind)}; Ctrl-C ends it", flush=True)
         with contextlib.suppress(KeyboardInterrupt):
             while True:
                 time.sleep(1.0)
+
+
+def page(bind: str) -> str:
+    """Address of the web viewer for a browser."""
+    host = HERE if bind == EVERYWHERE else bind
+    return f"http://{host}:{WEB_PORT}/?url={quote(_url(PORT, host), safe='')}"
 
 
 @contextlib.contextmanager
@@ -117,20 +131,17 @@ def open_recording(
             raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
 
 
-def open_file(rrd: Path, *, serve: bool = False) -> int:
+def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
     """Show a .rrd file in the native viewer, or serve it to browsers; returns when that is closed or stopped.
 
     Raises:
       UnableError: there is no screen, or the viewer could not be started.
     """
-    command = [viewer_program(), str(rrd), "--memory-limit", MEMORY_LIMIT, "--server-memory-limit", MEMORY_LIMIT]
+    command = [viewer_program(), str(rrd), "--bind", bind, *LIMITS]
     if serve:
-        _refuse_taken(PORT, WEB_PORT)
+        _refuse_taken(bind)
         command += ["--serve-web", "--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
-        print(
-            f"watch in a browser: http://127.0.0.1:{WEB_PORT}/?url={quote(_url(PORT), safe='')}; Ctrl-C ends it",
-            flush=True,
-        )
+        print(f"watch in a browser: {page(bind)}; Ctrl-C ends it", flush=True)
     else:
         _need_screen()
         command += ["--port", "auto"]
@@ -161,8 +172,8 @@ def send_file(rrd: Path, viewers: tuple[str, ...]) -> None:
         recording.disconnect()
 
 
-def _url(port: int) -> str:
-    return f"rerun+http://127.0.0.1:{port}/proxy"
+def _url(port: int, host: str = HERE) -> str:
+    return f"rerun+http://{host}:{port}/proxy"
 
 
 def _checked(url: str) -> str:
@@ -178,32 +189,52 @@ def _checked(url: str) -> str:
 
 
 def _spawned() -> str:
-    """The URL of the native viewer: the one that runs already, else a new one."""
-    if not listens("127.0.0.1", PORT):
+    """The URL of the native viewer: the one that runs already, else a new one, which outlives this program."""
+    if not listens(HERE, PORT):
         _need_screen()
-        try:
-            rr.spawn(
-                connect=False,
-                port=PORT,
-                memory_limit=MEMORY_LIMIT,
-                server_memory_limit=MEMORY_LIMIT,
-                executable_path=viewer_program(),
-                recording=rr.RecordingStream(APPLICATION),
-            )
-        except RuntimeError as e:
-            raise UnableError(
-                f"the Rerun viewer could not be started ({e}); use --serve and a browser, or --rrd and a file"
-            ) from e
+        viewer = subprocess.Popen(
+            [viewer_program(), "--bind", HERE, "--port", str(PORT), "--expect-data-soon", *LIMITS],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        _wait_for(viewer, HERE, "use --serve and a browser, or --rrd and a file")
     return _url(PORT)
 
 
-def _serve() -> rr.RecordingStream:
-    """A server for recordings, which lives as long as the stream returned, and the web viewer's page."""
-    _refuse_taken(PORT, WEB_PORT)
-    host = rr.RecordingStream(APPLICATION)
-    url = host.serve_grpc(grpc_port=PORT, server_memory_limit=MEMORY_LIMIT)
-    rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False, connect_to=url)
-    return host
+@contextlib.contextmanager
+def _serve(bind: str) -> Iterator[None]:
+    """A server for recordings and the web viewer's page, both at the address `bind`, while the body runs."""
+    _refuse_taken(bind)
+    if bind != HERE:
+        print(f"warning: everybody who reaches {bind} can look at what is served and send data to it", file=sys.stderr)
+    ports = ["--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
+    server = subprocess.Popen(
+        [viewer_program(), "--serve-web", "--bind", bind, *ports, *LIMITS],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C is for us
+    )
+    try:
+        _wait_for(server, HERE if bind == EVERYWHERE else bind, f"look whether {bind} is an address of this machine")
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def _wait_for(program: subprocess.Popen, host: str, remedy: str) -> None:
+    """Wait until `program` listens.
+
+    Raises:
+      UnableError: it ended, or does not listen after a minute.
+    """
+    until = time.monotonic() + PATIENCE
+    while not listens(host, PORT):
+        if program.poll() is not None or time.monotonic() > until:
+            program.kill()
+            raise UnableError(f"the Rerun viewer could not be started (status {program.poll()}); {remedy}")
+        time.sleep(0.1)
 
 
 def viewer_program() -> str:
@@ -219,11 +250,12 @@ def _need_screen() -> None:
         )
 
 
-def _refuse_taken(*ports: int) -> None:
-    for port in ports:
-        if listens("127.0.0.1", port):
+def _refuse_taken(bind: str) -> None:
+    for port in (PORT, WEB_PORT):
+        if listens(HERE if bind == EVERYWHERE else bind, port):
             raise UnableError(
-                f"port {port} is taken; end the program that uses it, or send to it with --connect {_url(port)} if it is a viewer"
+                f"port {port} is taken; end the program that uses it, or send to it with --connect {_url(port)} "
+                "if it is a viewer"
             )
 
 

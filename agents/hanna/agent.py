@@ -6,8 +6,6 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-import safetensors
-import safetensors.torch
 import torch
 
 from agents.hanna.asking import RULES, ask_above
@@ -17,14 +15,29 @@ from agents.hanna.policy import HannaPolicy, choose_at
 from agents.hanna.training_config import TrainingConfig
 from agents.hanna.vocabulary import Vocabulary
 from agents.shipped import SHIPPED_AGENT
+from agents.tensor_file import load_tensors, put, save_tensors
 from agents.vision.bank import FeatureBank
-from agents.vision.resnet import read_weights
-from assets.cache import atomic_path
+from embodied.records import from_plain, parse
 
-FORMAT = "embodied-agent-1"
+FORMAT, OLD_FORMAT = "embodied-agent-2", "embodied-agent-1"
+"""The older one has no checksum."""
 NETWORKS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 SHIPPED = SHIPPED_AGENT
 """The agent of this repository; see agents/weights/README.md."""
+
+
+@dataclass(frozen=True)
+class AgentSettings:
+    """What stands beside the weights in an agent's file, as text."""
+
+    format: str
+    config: str
+    """TrainingConfig as JSON."""
+    encoder: str
+    """Digest of the encoder whose features it learned from."""
+    feature_size: str
+    vocabulary: str
+    """Words as a JSON list."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +57,8 @@ class HannaAgent:
         """
         if bank.digest != self.encoder_digest:
             raise ValueError(
-                f"the features come from encoder {bank.digest[:12]}, the agent learned from {self.encoder_digest[:12]}; "
+                f"the features come from encoder {bank.digest[:12]}, the agent learned from "
+                f"{self.encoder_digest[:12]}; "
                 "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
             )
         config = self.config
@@ -78,29 +92,24 @@ def save_agent(agent: HannaAgent, path: Path) -> None:
         "feature_size": str(agent.feature_size),
         "vocabulary": json.dumps(agent.vocabulary.words),
     }
-    tensors = {k: v.detach().cpu().half().contiguous() for k, v in agent.network.state_dict().items()}
-    with atomic_path(Path(path)) as temporary:
-        safetensors.torch.save_file(tensors, temporary, metadata=settings)
+    save_tensors(Path(path), {k: v.detach().half() for k, v in agent.network.state_dict().items()}, settings)
 
 
 def load_agent(path: Path = SHIPPED) -> HannaAgent:
     """Read what `save_agent` wrote, ready to act.
 
     Raises:
-      ValueError: truncated, or of another format.
+      FileNotFoundError, OSError.
+      ValueError: truncated, changed, or of another format.
     """
-    tensors = read_weights(Path(path))
-    with safetensors.safe_open(path, "pt") as f:
-        settings = f.metadata() or {}
-    if settings.get("format") != FORMAT:
-        raise ValueError(
-            f"{path}: format {settings.get('format')!r}, this version reads {FORMAT!r}; "
-            "train the agent again with `embodied train hanna`"
-        )
-    config = TrainingConfig.from_json(settings["config"])
-    vocabulary = Vocabulary(tuple(json.loads(settings["vocabulary"])))
-    agent = new_agent(config, vocabulary, settings["encoder"], int(settings["feature_size"]))
-    agent.network.load_state_dict({k: v.float() for k, v in tensors.items()})
+    tensors, about = load_tensors(path, (FORMAT, OLD_FORMAT), "train the agent again with `embodied train hanna`")
+    settings = from_plain(AgentSettings, about, str(path))
+    config = TrainingConfig.from_json(settings.config)
+    words = parse(settings.vocabulary, "a vocabulary")
+    if not isinstance(words, list) or not all(isinstance(w, str) for w in words) or not settings.feature_size.isdigit():
+        raise ValueError(f"{path}: its vocabulary should be a list of words and its feature size a number")
+    agent = new_agent(config, Vocabulary(tuple(words)), settings.encoder, int(settings.feature_size))
+    put(agent.network, {k: v.float() for k, v in tensors.items()}, path)
     agent.network.eval()
     return agent
 
@@ -114,7 +123,8 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     sizes = [a.config.network_config(len(a.vocabulary), a.feature_size) for a in (agent, other)]
     if (agent.encoder_digest, agent.config.model, sizes[0]) != (other.encoder_digest, other.config.model, sizes[1]):
         raise ValueError(
-            f"{source} cannot be begun with: it is a {other.config.model!r} of {sizes[1]} on encoder {other.encoder_digest[:12]}, "
-            f"this run a {agent.config.model!r} of {sizes[0]} on encoder {agent.encoder_digest[:12]}; give this run its settings"
+            f"{source} cannot be begun with: it is a {other.config.model!r} of {sizes[1]} on encoder "
+            f"{other.encoder_digest[:12]}, this run a {agent.config.model!r} of {sizes[0]} on encoder "
+            f"{agent.encoder_digest[:12]}; give this run its settings"
         )
     agent.network.load_state_dict(other.network.state_dict())

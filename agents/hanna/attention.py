@@ -20,7 +20,7 @@ SIMILARITY_THRESHOLD = 0.9
 class MultiAttend(nn.Module):
     """MULTIATTEND(q, K, V): multi-headed attention, residual connection, layer normalisation."""
 
-    def __init__(self, hidden: int, heads: int, dropout: float):
+    def __init__(self, hidden: int, heads: int, dropout: float) -> None:
         super().__init__()
         if hidden % heads:
             raise ValueError(f"hidden size {hidden} is not a multiple of {heads} heads; choose another number of heads")
@@ -60,7 +60,7 @@ class MultiAttend(nn.Module):
 class FeedForward(nn.Module):
     """FFN(x): one ReLU layer four times as wide, residual connection, layer normalisation."""
 
-    def __init__(self, hidden: int, dropout: float):
+    def __init__(self, hidden: int, dropout: float) -> None:
         super().__init__()
         self.wide = nn.Linear(hidden, 4 * hidden)
         self.narrow = nn.Linear(4 * hidden, hidden)
@@ -75,7 +75,7 @@ class FeedForward(nn.Module):
 class DotAttend(nn.Module):
     """DOTATTEND(q, M): dot-product attention of Luong et al. (2015) over raw feature rows."""
 
-    def __init__(self, query_size: int, row_size: int, hidden: int):
+    def __init__(self, query_size: int, row_size: int, hidden: int) -> None:
         super().__init__()
         self.query = nn.Linear(query_size, hidden)
         self.row = nn.Linear(row_size, hidden, bias=False)
@@ -101,7 +101,7 @@ class DotAttend(nn.Module):
 class SelfAttend(nn.Module):
     """SELFATTEND(q, K, V): MULTIATTEND over an agent's own past, to which (q, output) is appended."""
 
-    def __init__(self, hidden: int, heads: int, dropout: float):
+    def __init__(self, hidden: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.attend = MultiAttend(hidden, heads, dropout)
 
@@ -155,7 +155,7 @@ def sim_attend(query: Tensor, keys: Tensor, values: Tensor, mask: Tensor, normal
 class IncTime(nn.Module):
     """INCTIME(x) = LAYERNORM(x + RELU(LINEAR(x))), Eq D.1; a linear shortcut where sizes differ (D.2)."""
 
-    def __init__(self, size: int, hidden: int):
+    def __init__(self, size: int, hidden: int) -> None:
         super().__init__()
         self.step = nn.Linear(size, hidden)
         self.shortcut = nn.Identity() if size == hidden else nn.Linear(size, hidden)
@@ -169,7 +169,7 @@ class IncTime(nn.Module):
 class TextEncoder(nn.Module):
     """TRANSENCODER(l), Eq D.5: word embeddings, sinusoid positions, one Transformer layer."""
 
-    def __init__(self, words: int, hidden: int, heads: int, dropout: float):
+    def __init__(self, words: int, hidden: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.hidden = hidden
         self.embedding = nn.Embedding(words, hidden, padding_idx=0)

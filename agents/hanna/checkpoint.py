@@ -10,6 +10,8 @@ from agents.hanna.agent import HannaAgent
 from agents.hanna.training_config import TrainingConfig
 from agents.imitation.checkpoint import CheckpointError, read_checkpoint, refuse_changes, write_checkpoint
 from agents.imitation.loop import Progress
+from agents.tensor_file import put
+from embodied.records import from_plain
 
 FORMAT = "embodied-checkpoint-1"
 
@@ -35,6 +37,8 @@ def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
         vocabulary or another encoder.
     """
     body = read_checkpoint(Path(path), FORMAT)
+    if lost := sorted({"encoder", "vocabulary", "config", "network", "optimizer", "progress"} - set(body)):
+        raise CheckpointError(f"{path}: {lost} are missing; delete it to begin again")
     if body["encoder"] != agent.encoder_digest:
         raise CheckpointError(
             f"{path}: this run learned from encoder {body['encoder'][:12]}, the data set has features of "
@@ -44,9 +48,9 @@ def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
         raise CheckpointError(f"{path}: the data set has other words than this run began with; use another run folder")
     before, now = TrainingConfig.from_json(body["config"]), agent.config
     refuse_changes(path, vars(before), vars(now), MAY_CHANGE)
-    agent.network.load_state_dict(body["network"])
+    put(agent.network, body["network"], path)
     optimizer.load_state_dict(body["optimizer"])
-    return Progress(**body["progress"])
+    return from_plain(Progress, body["progress"], f"{path}: progress")
 
 
 MAY_CHANGE = (

@@ -37,7 +37,7 @@ class LstmMemory:
 class LstmStateNetwork(nn.Module):
     """Text LSTM, decoder LSTM, attention over words, current view and target view."""
 
-    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int):
+    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int) -> None:
         super().__init__()
         h, d = config.hidden_size, config.feature_size
         self.hidden_size = h
@@ -87,7 +87,7 @@ def _attend_words(attend: DotAttend, query: Tensor, text: Tensor, mask: Tensor) 
 class LstmNetwork(nn.Module):
     """Navigation and help-request decoders of the baseline."""
 
-    def __init__(self, config: HannaConfig):
+    def __init__(self, config: HannaConfig) -> None:
         super().__init__()
         self.config = config
         h = config.hidden_size

@@ -144,13 +144,9 @@ class HannaPolicy:
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
-            n = len(o.candidates)
-            thought = Thought(
-                moves=np.append(moves[row, 1 : n + 1], moves[row, 0]),
-                asks={"help": float(asks[row]), "nothing": float(1 - asks[row])},
-                reasons=None if reasons is None else tuple(float(r) for r in reasons[row]),
-            )
-            rng = rngs[position]
+            n, rng = len(o.candidates), rngs[position]
+            reason = None if reasons is None else tuple(float(r) for r in reasons[row])
+            thought = thought_of(moves[row], asks[row], reason, n)
             index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
             if imposed is not None and imposed[position] is not None:
                 index = imposed[position]
@@ -240,6 +236,15 @@ class HannaPolicy:
         if text not in self._encoded:
             self._encoded[text] = self.vocabulary.encode(text, self.instruction_length)
         return self._encoded[text]
+
+
+def thought_of(moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int) -> Thought:
+    """What the networks said, as it is written down: `moves` has stop first, a Thought has it last."""
+    return Thought(
+        moves=np.append(moves[1 : candidates + 1], moves[0]),
+        asks={"help": float(ask), "nothing": float(1 - ask)},
+        reasons=reasons,
+    )
 
 
 def for_training(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -16,7 +17,7 @@ from agents.imitation.loop import Progress
 from agents.imitation.parallel import join_launcher, one_voice
 from agents.vision.encoder import Encoder
 from agents.vision.features import feature_path, load_bank
-from agents.vision.run import encoder_of
+from agents.vision.run import encoder_of, pictures_of
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import spread
 from embodied.interface import Episode
@@ -26,13 +27,25 @@ Note = Callable[[str], None]
 
 
 def split_of(
-    data: Dataset, name: str, encoder: Encoder, device: str = "cpu", limit: int | None = None, houses: int | None = None
+    data: Dataset,
+    name: str,
+    encoder: Encoder,
+    device: str = "cpu",
+    limit: int | None = None,
+    houses: int | None = None,
+    quality: str | None = None,
 ) -> Split:
-    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses."""
+    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
+
+    Args:
+      quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
+    """
     split = data.split(name, houses=houses)
-    paths = {n: feature_path(data.folder / "features", encoder.digest, n) for n in split.worlds}
+    pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n, pictures[n]) for n in split.worlds}
     tasks = split.tasks if limit is None else spread(split.tasks, limit)
-    return Split(split.worlds, tasks, split.make_env, load_bank(paths, encoder.digest).to(device))
+    bank = load_bank(paths, encoder.digest, split.worlds, pictures)
+    return Split(split.worlds, tasks, split.make_env, bank.to(device))
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
@@ -51,11 +64,9 @@ def run_train_hanna(
     """Train an agent on a data set's training houses, validating on its unseen validation houses."""
     torch.set_num_threads(args.threads)
     train_agent(
-        Dataset(args.data),
-        encoder_of(args),
+        Lessons(Dataset(args.data), encoder_of(args), args.quality, join_launcher(args.device)),
         config,
         args.out,
-        device=join_launcher(args.device),
         minutes=args.minutes,
         begin=args.begin,
         note=note,
@@ -64,13 +75,25 @@ def run_train_hanna(
     return 0
 
 
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """What an agent learns from, and where it does."""
+
+    data: Dataset
+    encoder: Encoder
+    quality: str | None = None
+    """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
+    device: str = "cpu"
+
+    def split(self, name: str, *, limit: int | None = None, houses: int | None = None) -> Split:
+        return split_of(self.data, name, self.encoder, self.device, limit, houses, self.quality)
+
+
 def train_agent(
-    data: Dataset,
-    encoder: Encoder,
+    lessons: Lessons,
     config: TrainingConfig,
     folder: Path,
     *,
-    device: str = "cpu",
     minutes: float | None = None,
     begin: Path | None = None,
     note: Note = print,
@@ -85,14 +108,15 @@ def train_agent(
       ValueError: `begin` has networks of other sizes, or learned from another encoder.
     """
     houses, note = config.training_houses or None, one_voice(note)
-    training = split_of(data, "train", encoder, device, houses=houses)
-    validation = split_of(data, "val_unseen", encoder, device, config.validation_tasks)
+    data, encoder = lessons.data, lessons.encoder
+    training = lessons.split("train", houses=houses)
+    validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else load_agent(begin)
     agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.digest, encoder.size)
     if other is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         note(f"new runs begin with the weights of {begin}")
-    agent.network.to(device)
+    agent.network.to(lessons.device)
     parameters = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})
     note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")

@@ -42,10 +42,12 @@ from agents.imitation.loop import (
     tasks_of_update,
 )
 from agents.vision.bank import FeatureBank
+from assets.cache import write_json
 from embodied.envs.base import HelpEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, Place, Task, Teacher
+from embodied.locks import locked
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ def train(
     note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train `agent` in place, from `folder`'s checkpoint if there is one.
+    """Train `agent` in place, from `folder`'s checkpoint if there is one; one process at a time.
 
     Writes checkpoint.pt (last state), best.safetensors (see `validate`), settings.json,
     validation.jsonl and TensorBoard scalars into `folder`.
@@ -81,17 +83,36 @@ def train(
     Raises:
       TrainingError: a loss or gradient is not a number any more, or memory ran out.
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+      LockedError: another process trains in `folder`.
       CheckpointError, OSError.
     """
-    config, folder, note = agent.config, Path(folder), parallel.one_voice(note)
-    folder.mkdir(parents=True, exist_ok=True)
+    if parallel.rank() == 0:
+        with locked(folder):
+            return _train(agent, training, validation, teacher, folder, Session(minutes, note, on_validation))
+    return _train(agent, training, validation, teacher, folder, Session(minutes, parallel.one_voice(note)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """One run of the program that trains an agent; a training may take several."""
+
+    minutes: float | None
+    note: Note
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None
+
+
+def _train(
+    agent: HannaAgent, training: Split, validation: Split, teacher: Teacher, folder: Path, session: Session
+) -> Progress:
+    """See `train`; nobody else writes into `folder`."""
+    config, minutes, note = agent.config, session.minutes, session.note
     optimizer = torch.optim.Adam(agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay)
     checkpoint = folder / "checkpoint.pt"
     progress = load_checkpoint(checkpoint, agent, optimizer) if checkpoint.exists() else Progress()
     if progress.update:
         note(f"continuing after update {progress.update}")
     if parallel.rank() == 0:
-        (folder / "settings.json").write_text(json.dumps(json.loads(config.to_json()), indent=1) + "\n")
+        write_json(folder / "settings.json", json.loads(config.to_json()), indent=1)
     guided = config.guided_asking if config.ask_rule == "learned" else 0.0
     learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided)
     report = Report(folder, config.iterations, progress, note)
@@ -109,7 +130,9 @@ def train(
                 last = progress.update == config.iterations
                 if parallel.rank() == 0 and (progress.update % config.validate_every == 0 or last):
                     with report.clock.on("validation"):
-                        progress = validate(agent, validation, progress, folder, report, now().seconds, on_validation)
+                        progress = validate(
+                            agent, validation, progress, folder, report, now().seconds, session.on_validation
+                        )
                 device = next(agent.network.parameters()).device
                 late = parallel.any_of_us(minutes is not None and time.monotonic() - began > 60 * minutes, device)
                 stopped = parallel.any_of_us(stop.is_set(), device)
@@ -168,8 +191,9 @@ def learn_once(
     norm = torch.nn.utils.get_total_norm([p.grad for p in agent.network.parameters() if p.grad is not None])
     if not all(math.isfinite(float(x.detach())) for x in (*losses, norm)):
         raise TrainingError(
-            f"update {update}: loss {float(losses[0].detach()):.3g} + {float(losses[1].detach()):.3g}, gradient {float(norm):.3g}, not finite; "
-            "the last checkpoint is intact, lower the learning rate or alpha and begin from it"
+            f"update {update}: loss {float(losses[0].detach()):.3g} + {float(losses[1].detach()):.3g}, gradient "
+            f"{float(norm):.3g}, not finite; the last checkpoint is intact, lower the learning rate or alpha and "
+            "begin from it"
         )
     with clock.on("backward"):
         optimizer.step()
@@ -307,8 +331,8 @@ class Report:
         with open(self.folder / "validation.jsonl", "a") as f:
             f.write(json.dumps(line) + "\n")
         self.note(
-            f"validation on {episodes} unseen tasks after {update} updates: success {100 * values['success']:.1f} %, SPL "
-            f"{100 * values['spl']:.1f} %, {values['requests']:.1f} requests, {values['steps']:.1f} steps, ends "
+            f"validation on {episodes} unseen tasks after {update} updates: success {100 * values['success']:.1f} %, "
+            f"SPL {100 * values['spl']:.1f} %, {values['requests']:.1f} requests, {values['steps']:.1f} steps, ends "
             f"{values['navigation error']:.1f} m away" + ("; kept" if kept else "")
         )
 

@@ -9,13 +9,31 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from agents.hanna.asking import RULES
 from agents.hanna.config import HannaConfig
+from embodied.records import from_json
 
 MODELS = ("hanna", "lstm")
+
+RANGES: tuple[tuple[tuple[str, ...], Callable[[float], bool], str], ...] = (
+    (
+        ("hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads", "iterations", "batch")
+        + ("training_steps", "evaluation_steps", "evaluation_batch", "validate_every", "validation_tasks")
+        + ("instruction_length",),
+        lambda x: x >= 1,
+        "at least 1",
+    ),
+    (("learning_rate", "checkpoint_minutes"), lambda x: 0 < x < math.inf, "positive and finite"),
+    (("alpha", "weight_decay", "evaluation_temperature"), lambda x: 0 <= x < math.inf, "at least 0 and finite"),
+    (("training_houses",), lambda x: x >= 0, "at least 0"),
+    (("dropout", "environment_dropout", "curiosity_floor"), lambda x: 0 <= x < 1, "in [0, 1)"),
+    (("ask_threshold", "cooldown", "guided_asking"), lambda x: 0 <= x <= 1, "in [0, 1]"),
+)
+"""Fields of TrainingConfig, what holds of them, and that in words."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +59,8 @@ class TrainingConfig:
     learning_rate: float = 1e-4
     """Of Adam."""
     cooldown: float = 0.0
-    """Share of the updates, the last ones, over which the learning rate falls linearly towards zero; not in the dissertation."""
+    """Share of the updates, the last ones, over which the learning rate falls linearly towards zero; not in the
+    dissertation."""
     weight_decay: float = 5e-4
     """The authors' program's; the text does not mention it (X12)."""
     batch: int = 32
@@ -53,7 +72,8 @@ class TrainingConfig:
     instruction_length: int = 50
     """Words of an instruction that are read."""
     alpha: float = 1.0
-    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than 'learned'."""
+    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
+    'learned'."""
     curiosity_floor: float = 0.0
     """Mistakes less likely than this are not pushed down further; 0 is Eq 4.13 as printed, without a bound."""
     evaluation_steps: int = 50
@@ -93,38 +113,13 @@ class TrainingConfig:
     """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
-        if self.evaluation_temperature < 0:
-            raise ValueError(f"evaluation_temperature must not be negative, got {self.evaluation_temperature}")
-        if not 0 <= self.ask_threshold <= 1:
-            raise ValueError(f"ask_threshold must be in [0, 1], got {self.ask_threshold}")
-        if not 0 <= self.environment_dropout < 1:
-            raise ValueError(f"environment_dropout must be in [0, 1), got {self.environment_dropout}")
-        if self.ask_rule not in RULES:
-            raise ValueError(f"ask_rule must be one of {sorted(RULES)}, got {self.ask_rule!r}")
-        for name in (
-            "iterations",
-            "batch",
-            "training_steps",
-            "evaluation_steps",
-            "evaluation_batch",
-            "validate_every",
-            "instruction_length",
-        ):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("learning_rate", "checkpoint_minutes"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        if not 0 <= self.cooldown <= 1:
-            raise ValueError(f"cooldown must be in [0, 1], got {self.cooldown}")
-        if not 0 <= self.guided_asking <= 1:
-            raise ValueError(f"guided_asking must be in [0, 1], got {self.guided_asking}")
-        if self.training_houses < 0:
-            raise ValueError(f"training_houses must not be negative, got {self.training_houses}")
-        if self.alpha < 0:
-            raise ValueError(f"alpha must not be negative, got {self.alpha}")
+        for name, words in (("model", MODELS), ("ask_rule", sorted(RULES))):
+            if getattr(self, name) not in words:
+                raise ValueError(f"{name} must be one of {words}, got {getattr(self, name)!r}")
+        for names, holds, wanted in RANGES:
+            for name in names:
+                if not holds(getattr(self, name)):  # NaN holds nothing
+                    raise ValueError(f"{name} must be {wanted}, got {getattr(self, name)}")
 
     def learning_rate_at(self, update: int) -> float:
         """Of Adam at an update, counted from 0; never zero."""
@@ -153,11 +148,7 @@ class TrainingConfig:
     @staticmethod
     def from_json(text: str) -> TrainingConfig:
         """Read what `to_json` wrote; unknown fields are refused."""
-        body: dict[str, Any] = json.loads(text)
-        known = {f.name for f in dataclasses.fields(TrainingConfig)}
-        if unknown := sorted(set(body) - known):
-            raise ValueError(f"settings have the unknown fields {unknown}; they were written by another version")
-        return TrainingConfig(**body)
+        return from_json(TrainingConfig, text)
 
 
 SCALES: dict[str, TrainingConfig] = {

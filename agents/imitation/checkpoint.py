@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from assets.cache import atomic_path
+from assets.cache import write_bytes
 
 
 class CheckpointError(ValueError):
@@ -22,22 +24,27 @@ def write_checkpoint(path: Path, kind: str, body: Mapping[str, object]) -> None:
       kind: name and version of what is in it, checked on reading.
       body: tensors, state_dicts, numbers, texts and containers of them.
     """
-    with atomic_path(Path(path)) as temporary:
-        torch.save({"format": kind, **body}, temporary)
+    whole = io.BytesIO()
+    torch.save({"format": kind, **body}, whole)
+    write_bytes(Path(path), whole.getvalue())
 
 
 def read_checkpoint(path: Path, kind: str) -> dict[str, Any]:
     """What `write_checkpoint` wrote.
 
     Raises:
-      CheckpointError: truncated, or of another kind or version.
+      CheckpointError: truncated, changed, or of another kind or version.
     """
+    damage = f"{path}: cannot be read, it was cut short or changed; delete it to begin again"
     try:
+        with zipfile.ZipFile(path) as z:
+            if bad := z.testzip():  # torch does not look at the checksums itself
+                raise CheckpointError(f"{damage} ({bad} does not fit its checksum)")
         body = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError:
+    except (OSError, CheckpointError):
         raise
     except Exception as e:  # a truncated file raises one of half a dozen kinds
-        raise CheckpointError(f"{path}: cannot be read ({e}); it was cut short, delete it to begin again") from e
+        raise CheckpointError(f"{damage} ({e})") from e
     if not isinstance(body, dict) or body.get("format") != kind:
         found = body.get("format") if isinstance(body, dict) else type(body).__name__
         raise CheckpointError(f"{path}: format {found!r}, this version reads {kind!r}; begin a new run")

@@ -16,7 +16,7 @@ class FeatureBank:
     It is allowed to look inside a Sight; policies are not.
     """
 
-    def __init__(self, worlds: Mapping[str, np.ndarray], digest: str):
+    def __init__(self, worlds: Mapping[str, np.ndarray], digest: str) -> None:
         """Args:
         worlds: world name -> (nodes, 36, D) features, float16 or float32.
         digest: names the encoder that made them.

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from embodied.render.pictures import PictureSettings
+
+NETWORKS = ("compact", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
+"""Keys of agents.vision.resnet.ARCHITECTURES; the others than 'compact' are torchvision's."""
+PLAIN = PictureSettings(size=192)
+"""How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
+
+
+def drawing(pictures: PictureSettings) -> str:
+    """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
+    lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
+    other = () if pictures.backend == "classic" else (pictures.backend,)
+    return "_".join([pictures.quality, *map(str, lit), *other, str(pictures.size)])
 
 
 @dataclass(frozen=True)
@@ -25,3 +40,15 @@ class VisionConfig:
     """A class is learned if it is visible in at least this many training views."""
     seed: int = 0
     """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        if self.network not in NETWORKS:
+            raise ValueError(f"network must be one of {NETWORKS}, got {self.network!r}")
+        for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if not 0 < self.learning_rate < math.inf or not 0 <= self.weight_decay < math.inf:
+            raise ValueError(
+                f"learning_rate must be positive and weight_decay not negative, got {self.learning_rate} and "
+                f"{self.weight_decay}"
+            )

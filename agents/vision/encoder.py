@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import safetensors
-import safetensors.torch
 import torch
 from torch import Tensor
 
 from agents.shipped import SHIPPED_ENCODER
+from agents.tensor_file import load_tensors, put, save_tensors
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise, read_weights
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
-from assets.cache import atomic_path
 
-FORMAT = "embodied-encoder-1"
+FORMAT, OLD_FORMAT = "embodied-encoder-2", "embodied-encoder-1"
+"""The older one has no checksum, but its digest covers weights and settings, too."""
+SHARINGS = ("strip", "views")
 SHIPPED = SHIPPED_ENCODER
 """The encoder of this repository, trained on our own renders; see agents/weights/README.md."""
 MARGIN = 3 * CELL
@@ -49,7 +49,8 @@ class Encoder:
     @functools.cached_property
     def digest(self) -> str:
         """Hex SHA-256 over weights and settings: two encoders with one digest give the same features."""
-        h = hashlib.sha256(json.dumps([FORMAT, self.name, self.sharing]).encode())
+        # begins with the first format's name, so that features of its encoders stay theirs
+        h = hashlib.sha256(json.dumps([OLD_FORMAT, self.name, self.sharing]).encode())
         for name, tensor in sorted(_tensors(self).items()):
             h.update(name.encode() + tensor.detach().cpu().half().contiguous().numpy().tobytes())
         return h.hexdigest()
@@ -125,9 +126,7 @@ def imagenet_encoder(name: str, weights: Path) -> Encoder:
 def save_encoder(encoder: Encoder, path: Path) -> None:
     """Write half-precision weights and settings atomically."""
     settings = {"format": FORMAT, "name": encoder.name, "sharing": encoder.sharing, "digest": encoder.digest}
-    tensors = {k: v.detach().cpu().half().contiguous() for k, v in _tensors(encoder).items()}
-    with atomic_path(Path(path)) as temporary:
-        safetensors.torch.save_file(tensors, temporary, metadata=settings)
+    save_tensors(Path(path), {k: v.detach().half() for k, v in _tensors(encoder).items()}, settings)
 
 
 def load_encoder(path: Path = SHIPPED) -> Encoder:
@@ -136,23 +135,17 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     Raises:
       ValueError: truncated, of another format, or not the weights its digest names.
     """
-    path = Path(path)
-    tensors = read_weights(path)
-    with safetensors.safe_open(path, "pt") as f:
-        settings = f.metadata() or {}
-    if settings.get("format") != FORMAT:
-        raise ValueError(
-            f"{path}: format {settings.get('format')!r}, this version reads {FORMAT!r}; "
-            "train the encoder again with `embodied train vision`"
-        )
+    tensors, settings = load_tensors(path, (FORMAT, OLD_FORMAT), "train the encoder again with `embodied train vision`")
+    if settings.get("name") not in ARCHITECTURES or settings.get("sharing") not in SHARINGS:
+        raise ValueError(f"{path}: unknown settings {settings}; train the encoder again with `embodied train vision`")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
     network = ResNet(ARCHITECTURES[settings["name"]])
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
-    network.load_state_dict({**counters, **tensors})
+    put(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix)
-    if encoder.digest != settings["digest"]:
-        raise ValueError(f"{path}: contents do not fit the digest {settings['digest'][:12]}; the file was changed")
+    if encoder.digest != settings.get("digest"):
+        raise ValueError(f"{path}: contents do not fit the digest {settings.get('digest', '')[:12]}; it was changed")
     return encoder
 
 

@@ -1,7 +1,7 @@
 """From panoramas to the 36 x D features per node of appendix D.1, and their files.
 
-A feature file belongs to one house and one encoder, and says so: `<folder>/<encoder digest,
-16 letters>/<house>.safetensors`. Row k of a node is view k of embodied.interface: turn k % 12
+A feature file belongs to one house, one encoder and one way of drawing, and says so: `<folder>/<encoder
+digest, 16 letters>/<drawing>/<house>.safetensors`. Row k of a node is view k of embodied.interface: turn k % 12
 (counter-clockwise from +x), tilt k // 12 - 1.
 """
 
@@ -11,19 +11,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-import safetensors
-import safetensors.torch
 import torch
 
+from agents.tensor_file import load_tensors, save_tensors
 from agents.vision.bank import FeatureBank
+from agents.vision.config import PLAIN, drawing
 from agents.vision.encoder import Encoder
-from agents.vision.resnet import read_weights
 from agents.vision.strip import HEIGHT, VFOV
-from assets.cache import atomic_path
-from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
 from embodied.render.panorama import Panorama
+from embodied.render.pictures import PictureSettings
 
-FORMAT = "embodied-features-1"
+FORMAT = "embodied-features-2"
+KEYS = ("encoder", "source", "drawing")
+"""What a feature file says that it was made from."""
 EQUIRECT = 288
 """Height of the equirect that the strip is cut from: 1.6 pixels per degree."""
 VIEW_SIZE = (240, 320)
@@ -68,51 +69,73 @@ def _groups(pictures: Iterator[np.ndarray], batch: int) -> Iterator[list[np.ndar
         yield group
 
 
-def feature_path(folder: Path, digest: str, world: str) -> Path:
-    """Where the features of a world by an encoder are kept."""
-    return Path(folder) / digest[:16] / f"{world}.safetensors"
+def feature_path(folder: Path, digest: str, world: str, pictures: PictureSettings = PLAIN) -> Path:
+    """Where the features of a world by an encoder, from pictures drawn so, are kept."""
+    return Path(folder) / digest[:16] / drawing(pictures) / f"{world}.safetensors"
 
 
-def save_features(path: Path, features: np.ndarray, encoder: Encoder, source: str) -> None:
+def save_features(
+    path: Path, features: np.ndarray, encoder: Encoder, source: str, pictures: PictureSettings = PLAIN
+) -> None:
     """Write (n, 36, D) features; `source` is the digest of what they were computed from (the house)."""
-    about = {"format": FORMAT, "encoder": encoder.digest, "source": source}
-    with atomic_path(Path(path)) as temporary:
-        tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
-        safetensors.torch.save_file({"features": tensor}, temporary, metadata=about)
+    about = {"format": FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
+    tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
+    save_tensors(Path(path), {"features": tensor}, about)
 
 
-def load_features(path: Path, *, encoder: str | None = None, source: str | None = None) -> tuple[np.ndarray, str]:
+def load_features(
+    path: Path, *, encoder: str | None = None, source: str | None = None, pictures: PictureSettings | None = None
+) -> tuple[np.ndarray, str]:
     """(n, 36, D) float16 features and the digest of their encoder.
 
     Args:
-      encoder, source: the digests that are expected, if any.
+      encoder, source, pictures: what is expected, if anything.
 
     Raises:
       FileNotFoundError: there is no such file.
-      ValueError: truncated, of another format, another encoder or another house.
+      ValueError: truncated, changed, of another format, encoder, house or way of drawing.
     """
-    path = Path(path)
+    path, remedy = Path(path), f"make it again with `embodied features{_option(pictures)}`"
     if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; make it with `embodied features`")
-    features = read_weights(path).get("features")
-    with safetensors.safe_open(path, "pt") as f:
-        about = f.metadata() or {}
-    if about.get("format") != FORMAT or features is None or features.dim() != 3 or features.shape[1] != VIEWS:
-        raise ValueError(f"{path}: not a feature file of format {FORMAT!r}; make it again with `embodied features`")
-    for name, expected in (("encoder", encoder), ("source", source)):
+        raise FileNotFoundError(f"{path} does not exist; make it with `embodied features{_option(pictures)}`")
+    tensors, about = load_tensors(path, (FORMAT,), remedy)
+    features = tensors.get("features")
+    if features is None or features.dim() != 3 or features.shape[1] != VIEWS or not {*KEYS} <= set(about):
+        raise ValueError(f"{path}: not a feature file of format {FORMAT!r}; {remedy}")
+    drawn = None if pictures is None else drawing(pictures)
+    for name, expected in zip(KEYS, (encoder, source, drawn), strict=True):
         if expected is not None and about[name] != expected:
-            raise ValueError(
-                f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; "
-                "make features again with `embodied features`"
-            )
+            raise ValueError(f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; {remedy}")
     return features.numpy(), about["encoder"]
 
 
-def load_bank(paths: Mapping[str, Path], encoder: str | None = None) -> FeatureBank:
-    """The features of several worlds (name -> file); all must come from one encoder."""
+def _option(pictures: PictureSettings | None) -> str:
+    return "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {pictures.quality}"
+
+
+def load_bank(
+    paths: Mapping[str, Path],
+    encoder: str | None = None,
+    places: Mapping[str, Place] | None = None,
+    pictures: Mapping[str, PictureSettings] | None = None,
+) -> FeatureBank:
+    """The features of several worlds (name -> file); all must come from one encoder.
+
+    Args:
+      encoder: what is expected, if anything.
+      places, pictures: whose features they should be, and how these are drawn, by name.
+    """
     worlds, digests = {}, set()
     for name in sorted(paths):
-        worlds[name], digest = load_features(paths[name], encoder=encoder)
+        place = None if places is None else places[name]
+        source = None if place is None else place.house.digest
+        drawn = None if pictures is None else pictures[name]
+        worlds[name], digest = load_features(paths[name], encoder=encoder, source=source, pictures=drawn)
+        if place is not None and len(worlds[name]) != len(place.graph.ids):
+            raise ValueError(
+                f"{paths[name]}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
+                f"make it again with `embodied features{_option(drawn)}`"
+            )
         digests.add(digest)
     if len(digests) > 1:
         raise ValueError(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,20 +63,24 @@ class HouseStrips:
 
     @staticmethod
     def load(path: Path) -> HouseStrips:
-        """Read what `save` wrote; the house's name is the file's stem."""
+        """Read what `save` wrote; the house's name is the file's stem.
+
+        Raises:
+          FileNotFoundError, OSError.
+          ValueError: damaged, or arrays that do not fit each other.
+        """
         try:
             with np.load(path, allow_pickle=False) as f:
-                return HouseStrips(
-                    Path(path).stem,
-                    tuple(str(c) for c in f["classes"]),
-                    f["rgb"],
-                    f["share"],
-                    f["rooms"],
-                    f["log_depth"],
-                    f["room"],
-                )
-        except (ValueError, KeyError, EOFError) as e:
-            raise ValueError(f"{path}: not a file of strips, or truncated ({e}); delete it and render again") from e
+                classes = tuple(str(c) for c in f["classes"])
+                arrays = {name: f[name] for name in ("rgb", "share", "rooms", "log_depth", "room")}
+        except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as e:
+            raise ValueError(f"{path}: not a file of strips, or damaged ({e}); delete it and render again") from e
+        n, shapes = len(arrays["room"]), {name: a.shape for name, a in arrays.items()}
+        cells = (n, ROWS, COLUMNS)
+        wanted = {"rgb": (n, HEIGHT, WIDTH, 3), "share": (*cells, len(classes)), "rooms": cells, "log_depth": cells}
+        if shapes != {**wanted, "room": (n,)}:
+            raise ValueError(f"{path}: its arrays do not fit each other ({shapes}); delete it and render again")
+        return HouseStrips(Path(path).stem, classes, **arrays)
 
 
 def shell_class(owner: str) -> str:

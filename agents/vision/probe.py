@@ -5,6 +5,7 @@ The same protocol serves trained, random and ImageNet features, so their numbers
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,7 +105,9 @@ def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Rea
     )
 
 
-def _fit(x: Tensor, goal: Tensor, loss, seed: int, steps: int, outputs: int | None = None):
+def _fit(
+    x: Tensor, goal: Tensor, loss: Callable[[Tensor, Tensor], Tensor], seed: int, steps: int, outputs: int | None = None
+) -> Callable[[Tensor], Tensor]:
     """A linear reader trained with Adam on random batches of 4096 rows."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)

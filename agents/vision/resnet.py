@@ -57,7 +57,7 @@ ARCHITECTURES: dict[str, Architecture] = {
 
 
 class BasicBlock(nn.Module):
-    def __init__(self, inputs: int, width: int, stride: int):
+    def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
         self.conv1 = nn.Conv2d(inputs, width, 3, stride, 1, bias=False)
         self.bn1 = nn.BatchNorm2d(width)
@@ -74,7 +74,7 @@ class BasicBlock(nn.Module):
 class Bottleneck(nn.Module):
     """The stride sits in the 3x3 convolution, as in torchvision ("ResNet v1.5")."""
 
-    def __init__(self, inputs: int, width: int, stride: int):
+    def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
         outputs = width * EXPANSION["bottleneck"]
         self.conv1 = nn.Conv2d(inputs, width, 1, bias=False)
@@ -101,7 +101,7 @@ def _downsample(inputs: int, outputs: int, stride: int) -> nn.Module | None:
 class ResNet(nn.Module):
     """Images to a feature map; `fc` classifies its average, when there are classes."""
 
-    def __init__(self, architecture: Architecture, classes: int = 0):
+    def __init__(self, architecture: Architecture, classes: int = 0) -> None:
         super().__init__()
         a = architecture
         self.architecture = a

@@ -10,13 +10,14 @@ import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import joblib
 import numpy as np
 import torch
 
 from agents.device import check_device
-from agents.vision.config import VisionConfig
+from agents.vision.config import PLAIN, VisionConfig
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
@@ -27,52 +28,64 @@ from assets.cache import write_json
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.interface import VIEWS
+from embodied.locks import locked
 from embodied.render.pictures import PictureSettings
+from embodied.world import World, open_world
 
 Note = Callable[[str], None]
-FACES = 192
-"""Side of the cube faces from which features are made: the strip's resolution."""
 
 
 def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note = print) -> int:
     """Render strips of all houses, train on the training houses, judge on the others, save.
 
     What is there already, strips or an encoder of the same settings, is not made again.
+
+    Raises:
+      LockedError: another process writes to args.out.
     """
     torch.set_num_threads(args.threads)
     data = Dataset(args.data)
     train_names, test_names = _houses(data, ("train",)), _houses(data, ("val_unseen", "test_unseen"))
     train_names = train_names[: config.training_houses or None]
-    missing = [n for n in (*train_names, *test_names) if not _strips_path(args, n).exists()]
+    with locked(args.out):
+        strips = _strips(data, [*train_names, *test_names], args, note)
+        seen, unseen = ([strips[n] for n in names] for names in (train_names, test_names))
+        classes = trained_classes(args.out, config)
+        if classes is None:
+            encoder, heads, classes = train_encoder(seen, config, note=note)
+            save_training(whitened(encoder, seen), heads, classes, config, args.out)
+        encoder = load_encoder(args.out / "encoder.safetensors")
+        untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
+        numbers = {}
+        for name, who, alone in (
+            ("trained", encoder, False),
+            ("trained, each view alone", encoder, True),
+            ("random", untrained, False),
+        ):
+            began = time.perf_counter()
+            halves = [labelled(data, houses, who, classes, alone=alone) for houses in (seen, unseen)]
+            numbers[name] = _numbers(halves, classes, time.perf_counter() - began, config.seed)
+            note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
+        write_json(args.out / "readings.json", numbers, indent=1)
+    return 0
+
+
+def _strips(data: Dataset, names: Sequence[str], args: argparse.Namespace, note: Note) -> dict[str, HouseStrips]:
+    """The strips of houses, drawn where they are missing."""
+    missing = [n for n in names if not _strips_path(args, n).exists()]
     jobs = (joblib.delayed(_draw_strips)(data, n, args) for n in missing)
     for name in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
         note(f"drawn: {name}")
-    strips = {n: HouseStrips.load(_strips_path(args, n)) for n in (*train_names, *test_names)}
-    seen = [strips[n] for n in train_names]
-    classes = trained_classes(args.out, config)
-    if classes is None:
-        encoder, heads, classes = train_encoder(seen, config, note=note)
-        save_training(whitened(encoder, seen), heads, classes, config, args.out)
-    encoder = load_encoder(args.out / "encoder.safetensors")
-    untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
-    numbers = {}
-    for name, who, alone in (
-        ("trained", encoder, False),
-        ("trained, each view alone", encoder, True),
-        ("random", untrained, False),
-    ):
-        began = time.perf_counter()
-        halves = [
-            labelled(data, [strips[n] for n in names], who, classes, alone=alone) for names in (train_names, test_names)
-        ]
-        spent = time.perf_counter() - began
-        reading = read(*halves, seed=config.seed)
-        numbers[name] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
-        numbers[name]["nodes per second"] = sum(len(h.room) for h in halves) / spent
-        numbers[name]["ap by class"] = dict(zip(classes, reading.ap, strict=True))
-        note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
-    write_json(args.out / "readings.json", numbers, indent=1)
-    return 0
+    return {n: HouseStrips.load(_strips_path(args, n)) for n in names}
+
+
+def _numbers(halves: Sequence[Labelled], classes: Sequence[str], seconds: float, seed: int) -> dict[str, Any]:
+    """What linear readers make of an encoder's features, fitted on the first half and judged on the second."""
+    reading = read(halves[0], halves[1], seed=seed)
+    numbers: dict[str, Any] = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
+    numbers["nodes per second"] = sum(len(h.room) for h in halves) / seconds
+    numbers["ap by class"] = dict(zip(classes, reading.ap, strict=True))
+    return numbers
 
 
 def labelled(
@@ -106,9 +119,8 @@ def _strips_path(args: argparse.Namespace, name: str) -> Path:
 
 
 def _draw_strips(data: Dataset, name: str, args: argparse.Namespace) -> str:
-    catalogue = load_catalogue(args.cache)
-    with data.open_world(name, catalogue, args.cache, size=FACES) as world:
-        look(world, all_classes(catalogue)).save(_strips_path(args, name))
+    with _drawn_world(data, name, args.cache, PLAIN) as world:
+        look(world, all_classes(world.catalogue)).save(_strips_path(args, name))
     return name
 
 
@@ -126,35 +138,55 @@ def encoder_of(args: argparse.Namespace) -> Encoder:
     return imagenet_encoder(args.network, args.encoder) if args.network else load_encoder(args.encoder)
 
 
+def pictures_of(data: Dataset, name: str, quality: str | None = None) -> PictureSettings:
+    """How the pictures of a house are drawn that features are made from.
+
+    Args:
+      quality: None takes the panoramas that the data set holds, and plain ones where it holds none.
+    """
+    drawn = data.drawn_pictures(name)
+    if drawn is None or quality not in (None, drawn.quality):
+        return dataclasses.replace(PLAIN, quality=quality or PLAIN.quality)
+    return drawn
+
+
 def run_features(args: argparse.Namespace, note: Note = print) -> int:
     """Features of every house of a data set; houses that have them are skipped."""
     check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
-    missing = [n for n in _houses(data, data.splits) if not _has_features(data, n, encoder)]
-    jobs = (joblib.delayed(_make_features)(data, n, encoder, args) for n in missing)
+    wanted = {n: pictures_of(data, n, args.quality) for n in _houses(data, data.splits)}
+    missing = [n for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
+    jobs = (joblib.delayed(_make_features)(data, n, encoder, wanted[n], args) for n in missing)
     for line in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
         note(line)
     note(f"{len(missing)} houses made, encoder {encoder.digest[:16]}")
     return 0
 
 
-def _has_features(data: Dataset, name: str, encoder: Encoder) -> bool:
+def _has_features(data: Dataset, name: str, encoder: Encoder, pictures: PictureSettings) -> bool:
     """False: missing, damaged, or of another house."""
-    path = feature_path(data.folder / "features", encoder.digest, name)
+    path = feature_path(data.folder / "features", encoder.digest, name, pictures)
     try:
-        load_features(path, encoder=encoder.digest, source=data.place(name).house.digest)
+        load_features(path, encoder=encoder.digest, source=data.place(name).house.digest, pictures=pictures)
         return True
     except (FileNotFoundError, ValueError):
         return False
 
 
-def _make_features(data: Dataset, name: str, encoder: Encoder, args: argparse.Namespace) -> str:
+def _make_features(
+    data: Dataset, name: str, encoder: Encoder, pictures: PictureSettings, args: argparse.Namespace
+) -> str:
     torch.set_num_threads(args.threads)
-    pictures = data.drawn_pictures(name)
-    if pictures is None or args.quality not in (None, pictures.quality):
-        pictures = PictureSettings(size=FACES, quality=args.quality or "unlit")
-    with data.open_world(name, load_catalogue(args.cache), args.cache, pictures) as world:
+    with _drawn_world(data, name, args.cache, pictures) as world:
         panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-        path = feature_path(data.folder / "features", encoder.digest, name)
-        save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest)
+        path = feature_path(data.folder / "features", encoder.digest, name, pictures)
+        save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
         return f"{name}: {len(world.graph.positions)} nodes, {pictures.quality} pictures of {pictures.size} pixels"
+
+
+def _drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings) -> World:
+    """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone."""
+    place, catalogue = data.place(name), load_catalogue(cache)
+    if pictures == data.drawn_pictures(name):
+        return data.open_world(name, catalogue, cache, pictures)
+    return open_world(place.house, catalogue, cache, pictures, graph=place.graph)

@@ -7,7 +7,7 @@ what room the camera stands. Labels come from the simulator's own ids and depths
 
 from __future__ import annotations
 
-import json
+import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,12 +19,15 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.resnet import ARCHITECTURES, ResNet
 from agents.vision.strip import CELL, COLUMNS
+from assets.cache import write_json
 from assets.records import ROOM_KINDS
+from embodied.records import load_json
 from embodied.seeds import stream
 
 SHADE = 0.3
@@ -34,13 +37,21 @@ SHADE = 0.3
 class Heads(nn.Module):
     """Linear readers of the feature map (cells) and of the pooled features (views)."""
 
-    def __init__(self, size: int, classes: int):
+    def __init__(self, size: int, classes: int) -> None:
         super().__init__()
         self.cell_objects = nn.Conv2d(size, classes, 1)
         self.cell_room = nn.Conv2d(size, len(ROOM_KINDS), 1)
         self.cell_depth = nn.Conv2d(size, 1, 1)
         self.view_objects = nn.Linear(size, classes)
         self.view_room = nn.Linear(size, len(ROOM_KINDS))
+
+
+@dataclass(frozen=True)
+class Trained:
+    """classes.json of an encoder's folder."""
+
+    classes: tuple[str, ...]
+    config: VisionConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,14 +200,10 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
 
 def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config: VisionConfig, folder: Path) -> None:
     """encoder.safetensors (half precision), heads.safetensors and classes.json in `folder`."""
-    import safetensors.torch
-
-    from assets.cache import atomic_path, write_json
-
     save_encoder(encoder, folder / "encoder.safetensors")
-    with atomic_path(folder / "heads.safetensors") as temporary:
-        safetensors.torch.save_file({k: v.half().contiguous() for k, v in heads.state_dict().items()}, temporary)
-    write_json(folder / "classes.json", {"classes": list(classes), "config": json.loads(json.dumps(vars(config)))})
+    heads_of = {"format": "embodied-heads-1", "encoder": encoder.digest}
+    save_tensors(folder / "heads.safetensors", {k: v.half() for k, v in heads.state_dict().items()}, heads_of)
+    write_json(folder / "classes.json", {"classes": list(classes), "config": dataclasses.asdict(config)})
 
 
 def trained_classes(folder: Path, config: VisionConfig) -> list[str] | None:
@@ -204,5 +211,5 @@ def trained_classes(folder: Path, config: VisionConfig) -> list[str] | None:
     path = folder / "classes.json"
     if not path.exists():
         return None
-    body = json.loads(path.read_text())
-    return body["classes"] if body["config"] == vars(config) else None
+    trained = load_json(path, Trained)
+    return list(trained.classes) if trained.config == config else None

@@ -10,6 +10,7 @@ import argparse
 import ast
 import errno
 import importlib
+import io
 import os
 import sys
 import warnings
@@ -43,6 +44,8 @@ COMMANDS = (
 
 REMEDIES = {
     errno.ENOSPC: "the disk is full; free some space, or put --cache and --out on another disk. What is whole is kept",
+    errno.EFBIG: "this disk, or the limit set with `ulimit -f`, holds no larger files; put --cache and --out elsewhere",
+    errno.ELOOP: "a symbolic link leads to itself; remove it",
     errno.EDQUOT: "your share of the disk is used up; free some space, or put --cache and --out on another disk",
     errno.EACCES: "it may not be read or written by you; choose another --out or --cache",
     errno.EPERM: "it may not be read or written by you; choose another --out or --cache",
@@ -92,6 +95,9 @@ def parser(chosen: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one subcommand; returns the exit status (2: wrong input or an unable machine, 130: Ctrl-C)."""
     argv = sys.argv[1:] if argv is None else list(argv)
+    for out in (sys.stdout, sys.stderr):
+        if isinstance(out, io.TextIOWrapper):  # "±" on a terminal without it is a "?", not an error at the end
+            out.reconfigure(errors="replace")
     try:
         args = parser(next((a for a in argv if a in COMMANDS), None)).parse_args(argv)
         with warnings.catch_warnings():
@@ -106,6 +112,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ValueError, OSError, UnableError) as e:
         if "--traceback" in argv:
             raise
+        _close_bars()
         print(f"error: {message_of(e)}", file=sys.stderr)
         return 2
     except ImportError:
@@ -124,6 +131,13 @@ def message_of(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+def _close_bars() -> None:
+    """End progress bars, so that what follows has a line of its own."""
+    tqdm = sys.modules.get("tqdm")
+    for bar in list(getattr(getattr(tqdm, "tqdm", None), "_instances", ())):
+        bar.close()
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     """Warnings as one line, without a piece of source."""
     print(f"warning: {message}", file=sys.stderr)

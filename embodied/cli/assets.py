@@ -8,9 +8,16 @@ from __future__ import annotations
 
 import argparse
 import collections
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
+from embodied.cli.options import any_path
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from assets.records import Asset
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +27,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="attribution writes who made which model, under which licence",
     )
     parser.add_argument("--class", dest="object_class", metavar="NAME", help="only this object class")
-    parser.add_argument("--out", type=Path, metavar="PATH", help="folder for sheets, file for the attribution")
+    parser.add_argument("--out", type=any_path, metavar="PATH", help="folder for sheets, file for the attribution")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -38,14 +45,14 @@ def run(args: argparse.Namespace) -> int:
     )
 
 
-def build(args: argparse.Namespace, catalogue, chosen) -> int:
+def build(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Import the meshes into the cache."""
     catalogue.build([a.key for a in chosen])
     show(args, {"models": len(chosen), "cache": str(args.cache)}, f"{len(chosen)} models are ready in {args.cache}")
     return 0
 
 
-def list_assets(args: argparse.Namespace, catalogue, chosen) -> int:
+def list_assets(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Print the catalogue by class."""
     by_class = collections.defaultdict(list)
     for a in chosen:
@@ -56,7 +63,7 @@ def list_assets(args: argparse.Namespace, catalogue, chosen) -> int:
     return 0
 
 
-def sheet(args: argparse.Namespace, catalogue, chosen) -> int:
+def sheet(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Draw the contact sheets."""
     from embodied.render.contact_sheet import draw_sheets
 
@@ -66,7 +73,7 @@ def sheet(args: argparse.Namespace, catalogue, chosen) -> int:
     return 0
 
 
-def attribution(args: argparse.Namespace, catalogue, chosen) -> int:
+def attribution(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Write who made which model, under which licence."""
     from assets.attribution import write_attribution
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.options import any_path, folder_to_write, whole
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -30,13 +31,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
     parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
     parser.add_argument(
-        "--houses", type=int, default=1000, help="houses that memory loads and drops (default: %(default)s)"
+        "--houses", type=whole(), default=1000, help="houses that memory loads and drops (default: %(default)s)"
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures"
+        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures"
     )
     parser.add_argument(
-        "--against", type=Path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
+        "--against", type=any_path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
     )
     add_cache(parser)
     add_packs(parser)

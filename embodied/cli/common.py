@@ -7,12 +7,16 @@ import dataclasses
 import json
 import sys
 from collections.abc import Iterable
-from pathlib import Path
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from tqdm import tqdm
 
 from assets.cache import default_cache
+from embodied.cli.options import any_folder, any_path
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.house.house import House
 
 T = TypeVar("T")
 PATIENCE = 2.0
@@ -23,8 +27,8 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
     """--cache: where meshes, textures, baked light and panoramas are kept."""
     parser.add_argument(
         "--cache",
-        type=Path,
-        default=default_cache(),
+        type=any_folder,
+        default=str(default_cache()),
         metavar="DIR",
         help="where expensive products are kept; safe to delete (default: %(default)s)",
     )
@@ -34,7 +38,7 @@ def add_packs(parser: argparse.ArgumentParser) -> None:
     """--pack, --own: which furniture to use."""
     parser.add_argument(
         "--pack",
-        type=Path,
+        type=any_path,
         action="append",
         default=[],
         metavar="FILE",
@@ -42,7 +46,7 @@ def add_packs(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--own",
-        type=Path,
+        type=any_path,
         action="append",
         default=[],
         metavar="DIR",
@@ -55,7 +59,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
-def catalogue_of(args: argparse.Namespace):
+def catalogue_of(args: argparse.Namespace) -> Catalogue:
     """The catalogue that --cache, --pack and --own describe."""
     from assets.catalogue import load_catalogue
 
@@ -86,7 +90,7 @@ def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> I
     return tqdm(items, name, total=total, unit=unit, delay=PATIENCE, leave=False)
 
 
-def fetch(catalogue, house) -> None:
+def fetch(catalogue: Catalogue, house: House) -> None:
     """Import all models and materials that `house` needs into the cache, with a bar if that takes a while."""
     surfaces = (*house.rooms, *house.openings)
     finishes = {getattr(s, f.name) for s in surfaces for f in dataclasses.fields(s) if f.name.endswith("finish")} - {

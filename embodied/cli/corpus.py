@@ -12,32 +12,35 @@ plain-text files of equal length. Splits share no document (lines of own files c
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from embodied.cli.common import add_cache, note
-from embodied.cli.options import add_options, read_options
+from embodied.cli.options import add_fields, any_path, chosen, folder_to_write, whole
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     from agents.bandit.sizes import Sizes
 
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the corpus")
+    parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the corpus")
     given = parser.add_mutually_exclusive_group()
     given.add_argument(
         "--from",
-        type=Path,
+        type=any_path,
         metavar="DIR",
         dest="folder",
         help="where the packages or what they hold are (default: fetch)",
     )
     given.add_argument(
-        "--moses", type=Path, nargs=2, metavar="FILE", help="German and English text, a sentence a line, instead"
+        "--moses", type=any_path, nargs=2, metavar="FILE", help="German and English text, a sentence a line, instead"
     )
     parser.add_argument(
-        "--block", type=int, default=100, metavar="N", help="lines of --moses files per document (default: %(default)s)"
+        "--block",
+        type=whole(),
+        default=100,
+        metavar="N",
+        help="lines of --moses files per document (default: %(default)s)",
     )
     parser.add_argument("--seed", type=int, default=0, help="the splits follow from this number (default: %(default)s)")
-    add_options(parser, Sizes)
+    add_fields(parser, Sizes)
     add_cache(parser)
 
 
@@ -45,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from agents.bandit import corpus, libreoffice
     from agents.bandit.sizes import Sizes
 
-    sizes = read_options(args, Sizes)
+    sizes = chosen(args, Sizes())
     if args.moses:
         facts = {"source": "own text", "files": [p.name for p in args.moses]}
         pairs = corpus.read_moses(args.moses[0], args.moses[1], args.block)

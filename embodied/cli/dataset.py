@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from pathlib import Path
+from collections.abc import Iterable
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, show
+from embodied.cli.options import face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import QUALITIES, PictureSettings
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=KINDS, help="what is to be done in the houses")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the data set")
+    parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the data set")
     sizes = "; ".join(f"{name}: {described(name)}" for name in SCALES)
     parser.add_argument(
         "--scale",
@@ -27,11 +28,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--houses",
-        type=int,
+        type=whole(),
         metavar="N",
         help="instead of --scale: houses to learn from; a tenth to validate, a fifth to test in",
     )
-    parser.add_argument("--tasks", type=int, metavar="N", help="with --houses: training tasks (default: 100 per house)")
+    parser.add_argument(
+        "--tasks", type=whole(), metavar="N", help="with --houses: training tasks (default: 100 per house)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
     parser.add_argument(
         "--area",
@@ -56,13 +59,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
     parser.add_argument("--panoramas", choices=QUALITIES[1:5], help="also draw every viewpoint, this well")
     parser.add_argument(
-        "--size", type=int, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)"
+        "--size", type=face, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
     parser.add_argument(
-        "--export", type=Path, metavar="DIR", help="also write the files that the published programs read"
+        "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
     )
     parser.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="processes on this machine (default: %(default)s)"
+        "--workers", type=whole(), default=2, metavar="N", help="processes on this machine (default: %(default)s)"
     )
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_cache(parser)
@@ -79,8 +82,6 @@ def run(args: argparse.Namespace) -> int:
     from embodied.generate import HouseConfig
 
     HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
-    if args.workers < 1:
-        raise ValueError(f"--workers should be at least 1, got {args.workers}")
     programs = [name for name, program in PROGRAMS.items() if program.kind == args.kind]
     if args.export and not programs:
         raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
@@ -88,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         args.kind, chosen_scale(args), args.seed, tuple(args.area), args.routes, not args.no_people, args.language
     )
 
-    def watch(jobs, total):
+    def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
         return tqdm(jobs, "houses", total=total, unit="house")
 
     build_dataset(

@@ -10,12 +10,21 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
+from embodied.cli.options import face, folder_to_write, whole
 from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.pictures import DRAWN
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.house.house import House
+    from embodied.interface import Episode, Route
+    from embodied.navigation.graph import NavGraph
+    from embodied.world import World
 
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
@@ -23,13 +32,17 @@ SEED = 3
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=SEED, help="which house (default: %(default)s)")
-    parser.add_argument("--task", type=int, default=0, help="which of the house's tasks (default: %(default)s)")
+    parser.add_argument("--task", type=whole(0), default=0, help="which of the house's tasks (default: %(default)s)")
     parser.add_argument(
-        "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
+        "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
     parser.add_argument("--quality", choices=DRAWN, default="normal", help="unlit is drawn at once (default: normal)")
     parser.add_argument(
-        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder to write (default: %(default)s)"
+        "--out",
+        type=folder_to_write,
+        default=Path("out/demo"),
+        metavar="DIR",
+        help="folder to write (default: %(default)s)",
     )
     add_sinks(parser, "DIR/episode.rrd")
     add_cache(parser)
@@ -87,7 +100,7 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     return 0
 
 
-def inhabited(house, catalogue, args: argparse.Namespace):
+def inhabited(house: House, catalogue: Catalogue, args: argparse.Namespace) -> tuple[House, NavGraph, list[Route]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
     from embodied.generate.people import add_people, meet
@@ -103,7 +116,7 @@ def inhabited(house, catalogue, args: argparse.Namespace):
         return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 
 
-def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) -> dict:
+def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
@@ -118,7 +131,7 @@ def find_something(args: argparse.Namespace, world, viewers: tuple[str, ...]) ->
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 
-def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ...]) -> dict:
+def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent does a HANNA task in a house it has never seen; recorded to help.rrd.
 
     Its features come from plainly drawn panoramas, the kind that its encoder learned from.
@@ -126,9 +139,9 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
     from agents.failures import hanna_policies
     from agents.hanna.agent import load_agent
     from agents.vision.bank import FeatureBank
+    from agents.vision.config import PLAIN
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
-    from agents.vision.run import FACES
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
     from embodied.language import People
@@ -136,7 +149,7 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
     from embodied.world import open_world
 
     agent, encoder = load_agent(), load_encoder()
-    with open_world(world.house, world.catalogue, args.cache, graph=world.graph, size=FACES) as plain:
+    with open_world(world.house, world.catalogue, args.cache, PLAIN, graph=world.graph) as plain:
         nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
         features = encode_panoramas(encoder, (plain.panorama(n) for n in nodes))
     bank = FeatureBank({world.name: features}, encoder.digest)
@@ -147,21 +160,13 @@ def ask_for_help(args: argparse.Namespace, world, routes, viewers: tuple[str, ..
     return recorded(world, episode, args.out / "help.rrd", viewers)
 
 
-def recorded(world, episode, path: Path, viewers: tuple[str, ...]) -> dict:
+def recorded(world: World, episode: Episode, path: Path, viewers: tuple[str, ...]) -> dict:
     """Record an episode into the file `path` and to `viewers`; what is worth telling about it."""
     from embodied.evaluation.metrics import navigation_error, spl, success
-    from viz.blueprint import blueprint_of
-    from viz.recording import record
-    from viz.sinks import Sinks, open_recording
+    from viz.recording import record_episode
+    from viz.sinks import Sinks
 
-    with open_recording(
-        Sinks(path, viewers),
-        blueprint_of(world.house, episode),
-        name=episode.task.request,
-        properties=texts(world.fingerprint),
-    ) as stream:
-        for _ in record(stream, world, episode.task, bar(episode.steps, "recording", "step")):
-            pass
+    record_episode(world, episode, Sinks(path, viewers), watch=lambda steps: bar(steps, "recording", "step"))
     return {
         "agent": episode.agent,
         "request": episode.task.request,
@@ -179,7 +184,8 @@ def told(facts: dict) -> str:
     """One line about a recorded episode."""
     outcome = "found" if facts["success"] else f"missed by {facts['navigation_error_m']} m"
     return (
-        f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, {facts['requests']} request{'s' * (facts['requests'] != 1)} for help"
+        f"“{facts['request']}”  {facts['agent']}: {outcome}, {facts['steps']} steps, "
+        f"{facts['requests']} request{'s' * (facts['requests'] != 1)} for help"
         f"  -> {facts['recording']} ({facts['recording_mib']} MiB)"
     )
 
@@ -191,8 +197,3 @@ def timed(name: str, seconds: dict[str, float]) -> Iterator[None]:
     yield
     seconds[name] = round(time.perf_counter() - start, 1)
     note(f"[{seconds[name]:6.1f} s] {name}")
-
-
-def texts(fingerprint: dict) -> dict[str, str]:
-    """A fingerprint with every value as text, as recordings keep it."""
-    return {k: str(v) for k, v in fingerprint.items()}

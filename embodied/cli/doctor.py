@@ -106,7 +106,10 @@ def packs(args: argparse.Namespace) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
     from assets.importing.packs import find_packs
 
-    remedy = "apt-get install sweethome3d-furniture (version 1.8 or later), or name existing files with --pack and folders with --own"
+    remedy = (
+        "apt-get install sweethome3d-furniture (version 1.8 or later), or name existing files with --pack and "
+        "folders with --own"
+    )
     try:
         found, missing = find_packs(tuple(args.pack)), catalogue_of(args).missing()
     except (ValueError, OSError) as e:

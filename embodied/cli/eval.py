@@ -7,10 +7,15 @@ the episodes, to --out.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, show
+from embodied.cli.options import any_path, folder_to_write, whole
 from embodied.datasets.scale import KINDS
+
+if TYPE_CHECKING:
+    from embodied.interface import Episode
 
 COLUMNS = {
     "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
@@ -22,12 +27,14 @@ COLUMNS = {
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=KINDS, help="kind of task")
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="folder that `embodied dataset` built")
+    parser.add_argument(
+        "--data", type=any_path, required=True, metavar="DIR", help="folder that `embodied dataset` built"
+    )
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
     parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
-    parser.add_argument("--tasks", type=int, metavar="N", help="at most so many tasks, from all houses alike")
+    parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write the table and the episodes")
+    parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where to write the table and the episodes")
     parser.add_argument(
         "--as-programs",
         action="store_true",
@@ -52,13 +59,13 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names = args.agent or agent_names(args.kind)
 
-    def watch(agents):
+    def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")
 
     rows, theirs = [], []
     for split in args.split:
 
-        def keep(name, episodes, split=split):
+        def keep(name: str, episodes: Sequence[Episode], split: str = split) -> None:
             if args.as_programs:
                 theirs.append(as_programs.row(name, split, episodes, data.places(split), seed=args.seed))
             if args.out:

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.options import any_path, folder_to_write, whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,19 +43,26 @@ def add(parser: argparse.ArgumentParser) -> None:
             "--features", action="store_true", help="also write the features of `embodied features`, as TSV"
         )
         sub.add_argument(
-            "--pad", type=int, default=WIDTH, metavar="N",
+            "--pad", type=whole(), default=WIDTH, metavar="N",
             help="fill features with zeros up to this length, which the programs count on (default: %(default)s)",
         )  # fmt: skip
         add_encoder(sub)
     sub = what.add_parser("parquet", help="Parquet tables with a card")
     _add_data(sub)
     sub.add_argument(
-        "--episodes", type=Path, nargs="+", default=[], metavar="FILE", help="episodes (.jsonl) to write as tables, too"
+        "--episodes",
+        type=any_path,
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="episodes (.jsonl) to write as tables, too",
     )
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
-        sub.add_argument("--house", type=Path, required=True, metavar="DIR", help="folder that `embodied house` wrote")
-        sub.add_argument("--out", type=Path, required=True, metavar="PATH", help="file to write (mjcf: folder)")
+        sub.add_argument(
+            "--house", type=any_path, required=True, metavar="DIR", help="folder that `embodied house` wrote"
+        )
+        sub.add_argument("--out", type=any_path, required=True, metavar="PATH", help="file to write (mjcf: folder)")
         sub.add_argument(
             "--light", choices=("none", "draft", "normal"), default="normal",
             help="bake light of this quality into it, or leave its materials as they are (default: %(default)s)",
@@ -71,8 +78,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_data(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="a data set of `embodied dataset`")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
+    parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help="a data set of `embodied dataset`")
+    parser.add_argument(
+        "--out", type=folder_to_write, required=True, metavar="DIR", help="folder to write, made if missing"
+    )
     add_json(parser)
 
 
@@ -106,16 +115,17 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     import numpy as np
 
     from agents.vision.features import feature_path, load_features
-    from agents.vision.run import encoder_of
+    from agents.vision.run import encoder_of, pictures_of
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args)
     for name in names_of(data):
         place = data.place(name)
-        path = feature_path(data.folder / "features", encoder.digest, name)
-        features, _ = load_features(path, encoder=encoder.digest, source=place.house.digest)
+        pictures = pictures_of(data, name, args.quality)
+        file = feature_path(data.folder / "features", encoder.digest, name, pictures)
+        features, _ = load_features(file, encoder=encoder.digest, source=place.house.digest, pictures=pictures)
         if features.shape[2] > args.pad:
-            raise ValueError(f"{path} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it")
+            raise ValueError(f"{file} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it")
         wide = np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - features.shape[2])))
         for key, rows in zip(place.graph.ids, wide, strict=True):
             yield name, key, rows

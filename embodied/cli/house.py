@@ -7,10 +7,9 @@ own viewer), connectivity.json (the navigation graph in Matterport's format) and
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, show
-from embodied.cli.options import add_options, read_options
+from embodied.cli.options import add_fields, chosen, folder_to_write
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
 from embodied.house.house import WEATHERS
@@ -21,11 +20,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, help="which house; the same seed gives the same house (default: %(default)s)"
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write, made if missing")
+    parser.add_argument(
+        "--out", type=folder_to_write, required=True, metavar="DIR", help="folder to write, made if missing"
+    )
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
     group = parser.add_argument_group("what kind of house", "what is not given is drawn from the seed")
-    add_options(group, HouseConfig, words={"shape": SHAPES, "style": STYLES, "weather": WEATHERS})
+    add_fields(group, HouseConfig, words={"shape": SHAPES, "style": STYLES, "weather": WEATHERS})
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -36,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.scene.export import export_glb, export_mjcf
 
-    catalogue, config = catalogue_of(args), read_options(args, HouseConfig)
+    catalogue, config = catalogue_of(args), chosen(args, HouseConfig())
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
         house = generate_house(args.seed, config, catalogue)
         stages.next()

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
+from embodied.cli.options import any_path
+
+if TYPE_CHECKING:
+    from embodied.house.house import House
 
 TIMES = {"dawn": 6.5, "morning": 9.0, "noon": 12.5, "afternoon": 15.5, "dusk": 19.2, "night": 23.0}
 """Words for --time, as local solar hours."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
+    parser.add_argument("folder", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
     parser.add_argument(
         "--time", metavar="TIME", help=f"one of {', '.join(TIMES)}, or an hour such as 17.5; written into house.json"
     )
@@ -53,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def with_sky(house, time: str | None, weather: str | None, lamps: str | None):
+def with_sky(house: House, time: str | None, weather: str | None, lamps: str | None) -> House:
     """`house` at another hour, in other weather, with its lamps on or off; None keeps what is."""
     sky = house.sky
     if time is not None:

@@ -1,4 +1,8 @@
-"""Command-line options made from a configuration dataclass, so that each is defined once."""
+"""Command-line options: the types of arguments, checked before any work begins, and options made from settings.
+
+A type here is what `type=` of argparse wants: it turns a word into a value or says, in one line,
+what it should be.
+"""
 
 from __future__ import annotations
 
@@ -7,52 +11,170 @@ import ast
 import dataclasses
 import inspect
 import itertools
+import math
+import os
 import textwrap
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
-METAVARS = {int: "N", float: "X", str: "WORD"}
+C = typing.TypeVar("C")
+METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD"}
+MOST = 2**31
+"""Largest count that any option takes."""
 
 
-def add_options(
-    parser: argparse.ArgumentParser,
-    kind: type,
-    skip: tuple[str, ...] = (),
+# Types of arguments -----------------------------------------------------------------------------
+
+
+def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[str], int]:
+    """Whole numbers from `least` to `most`, both included."""
+    wanted = f"{'an even' if even else 'a whole'} number of at least {least}" + (
+        f" and at most {most}" if most < MOST else ""
+    )
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if not least <= value <= most or (even and value % 2):
+            raise argparse.ArgumentTypeError(f"should be {wanted}, got {text[:40]!r}")
+        return value
+
+    return read
+
+
+def positive(text: str) -> float:
+    """Finite numbers above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"should be a number above 0, got {text[:40]!r}")
+    return value
+
+
+face = whole(8, 4096)
+"""Side of a cube face, pixels."""
+video_side = whole(16, 4096, even=True)
+"""Height or width of a video, pixels."""
+
+
+def any_path(text: str) -> Path:
+    """A path that libraries can open: not empty, and text in UTF-8.
+
+    MuJoCo, MjSpec and others take paths as UTF-8 text only.
+    """
+    if not text:
+        raise argparse.ArgumentTypeError("should be a path, got an empty word; use . for this folder")
+    try:
+        os.fsencode(text).decode("utf-8")
+        text.encode("utf-8")
+    except (UnicodeDecodeError, UnicodeEncodeError):
+        raise argparse.ArgumentTypeError(
+            f"should be a path in UTF-8, which MuJoCo wants, got {os.fsencode(text)!r}; "
+            "rename it, or set LC_ALL=C.UTF-8 if it is meant as UTF-8"
+        ) from None
+    found = Path(text)
+    try:
+        found.stat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except OSError as e:  # a link that leads to itself, a name too long
+        raise argparse.ArgumentTypeError(f"{text[:80]!r} cannot be used: {e.strerror}; choose another path") from None
+    return found
+
+
+def any_folder(text: str) -> Path:
+    """A folder, there or not."""
+    found = any_path(text)
+    if found.exists() and not found.is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a file, a folder is wanted; move it away or choose another name")
+    return found
+
+
+def folder_to_write(text: str) -> Path:
+    """A folder that is there and may be written, or that can be made."""
+    found = any_folder(text)
+    _refuse_unwritable(found)
+    return found
+
+
+def file_to_write(text: str) -> Path:
+    """A file that can be written, new or over an old one."""
+    found = any_path(text)
+    if found.is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder, a file is wanted; name a file in it")
+    _refuse_unwritable(found.parent)
+    return found
+
+
+def _refuse_unwritable(wanted: Path) -> None:
+    there = next(p for p in (wanted, *wanted.absolute().parents) if p.exists())
+    if not there.is_dir():
+        raise argparse.ArgumentTypeError(f"{there} is a file, {wanted} needs a folder there; choose another name")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise argparse.ArgumentTypeError(f"{there} may not be written by you; choose another place than {wanted}")
+
+
+# Options made from settings ---------------------------------------------------------------------
+
+
+def add_fields(
+    parser: argparse._ActionsContainer,
+    config: type,
+    skip: Sequence[str] = (),
     *,
     words: Mapping[str, Sequence[str]] | None = None,
+    scales: Mapping[str, object] | None = None,
 ) -> None:
-    """One option per field of the frozen dataclass `kind`; the sentence below a field is its help.
+    """One option per field of the frozen dataclass `config`; the sentence below a field is its help.
+
+    An option that is not given leaves the field as it is in the settings that `chosen` starts from.
 
     Args:
       words: what may be given for a field, to be listed in the help.
+      scales: named settings that `chosen` may start from, for the help.
     """
-    helps = field_docs(kind)
-    hints = typing.get_type_hints(kind)
-    for f in dataclasses.fields(kind):
+    hints, helps = typing.get_type_hints(config), field_docs(config)
+    for f in dataclasses.fields(config):
         if f.name in skip:
             continue
-        flag, text = "--" + f.name.replace("_", "-"), helps.get(f.name, "").replace("%", "%%")
-        default = None if f.default is dataclasses.MISSING else f.default
-        text = f"{text} (default: {default})" if default is not None else text
+        option, text = "--" + f.name.replace("_", "-"), helps.get(f.name, "")
+        if default := _default(config, f, scales or {}):
+            text = f"{text} (default: {default})"
+        text = text.replace("%", "%%")
         item, many = _scalar(hints[f.name])
-        name = "{" + ",".join((words or {})[f.name]) + "}" if f.name in (words or {}) else METAVARS.get(item)
+        listed = (words or {}).get(f.name)
+        name = "{" + ",".join(listed) + "}" if listed else METAVARS.get(item)
         if item is bool:
-            parser.add_argument(flag, action=argparse.BooleanOptionalAction, default=default, help=text)
+            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
         elif many:
-            parser.add_argument(flag, type=item, nargs=many, default=default, help=text, metavar=name)
+            parser.add_argument(option, type=item, nargs=many, default=None, help=text, metavar=name)
         else:
-            parser.add_argument(flag, type=item, default=default, help=text, metavar=name)
+            parser.add_argument(option, type=item, default=None, help=text, metavar=name)
 
 
-def read_options(args: argparse.Namespace, kind: type, skip: tuple[str, ...] = ()):
-    """The `kind` that the parsed options describe."""
-    values = {}
-    for f in dataclasses.fields(kind):
-        if f.name not in skip:
-            value = getattr(args, f.name)
-            values[f.name] = tuple(value) if isinstance(value, list) else value
-    return kind(**values)
+def chosen(args: argparse.Namespace, config: C) -> C:
+    """The settings `config` with the fields that were given on the command line; they check themselves.
+
+    Raises:
+      ValueError: a value that the settings refuse.
+    """
+    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}  # type: ignore[arg-type]
+    values = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items() if v is not None}
+    return dataclasses.replace(config, **values)  # type: ignore[type-var]
+
+
+def _default(config: type, field: dataclasses.Field, scales: Mapping[str, object]) -> str:
+    """The field's default in words, for every scale where they differ; '' for none."""
+    of_scale = {name: getattr(c, field.name) for name, c in sorted(scales.items()) if isinstance(c, config)}
+    if len(set(of_scale.values())) > 1:
+        return ", ".join(f"{name}: {value}" for name, value in of_scale.items())
+    return "" if field.default in (None, dataclasses.MISSING) else str(field.default)
 
 
 def _scalar(hint: typing.Any) -> tuple[type, str | int | None]:
@@ -67,9 +189,15 @@ def _scalar(hint: typing.Any) -> tuple[type, str | int | None]:
 
 def field_docs(kind: type) -> dict[str, str]:
     """Field name to the docstring that stands below it in the source, on one line."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    assert isinstance(body, ast.ClassDef)
     docs = {}
-    for field, doc in itertools.pairwise(body):
-        if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
+    for field, doc in itertools.pairwise(body.body):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(doc, ast.Expr)
+            and isinstance(doc.value, ast.Constant)
+        ):
             docs[field.target.id] = " ".join(str(doc.value.value).split())
     return docs

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import contextlib
 from collections.abc import Iterator
-from pathlib import Path
 
 from embodied.cli.common import note
+from embodied.cli.options import file_to_write
 
 
 def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -19,7 +19,7 @@ def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> No
     group = parser.add_argument_group("recording")
     group.add_argument(
         "--rrd",
-        type=Path,
+        type=file_to_write,
         metavar="FILE",
         help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
     )
@@ -37,6 +37,12 @@ def add_viewers(group: argparse._ActionsContainer) -> None:
     group.add_argument(
         "--serve", action="store_true", help="serve the web viewer, watch in the browser, end with Ctrl-C"
     )
+    group.add_argument(
+        "--bind",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="where --serve listens (default: %(default)s, this machine only; 0.0.0.0 lets everybody look and write)",
+    )
 
 
 @contextlib.contextmanager
@@ -48,9 +54,10 @@ def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
     from embodied import gl
     from viz.sinks import open_viewers
 
-    with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve) as viewers:
+    with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve, bind=args.bind) as viewers:
         if args.spawn and gl.info().software:
             note(
-                "this machine draws by software: the native viewer is slow, and fills memory with some drivers; better --serve"
+                "this machine draws by software: the native viewer is slow, and fills memory with some drivers; "
+                "better --serve"
             )
         yield viewers

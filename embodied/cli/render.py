@@ -7,15 +7,19 @@ With --node, one panorama is drawn, as an equirectangular picture.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
+from embodied.cli.options import any_path, face, file_to_write, whole
 from embodied.render.pictures import BACKENDS, QUALITIES
+
+if TYPE_CHECKING:
+    from embodied.world import World
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
-    parser.add_argument("--size", type=int, default=512, help="side of a cube face in pixels (default: %(default)s)")
+    parser.add_argument("folder", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    parser.add_argument("--size", type=face, default=512, help="side of a cube face in pixels (default: %(default)s)")
     parser.add_argument(
         "--quality",
         choices=QUALITIES[1:],
@@ -26,8 +30,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan"
     )
-    parser.add_argument("--node", type=int, help="draw only this viewpoint")
-    parser.add_argument("--equirect", type=Path, metavar="PNG", help="where to write the picture of --node")
+    parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
+    parser.add_argument("--equirect", type=file_to_write, metavar="PNG", help="where to write the picture of --node")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -56,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def one(args: argparse.Namespace, world) -> int:
+def one(args: argparse.Namespace, world: World) -> int:
     """Draw one viewpoint as an equirectangular PNG."""
     import cv2
 

@@ -8,29 +8,36 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.demo import texts
+from embodied.cli.options import any_path, face, file_to_write, video_side, whole
 from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.pictures import DRAWN
+
+if TYPE_CHECKING:
+    from embodied.interface import Agent, Episode
+    from embodied.world import World
 
 AGENTS = ("shortest", "random", "forward10")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--house", type=Path, metavar="DIR", help="folder that `embodied house` wrote")
+    where.add_argument("--house", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
-    parser.add_argument("--episodes", type=int, default=1, metavar="N", help="how many tasks (default: %(default)s)")
+    parser.add_argument(
+        "--episodes", type=whole(), default=1, metavar="N", help="how many tasks (default: %(default)s)"
+    )
     parser.add_argument("--quality", choices=DRAWN, default="normal", help="how the house is drawn (default: normal)")
     parser.add_argument(
-        "--size", type=int, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
+        "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument("--video", type=Path, metavar="MP4", help="write what the agent sees as a video")
+    parser.add_argument("--video", type=file_to_write, metavar="MP4", help="write what the agent sees as a video")
     parser.add_argument(
         "--video-size",
-        type=int,
+        type=video_side,
         nargs=2,
         default=(480, 640),
         metavar=("H", "W"),
@@ -54,9 +61,9 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     from embodied.evaluation.rollout import play
     from embodied.language import People
     from embodied.tasks.find import find_pool, find_task
+    from viz.recording import record_episode
+    from viz.sinks import Sinks
 
-    if args.episodes < 1:
-        raise ValueError(f"--episodes should be at least 1, got {args.episodes}")
     with world_of(args) as world:
         fetch(world.catalogue, world.house)
         pool = find_pool(world, seed=args.seed)
@@ -82,7 +89,9 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
                 )
             if args.rrd or viewers:
                 rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
-                row["recording"] = record_episode(world, episode, rrd, viewers)
+                watch = lambda steps: bar(steps, "recording", "step")
+                record_episode(world, episode, Sinks(rrd, viewers), watch=watch)
+                row["recording"] = str(rrd or ", ".join(viewers))
             rows.append(row)
         facts = {
             "agent": args.agent,
@@ -96,7 +105,7 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     return 0
 
 
-def world_of(args: argparse.Namespace):
+def world_of(args: argparse.Namespace) -> World:
     """The world of --house, or of the generated house of --seed."""
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world
@@ -108,7 +117,7 @@ def world_of(args: argparse.Namespace):
     return open_world(house, catalogue, args.cache, size=args.size, quality=args.quality)
 
 
-def policy_of(name: str):
+def policy_of(name: str) -> Agent:
     """The policy behind an --agent word."""
     from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 
@@ -123,7 +132,7 @@ def numbered(path: Path, number: int, total: int) -> Path:
     return path.with_name(name.replace("%d", str(number)))
 
 
-def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
+def film(world: World, episode: Episode, path: Path, size: tuple[int, int]) -> Path:
     """Write what the agent saw as a video with smooth motion; returns the path."""
     from viz.video import camera_track, captioned, write_video
 
@@ -136,20 +145,3 @@ def film(world, episode, path: Path, size: tuple[int, int]) -> Path:
     write_video(path, drawn, size)
     note(f"{path}: {len(track)} frames")
     return path
-
-
-def record_episode(world, episode, rrd: Path | None, viewers: tuple[str, ...]) -> str:
-    """Record one episode to a file and to viewers; returns the file's name or the viewers'."""
-    from viz.blueprint import blueprint_of
-    from viz.recording import record
-    from viz.sinks import Sinks, open_recording
-
-    with open_recording(
-        Sinks(rrd, viewers),
-        blueprint_of(world.house, episode),
-        name=episode.task.request,
-        properties=texts(world.fingerprint),
-    ) as r:
-        for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):
-            pass
-    return str(rrd or ", ".join(viewers))

@@ -32,14 +32,14 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     for path in {"hanna": run_hanna, "hari": run_hari, "bandit": run_bandit, "stars": run_stars}[args.what](args):
-        print(path.read_text())
+        print(path.read_text(encoding="utf-8"))
     return 0
 
 
 def run_hanna(args: argparse.Namespace) -> list[Path]:
     from agents.hanna.training_config import SCALES
     from agents.study import Setting, run_study
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     setting = Setting(
         args.data,
@@ -57,7 +57,7 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
 def run_hari(args: argparse.Namespace) -> list[Path]:
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.study import Setting, run_study
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     setting = Setting(
         args.data,
@@ -75,7 +75,7 @@ def run_hari(args: argparse.Namespace) -> list[Path]:
 def run_bandit(args: argparse.Namespace) -> list[Path]:
     from agents.bandit.config import SCALES
     from agents.bandit.study import Setting, report, run_study
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     if args.seeds < 1 or args.workers < 1:
         raise ValueError(f"--seeds and --workers should be at least 1, got {args.seeds} and {args.workers}")
@@ -89,7 +89,7 @@ def run_stars(args: argparse.Namespace) -> list[Path]:
     from agents.bandit.navigation_study import NavigationSetting, run_navigation_study
     from agents.bandit.rating_config import RatingConfig
     from agents.vision.run import encoder_of
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     if args.seeds < 1:
         raise ValueError(f"--seeds should be at least 1, got {args.seeds}")

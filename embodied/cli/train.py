@@ -9,9 +9,13 @@ and on several cores the same without --device.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import note
+
+if TYPE_CHECKING:
+    from embodied.interface import Episode
 
 WATCHED = 2
 """Validation episodes that --rrd records each time."""
@@ -44,16 +48,16 @@ def run_vision(args: argparse.Namespace) -> int:
     """Draw the houses of a data set, teach an encoder to name and place what is in them, and read how well it sees."""
     from agents.vision.config import VisionConfig
     from agents.vision.run import run_train_vision
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     return run_train_vision(args, chosen(args, VisionConfig()), note)
 
 
 def run_hanna(args: argparse.Namespace) -> int:
-    """Teach an agent by imitation to navigate, to ask for help and to follow it, on data that `embodied features` prepared."""
+    """Teach an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`."""
     from agents.hanna.run import run_train_hanna
     from agents.hanna.training_config import SCALES
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     return run_train_hanna(
         args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None
@@ -65,7 +69,7 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention
     from agents.imitation.parallel import use_threads
-    from embodied.cli.learning import chosen
+    from embodied.cli.options import chosen
 
     use_threads(args.threads)
     data = hari_data(args.data)
@@ -78,24 +82,18 @@ def run_hari(args: argparse.Namespace) -> int:
     return 0
 
 
-def _recorder(args: argparse.Namespace):
+def _recorder(args: argparse.Namespace) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings."""
     from assets.catalogue import load_catalogue
-    from embodied.cli.demo import texts
     from embodied.datasets.store import Dataset
-    from viz.blueprint import episode_blueprint
-    from viz.recording import record
-    from viz.sinks import Sinks, open_recording
+    from viz.recording import record_episode
+    from viz.sinks import Sinks
 
     data, catalogue = Dataset(args.data), load_catalogue(args.cache)
 
-    def keep(update: int, episodes) -> None:
+    def keep(update: int, episodes: Sequence[Episode]) -> None:
         for number, episode in enumerate(episodes[:WATCHED]):
             with data.open_world(episode.task.world, catalogue, args.cache) as world:
-                sinks = Sinks(Path(args.out) / f"validation_{update:06d}_{number}.rrd")
-                blueprint, about = episode_blueprint(world.house), texts(world.fingerprint)
-                with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as recording:
-                    for _ in record(recording, world, episode.task, episode.steps):
-                        pass
+                record_episode(world, episode, Sinks(args.out / f"validation_{update:06d}_{number}.rrd"))
 
     return keep

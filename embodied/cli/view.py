@@ -9,17 +9,22 @@ listed, --page writes one HTML page about them, and --episode N makes the record
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
+from embodied.cli.options import any_path, whole
 from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.pictures import DRAWN
 
+if TYPE_CHECKING:
+    from viz.report import Listed
+
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="RUN", help="a .rrd file, or a folder with episodes*.jsonl")
-    parser.add_argument("--episode", type=int, metavar="N", help="record episode N of the list and open it")
-    parser.add_argument("--data", type=Path, metavar="DIR", help="data set of the run, for --episode")
+    parser.add_argument("folder", type=any_path, metavar="RUN", help="a .rrd file, or a folder with episodes*.jsonl")
+    parser.add_argument("--episode", type=whole(0), metavar="N", help="record episode N of the list and open it")
+    parser.add_argument("--data", type=any_path, metavar="DIR", help="data set of the run, for --episode")
     parser.add_argument(
         "--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings"
     )
@@ -62,19 +67,17 @@ def show_file(args: argparse.Namespace) -> int:
     from viz.sinks import open_file, send_file
 
     if args.connect is None:
-        return open_file(args.folder, serve=args.serve)
+        return open_file(args.folder, serve=args.serve, bind=args.bind)
     with viewers_of(args) as viewers:
         send_file(args.folder, viewers)
     return 0
 
 
-def record_one(args: argparse.Namespace, found) -> int:
+def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
     """Draw one episode of a run again, into a recording."""
-    from embodied.cli.demo import texts
     from embodied.datasets.store import Dataset
-    from viz.blueprint import blueprint_of
-    from viz.recording import record
-    from viz.sinks import Sinks, open_recording
+    from viz.recording import record_episode
+    from viz.sinks import Sinks
 
     if not 0 <= args.episode < len(found):
         raise ValueError(f"--episode {args.episode} does not exist; this run has the episodes 0 to {len(found) - 1}")
@@ -83,16 +86,13 @@ def record_one(args: argparse.Namespace, found) -> int:
             "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
         )
     episode = found[args.episode].episode
-    path = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
+    file = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
     with viewers_of(args) as viewers:
-        catalogue = catalogue_of(args)
-        with Dataset(args.data).open_world(
-            episode.task.world, catalogue, args.cache, quality=args.quality, size=384
-        ) as world:
-            sinks, blueprint, about = Sinks(path, viewers), blueprint_of(world.house, episode), texts(world.fingerprint)
-            with open_recording(sinks, blueprint, name=episode.task.request, properties=about) as r:
-                for _ in record(r, world, episode.task, bar(episode.steps, "recording", "step")):
-                    pass
+        catalogue, data = catalogue_of(args), Dataset(args.data)
+        if f"{episode.task.world}/house.json" not in data.index.files:
+            raise ValueError(f"{args.data} has no house {episode.task.world!r}; name the data set of the run")
+        with data.open_world(episode.task.world, catalogue, args.cache, quality=args.quality, size=384) as world:
+            record_episode(world, episode, Sinks(file, viewers), watch=lambda steps: bar(steps, "recording", "step"))
         note(f"recorded {episode.task.id}")
-        show(args, {"recording": str(path)}, f"wrote {path}; open it with: embodied view {path}")
+        show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
     return 0

@@ -91,7 +91,6 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
             raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
         self._env, self._tasks, self._eyes, self._layout = make_env(), tuple(tasks), eyes, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
-        self._names: dict[str, int] = {}
         self.render_mode = render_mode
         self.action_space = action_space(layout)
         self.observation_space = observation_space(layout, eyes)
@@ -140,7 +139,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         return picture(self._env, self._o)
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
-        return encode(o, self._eyes, self._layout, self._names)
+        return encode(o, self._eyes, self._layout)
 
     def _potential(self) -> float:
         e = self._env

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import bisect
+import functools
 from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from assets.catalogue import load_catalogue
+from assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
 from embodied.gym.eyes import Eyes
 from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
 
 INTENTIONS = tuple(Intention)
 KINDS = ("object", "room", "action")
+ACTION_WORDS = ("go", "stop")
+"""Names of HARI's features of kind 'action'."""
+OWN_WORDS = 4096
+"""Numbers for object classes of people's own."""
 LARGE = 1e6
 """Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
 
@@ -62,12 +70,12 @@ def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
     return spaces.Dict(whole)
 
 
-def encode(o: Observation, eyes: Eyes, layout: Layout, names: dict[str, int]) -> dict[str, object]:
+def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, object]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
     one (0 is padding); 'clock' is time, time on task and requests left (1e6 when
-    there is no budget). `names` numbers the words of descriptions and grows as they appear.
+    there is no budget). Words of descriptions are numbered by `word_number`.
 
     Raises:
       ValueError: more candidates than the layout has room for.
@@ -93,10 +101,10 @@ def encode(o: Observation, eyes: Eyes, layout: Layout, names: dict[str, int]) ->
         "clock": np.array([o.time, o.time_on_task, left], dtype=np.float32),
     }
     if layout.descriptions:
-        whole["state"] = _description(o.state_description, layout, names)
+        whole["state"] = _description(o.state_description, layout)
         goals = np.zeros((layout.stack, layout.features, 5), dtype=np.float32)
         for i, d in enumerate(o.goal_descriptions):
-            goals[i] = _description(d, layout, names)
+            goals[i] = _description(d, layout)
         whole["goals"] = goals
     return whole
 
@@ -188,17 +196,37 @@ def _stable(word: str) -> int:
     return total
 
 
+@functools.cache
+def words() -> tuple[str, ...]:
+    """The words of HARI's descriptions, sorted: actions, room kinds and the catalogue's object classes."""
+    return tuple(sorted({*ACTION_WORDS, *ROOM_KINDS, *load_catalogue().classes}))
+
+
+@functools.cache
+def word_number(word: str) -> int:
+    """The number of a word, from 1, the same in every process.
+
+    Object classes of people's own models are not in the catalogue; they get a number above all
+    others, which two of them may share.
+    """
+    known = words()
+    place = bisect.bisect_left(known, word)
+    if place < len(known) and known[place] == word:
+        return place + 1
+    return len(known) + 1 + _stable(word) % OWN_WORDS
+
+
 def _description_space(layout: Layout) -> spaces.Box:
     """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
     return spaces.Box(0, LARGE, (layout.features, 5), np.float32)
 
 
-def _description(description: Description, layout: Layout, names: dict[str, int]) -> np.ndarray:
+def _description(description: Description, layout: Layout) -> np.ndarray:
     rows = np.zeros((layout.features, 5), dtype=np.float32)
     for i, f in enumerate(description[: layout.features]):
-        rows[i] = _feature(f, names)
+        rows[i] = _feature(f)
     return rows
 
 
-def _feature(f: Feature, names: dict[str, int]) -> tuple[int, ...]:
-    return (KINDS.index(f.kind) + 1, names.setdefault(f.name, len(names) + 1), f.horizontal, f.vertical + 1, f.distance)
+def _feature(f: Feature) -> tuple[int, ...]:
+    return (KINDS.index(f.kind) + 1, word_number(f.name), f.horizontal, f.vertical + 1, f.distance)

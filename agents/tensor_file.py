@@ -1,0 +1,76 @@
+"""Tensors with what they are, in one .safetensors file that notices when a byte of it was changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import safetensors
+import safetensors.torch
+from torch import Tensor, nn
+
+from agents.vision.resnet import read_weights
+from assets.cache import write_bytes
+
+CHECKSUM = "checksum"
+"""Name of the entry that holds `checksum_of` all else."""
+
+
+def save_tensors(path: Path, tensors: Mapping[str, Tensor], about: Mapping[str, str]) -> None:
+    """Write `tensors` and what they are, atomically.
+
+    Raises:
+      OSError: the disk is full, ...; names `path`.
+    """
+    whole = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+    metadata = {**about, CHECKSUM: checksum_of(whole, about)}
+    write_bytes(Path(path), safetensors.torch.save(whole, metadata=metadata))
+
+
+def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """What `save_tensors` wrote.
+
+    Args:
+      formats: which about["format"] can be read, the newest first; only an older one may lack a checksum.
+      remedy: how such a file is made, for messages.
+
+    Raises:
+      FileNotFoundError, OSError.
+      ValueError: truncated, of another format, or changed since it was written.
+    """
+    path = Path(path)
+    tensors = read_weights(path)
+    with safetensors.safe_open(path, "pt") as f:
+        about = dict(f.metadata() or {})
+    if about.get("format") not in formats:
+        raise ValueError(f"{path}: format {about.get('format')!r}, this version reads {formats[0]!r}; {remedy}")
+    found = about.pop(CHECKSUM, None)
+    if found is None and about["format"] == formats[0]:
+        raise ValueError(f"{path}: it has no checksum, which {formats[0]!r} has; {remedy}")
+    if found is not None and found != checksum_of(tensors, about):
+        raise ValueError(f"{path}: its contents do not fit its checksum, somebody or something changed it; {remedy}")
+    return tensors, about
+
+
+def checksum_of(tensors: Mapping[str, Tensor], about: Mapping[str, str]) -> str:
+    """Hex SHA-256 over names, types, shapes and bytes of tensors and over `about`."""
+    h = hashlib.sha256(json.dumps(dict(about), sort_keys=True).encode())
+    for name, tensor in sorted(tensors.items()):
+        h.update(json.dumps([name, str(tensor.dtype), list(tensor.shape)]).encode())
+        h.update(tensor.cpu().contiguous().numpy().tobytes())
+    return h.hexdigest()
+
+
+def put(network: nn.Module, tensors: Mapping[str, Tensor], path: Path) -> None:
+    """Give `network` the weights `tensors`, which were read from `path`.
+
+    Raises:
+      ValueError: they are another network's.
+    """
+    try:
+        network.load_state_dict(tensors)
+    except RuntimeError as e:
+        what = " ".join(str(e).split())
+        raise ValueError(f"{path}: these are not the weights of its settings ({what:.200}); make it again") from e

@@ -1,0 +1,286 @@
+"""Every kind of file we read, damaged in seeded ways: none ends in a traceback, none is believed against itself.
+
+A mutation either is refused by an error that the command line shows as one line (ValueError,
+OSError, UnableError), or what is read is the same as before, or it is a whole and different file
+of its kind. What carries a checksum may never be the last.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from conftest import two_rooms
+from hand_data import build
+
+from agents.hanna.agent import load_agent, new_agent, save_agent
+from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
+from agents.hanna.training_config import SCALES
+from agents.hanna.vocabulary import build_vocabulary
+from agents.imitation.loop import Progress
+from agents.vision.encoder import random_encoder
+from agents.vision.features import load_features, save_features
+from agents.vision.labels import HouseStrips
+from assets.catalogue import load_catalogue
+from embodied.datasets.store import Dataset
+from embodied.errors import UnableError
+from embodied.evaluation.rollout import play
+from embodied.house.house import House
+from embodied.interface import Episode
+from embodied.navigation.graph import from_matterport
+from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
+from embodied.records import load_lines, save_lines, to_json
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import PanoramaFile, write_panoramas
+from embodied.seeds import stream
+
+MUTATIONS = 20
+"""Of each of the KINDS; together a little over 300."""
+CLEAR = (ValueError, OSError, UnableError)
+"""What the command line shows as one line."""
+VALUES = (None, True, False, 0, -1, 10**30, 1e300, -0.5, "", "nope", "../../etc", [], {}, [[]], "9" * 5000)
+"""What takes the place of a value of JSON."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file."""
+
+    path: Path
+    read: Callable[[Path], object]
+    """Its content, to compare; raises one of CLEAR."""
+    guarded: bool
+    """Whether a checksum or digest covers it: what differs must be refused."""
+
+
+# What is damaged ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory) -> dict[str, Kind]:
+    folder = tmp_path_factory.mktemp("fuzz")
+    data = build(folder / "data", folder / "cache")
+    home = data.folder / "houses" / "test_0000"
+    (folder / "own").mkdir()
+    (folder / "house.json").write_text(two_rooms().to_json())
+    (folder / "own" / "catalogue.json").write_text(json.dumps(OWN))
+    shutil.copy(home / "connectivity.json", folder / "graph.json")
+    for name in ("routes.jsonl", "tasks_test_unseen.jsonl"):
+        shutil.copy(home / name, folder / name)
+    _write_episodes(data, folder / "episodes.jsonl")
+    _write_learned(folder)
+    _write_pictures(folder)
+    whole = lambda _: _of(Dataset(data.folder))
+    return {
+        "house.json": Kind(folder / "house.json", lambda p: House.load(p).to_json(), False),
+        "own catalogue.json": Kind(folder / "own" / "catalogue.json", lambda p: _own(folder, p), False),
+        "connectivity": Kind(folder / "graph.json", lambda p: from_matterport(p).positions.tolist(), False),
+        "config.json": Kind(data.folder / "config.json", whole, False),
+        "dataset.json": Kind(data.folder / "dataset.json", whole, False),
+        "houses/house.json": Kind(home / "house.json", whole, True),
+        "houses/connectivity.json": Kind(home / "connectivity.json", whole, True),
+        "houses/routes.jsonl": Kind(home / "routes.jsonl", whole, True),
+        "houses/tasks.jsonl": Kind(home / "tasks_test_unseen.jsonl", whole, True),
+        "episodes": Kind(folder / "episodes.jsonl", lambda p: [to_json(e) for e in load_lines(p, Episode)], False),
+        "agent": Kind(folder / "agent.safetensors", lambda p: _weights(load_agent(p).network), True),
+        "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
+        "checkpoint": Kind(folder / "checkpoint.pt", _resumed, True),
+        "panoramas": Kind(folder / "a.pano", _pictures, True),
+        "strips": Kind(folder / "strips.npz", lambda p: HouseStrips.load(p).rgb.tolist(), True),
+    }
+
+
+OWN = {
+    "pack": "mine",
+    "licence": "CC0-1.0",
+    "creator": "me",
+    "models": {"mug": {"file": "mug.obj", "class": "mug", "size": [0.1, 0.1, 0.1]}},
+}
+CUBE = (
+    "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1)) + "f 1 2 4\nf 1 4 3\nf 5 7 8\nf 5 8 6\n"
+)
+TINY = dataclasses.replace(
+    SCALES["mini"], hidden_size=8, navigation_embedding=8, ask_embedding=4, self_heads=2, text_heads=2
+)
+
+
+def _own(folder: Path, path: Path) -> object:
+    (path.parent / "mug.obj").write_text(CUBE)
+    return sorted(load_catalogue(folder / "cache", own=(path.parent,)).assets)
+
+
+def _of(data: Dataset) -> object:
+    split = "test_unseen"
+    return data.digest, [to_json(t) for t in data.tasks(split)], [to_json(r) for r in data.routes("test_0000")]
+
+
+def _write_episodes(data: Dataset, path: Path) -> None:
+    tasks = data.tasks("test_unseen")[:3]
+    save_lines(path, play(data.environment("test_unseen"), PrivilegedAsking(Shortest(), ask_every_5), tasks, seed=0))
+
+
+def _agent():
+    return new_agent(TINY, build_vocabulary(["go to the red door"]), "e" * 64, 4)
+
+
+def _write_learned(folder: Path) -> None:
+    agent = _agent()
+    save_agent(agent, folder / "agent.safetensors")
+    save_checkpoint(folder / "checkpoint.pt", agent, torch.optim.Adam(agent.network.parameters()), Progress(3))
+    save_features(folder / "features.safetensors", np.ones((2, 36, 4)), random_encoder(seed=0), "house")
+
+
+def _weights(network: torch.nn.Module) -> list[float]:
+    return [float(p.double().sum()) for p in network.state_dict().values()]
+
+
+def _resumed(path: Path) -> object:
+    agent = _agent()
+    progress = load_checkpoint(path, agent, torch.optim.Adam(agent.network.parameters()))
+    return progress, _weights(agent.network)
+
+
+def _write_pictures(folder: Path) -> None:
+    faces = Panorama(np.full((6, 8, 8, 3), 90, np.uint8), np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
+    write_panoramas(folder / "a.pano", [faces, faces], {"house": "x"})
+    shapes = (1, 192, 576, 3), (1, 12, 36, 2), (1, 12, 36), (1, 12, 36), (1,)
+    types = np.uint8, np.uint8, np.int8, np.float16, np.int8
+    HouseStrips("a", ("door", "wall"), *(np.zeros(s, t) for s, t in zip(shapes, types))).save(folder / "strips.npz")
+
+
+def _pictures(path: Path) -> object:
+    with PanoramaFile(path) as file:
+        read = [file.read(node) for node in range(len(file))]
+    return [(p.rgb.tolist(), p.depth.tolist(), p.ids.tolist()) for p in read]
+
+
+# How it is damaged ------------------------------------------------------------------------------
+
+
+def mutated(body: bytes, text: bool, rng: np.random.Generator) -> bytes:
+    """`body`, damaged in one of several ways."""
+    ways = (flipped, cut, filled, repeated, *([edited] * 6 if text else []))
+    return ways[int(rng.integers(len(ways)))](body, rng)
+
+
+def flipped(body: bytes, rng: np.random.Generator) -> bytes:
+    out = bytearray(body)
+    out[int(rng.integers(len(out)))] ^= 1 << int(rng.integers(8))
+    return bytes(out)
+
+
+def cut(body: bytes, rng: np.random.Generator) -> bytes:
+    return body[: int(rng.integers(len(body)))]
+
+
+def filled(body: bytes, rng: np.random.Generator) -> bytes:
+    at, n = int(rng.integers(len(body))), int(rng.integers(1, 64))
+    return body[:at] + bytes([int(rng.integers(256))]) * n + body[at + n :]
+
+
+def repeated(body: bytes, rng: np.random.Generator) -> bytes:
+    """A piece twice; of text, a line."""
+    a, b = sorted(int(x) for x in rng.integers(len(body), size=2))
+    return body[:b] + body[a:]
+
+
+def edited(body: bytes, rng: np.random.Generator) -> bytes:
+    """One value of a JSON file, or of one line of a JSON Lines file, replaced, taken away or given another name."""
+    lines = body.decode().splitlines()
+    whole = len(lines) == 1 or not lines[0].endswith("}")
+    number = 0 if whole else int(rng.integers(len(lines)))
+    tree = json.loads(body if whole else lines[number])
+    _edit(tree, rng)
+    text = json.dumps(tree)
+    return (text if whole else "\n".join([*lines[:number], text, *lines[number + 1 :]])).encode()
+
+
+def _edit(tree: object, rng: np.random.Generator) -> None:
+    """Replace something somewhere in `tree`."""
+    inner = list(tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ())
+    if not inner:
+        return
+    key, value = inner[int(rng.integers(len(inner)))]
+    if isinstance(value, (dict, list)) and value and rng.random() < 0.8:
+        _edit(value, rng)
+    elif isinstance(tree, dict) and rng.random() < 0.2:
+        del tree[key]
+    else:
+        tree[key] = VALUES[int(rng.integers(len(VALUES)))]
+
+
+KINDS = (
+    "house.json",
+    "own catalogue.json",
+    "connectivity",
+    "config.json",
+    "dataset.json",
+    "houses/house.json",
+    "houses/connectivity.json",
+    "houses/routes.jsonl",
+    "houses/tasks.jsonl",
+    "episodes",
+    "agent",
+    "features",
+    "checkpoint",
+    "panoramas",
+    "strips",
+)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_damaged_file_is_refused_in_a_line_or_harmless(name, kinds):
+    kind = kinds[name]
+    before, good = kind.path.read_bytes(), kind.read(kind.path)
+    assert kind.read(kind.path) == good, "reading tells the same twice"
+    refused = 0
+    try:
+        for k in range(MUTATIONS):
+            damage = mutated(before, kind.path.suffix in (".json", ".jsonl"), stream(0, "fuzz", name, k))
+            kind.path.write_bytes(damage)
+            try:
+                found = kind.read(kind.path)
+            except CLEAR as e:
+                refused += 1
+                assert str(e).strip(), (name, k)
+            else:
+                assert found == good or not kind.guarded or damage == before, (name, k, "believed although changed")
+    finally:
+        kind.path.write_bytes(before)
+    assert refused >= MUTATIONS // 4, "most damage is noticed"
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"[" * 100_000, b"\x00" * 64, b'{"version": 1}', b"null"],
+    ids=["empty", "deep", "zeros", "one field", "null"],
+)
+def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
+    kind = kinds[name]
+    before = kind.path.read_bytes()
+    try:
+        kind.path.write_bytes(body)
+        if name == "episodes" and not body:
+            assert kind.read(kind.path) == []
+            return
+        with pytest.raises(CLEAR, match=r"\w"):
+            kind.read(kind.path)
+    finally:
+        kind.path.write_bytes(before)
+
+
+def test_the_mutations_are_what_they_say():
+    body = b'{"a": 1, "b": [1, 2, {"c": null}]}'
+    changed = [mutated(body, True, stream(1, k)) for k in range(60)]
+    assert changed == [mutated(body, True, stream(1, k)) for k in range(60)], "the same in every run"
+    assert len(set(changed)) > 30
+    assert io.BytesIO(flipped(body, stream(2, "f"))).getbuffer().nbytes == len(body)

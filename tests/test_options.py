@@ -1,0 +1,98 @@
+"""Arguments are checked before any work begins, and what one word cannot be is said in one line."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+
+import pytest
+
+from embodied import cli
+from embodied.cli.options import any_folder, any_path, file_to_write, folder_to_write, positive, video_side, whole
+
+
+def said(capsys, *words: str) -> str:
+    try:
+        assert cli.main(words) == 2
+    except SystemExit as e:  # words that the parser refuses
+        assert e.code == 2
+    out, err = capsys.readouterr()
+    assert not out and err.startswith("error: ") and err.count("\n") == 1, err
+    return err
+
+
+LEARN = ("--data", "d", "--out", "o")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("rollout", "--video-size", "0", "0"), "--video-size: should be an even number of at least 16"),
+        (("rollout", "--video-size", "100000", "100000"), "at most 4096, got '100000'"),
+        (("rollout", "--episodes", "-3"), "--episodes: should be a whole number of at least 1, got '-3'"),
+        (("judge", "--data", "d", "--threads", "0"), "--threads: should be a whole number of at least 1"),
+        (("judge", "--data", "d", "--threads", "-1"), "--threads: should be a whole number of at least 1"),
+        (("judge", "--data", "d", "--batch", "-3"), "--batch: should be"),
+        (("judge", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
+        (("eval", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
+        (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
+        (("features", "--data", "d", "--quality", "nope"), "--quality: invalid choice: 'nope'"),
+        (("bench", "memory", "--houses", "0"), "--houses: should be"),
+        (("train", "hanna", *LEARN, "--minutes", "-1"), "--minutes: should be a number above 0, got '-1'"),
+        (("train", "hanna", *LEARN, "--minutes", "nan"), "--minutes: should be a number above 0"),
+        (("train", "hanna", *LEARN, "--validation-tasks", "0"), "validation_tasks must be at least 1"),
+        (("train", "hanna", *LEARN, "--evaluation-temperature", "nan"), "evaluation_temperature must be"),
+        (("train", "hanna", *LEARN, "--learning-rate", "inf"), "learning_rate must be positive and finite"),
+        (("train", "vision", *LEARN, "--network", "nope"), "network must be one of"),
+        (("train", "vision", *LEARN, "--batch", "0"), "batch must be at least 1"),
+        (("dataset", "find", "--out", "x", "--panoramas", "unlit", "--size", "-5"), "--size: should be"),
+        (("dataset", "find", "--out", ""), "--out: should be a path, got an empty word"),
+        (("assets", "list", "--cache", ""), "--cache: should be a path, got an empty word"),
+        (("house", "--out", "/dev/null"), "--out: /dev/null is a file, a folder is wanted"),
+        (("house", "--out", "/dev/null/x"), "is a file"),
+        (("render", "x", "--node", "1", "--equirect", "."), "--equirect: . is a folder, a file is wanted"),
+        (("house", "--out", "x", "--cache", "loop"), "--cache: 'loop' cannot be used"),
+        (("house", "--out", b"bad\xff".decode("utf-8", "surrogateescape")), "should be a path in UTF-8"),
+        (("demo", "--size", "5000"), "at most 4096"),
+    ],
+)
+def test_odd_arguments_are_refused_before_any_work(words, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.symlink("loop", "loop")
+    assert message in said(capsys, *words)
+    assert [p.name for p in tmp_path.iterdir()] == ["loop"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "good", "bad"),
+    [
+        (whole(1, 9), ("1", "9", "+3"), ("0", "10", "x", "", "2.0", "1e3", "nan", "9" * 5000)),
+        (whole(0), ("0",), ("-1",)),
+        (video_side, ("16", "480"), ("17", "0", "4098")),
+        (positive, ("0.5", "3"), ("0", "-1", "nan", "inf", "1e999", "x")),
+        (any_path, (".", "ü"), ("", "a\udcff")),
+        (any_folder, (".", "new/one"), (__file__,)),
+        (folder_to_write, ("new/one",), (f"{__file__}/x",)),
+        (file_to_write, ("new/one",), (".", f"{__file__}/x")),
+    ],
+)
+def test_types_of_arguments_take_what_they_name_and_nothing_else(kind, good, bad, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for text in good:
+        kind(text)
+    for text in bad:
+        with pytest.raises(argparse.ArgumentTypeError, match=r"should be|is a f|cannot be used"):
+            kind(text)
+
+
+def test_a_terminal_that_knows_no_unicode_gets_question_marks_not_an_error():
+    code = (
+        "from embodied import cli\nfrom embodied.cli import doctor\n"
+        "doctor.run = lambda a: print('50.0', chr(177), '3.1')\n"
+        "raise SystemExit(cli.main(['doctor']))"
+    )
+    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, env=plain)
+    assert (done.returncode, done.stdout) == (0, "50.0 ? 3.1\n"), done.stderr

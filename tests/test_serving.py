@@ -1,0 +1,63 @@
+"""What is served to a browser can be reached from this machine only, unless somebody asks for more by name."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from embodied.errors import UnableError
+from viz import sinks
+
+
+@pytest.fixture
+def ports(monkeypatch) -> tuple[int, int]:
+    """Free ports in place of Rerun's own."""
+    with socket.socket() as a, socket.socket() as b:
+        for s in (a, b):
+            s.bind(("127.0.0.1", 0))
+        found = a.getsockname()[1], b.getsockname()[1]
+    monkeypatch.setattr(sinks, "PORT", found[0])
+    monkeypatch.setattr(sinks, "WEB_PORT", found[1])
+    return found
+
+
+def listening(port: int) -> set[str]:
+    """Addresses at which somebody on this machine listens, as the kernel writes them."""
+    rows = [
+        line.split()
+        for name in ("/proc/net/tcp", "/proc/net/tcp6")
+        if Path(name).exists()
+        for line in Path(name).read_text().splitlines()[1:]
+    ]
+    return {r[1].split(":")[0] for r in rows if r[3] == "0A" and int(r[1].split(":")[1], 16) == port}
+
+
+class Enough(Exception):
+    """Leaves the server, which would wait for Ctrl-C."""
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="asks the Linux kernel who listens")
+def test_serving_listens_on_the_loopback_address_only(ports, capsys):
+    with pytest.raises(Enough), sinks.open_viewers(serve=True) as viewers:
+        assert viewers == (f"rerun+http://127.0.0.1:{ports[0]}/proxy",)
+        assert [listening(p) for p in ports] == [{"0100007F"}, {"0100007F"}]
+        raise Enough
+    assert not any(map(listening, ports)), "it ends with the work"
+    said = capsys.readouterr()
+    assert f"http://127.0.0.1:{ports[1]}/" in said.out and not said.err
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="asks the Linux kernel who listens")
+def test_serving_to_others_is_said_aloud(ports, capsys):
+    with pytest.raises(Enough), sinks.open_viewers(serve=True, bind="0.0.0.0"):
+        assert listening(ports[0]) == {"00000000"}
+        raise Enough
+    assert "warning: everybody who reaches 0.0.0.0 can look at what is served" in capsys.readouterr().err
+
+
+def test_an_address_of_another_machine_is_refused(ports):
+    remedy = r"look whether 192\.0\.2\.1 is an address of this machine"
+    with pytest.raises(UnableError, match=remedy), sinks.open_viewers(serve=True, bind="192.0.2.1"):
+        raise AssertionError("nothing can be served there")
