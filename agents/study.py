@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import joblib
 import torch
@@ -22,6 +24,7 @@ from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.run import Lessons, split_of, train_agent
 from agents.hanna.training_config import TrainingConfig
 from agents.judging import about
+from agents.vision.bank import FeatureBank
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset
@@ -30,11 +33,11 @@ from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, save, shown
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
-from embodied.records import episodes_file, parse, save_lines
+from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
 
-VARIANTS: Mapping[str, Mapping[str, object]] = {
+VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "final": {},
     "no ask": {"ask_rule": "never", "alpha": 0.5},
     "random ask": {"ask_rule": "random", "alpha": 0.5},
@@ -306,7 +309,11 @@ def _train(setting: Setting, variant: str, note: Note | None) -> str:
 def _validations(folder: Path) -> list[dict[str, float]]:
     """How a training went, validation by validation."""
     path = folder / "validation.jsonl"
-    lines = [parse(line, f"{path}: a validation") for line in path.read_text(encoding="utf-8").splitlines()]
+    text = path.read_text(encoding="utf-8").splitlines()
+    try:
+        lines: list[dict[str, float]] = [json.loads(line) for line in text]
+    except ValueError as e:
+        raise ValueError(f"{path} holds a line that is no JSON ({e}); delete that line") from e
     return list({line["update"]: line for line in lines}.values())  # a resumed run may have validated twice
 
 
@@ -318,7 +325,7 @@ class _Judge:
         self.encoder: Encoder = load_encoder(setting.encoder)
         self.behaviour: dict[tuple[str, str], dict] = {}
         self._agents: dict[str, HannaAgent] = {}
-        self._banks: dict[str, object] = {}
+        self._banks: dict[str, FeatureBank] = {}
         self._rows: dict[tuple[str, str], Row] = {}
 
     def row(self, line: Line, split: str) -> Row:

@@ -150,7 +150,7 @@ def fingerprint(**facts: object) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    if dataclasses.is_dataclass(value):
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _plain(getattr(value, f.name)) for f in _fields(type(value))}
         return {"is": type(value).__name__, **fields} if type(value) in _choices() else fields
     if isinstance(value, enum.Enum):
@@ -240,7 +240,7 @@ def _build_choice(args: tuple[typing.Any, ...], value: object, where: str) -> ty
     if value is None and type(None) in args:
         return None
     some = [a for a in args if a is not type(None)]
-    records = [a for a in some if dataclasses.is_dataclass(a)]
+    records: list[type] = [a for a in some if isinstance(a, type) and dataclasses.is_dataclass(a)]
     if len(records) < 2:
         return _build(some[0], value, where)
     named = value.get("is") if isinstance(value, dict) else None

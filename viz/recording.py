@@ -19,7 +19,7 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Sight, Step, Stop, Task
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Sight, Step, Stop, Task
 from embodied.navigation.free_space import EYE
 from embodied.world import World
 from viz.blueprint import blueprint_of
@@ -87,7 +87,7 @@ def record(
         yield step
     if state.last is not None:
         recording.set_time("step", sequence=state.count)
-        log_end(recording, world, task, state, pictures)
+        log_end(recording, world, task, state, state.last.next_pose, pictures)
 
 
 def record_episode(
@@ -196,9 +196,10 @@ def log_step(
     log_aim(recording, world, state, pictures)
 
 
-def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Story, pictures: Pictures) -> None:
+def log_end(
+    recording: rr.RecordingStream, world: World, task: Task, state: Story, end: Pose, pictures: Pictures
+) -> None:
     """Where it ended, and whether that was right."""
-    end = state.last.next_pose
     log_sight(recording, world, end.node, end.yaw, end.pitch, pictures)
     log_path(recording, world, state.nodes)
     distance = min(float(world.graph.distance[end.node, g]) for g in task.goal_nodes)

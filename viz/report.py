@@ -112,6 +112,8 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
     if not table.exists():
         return {}
     rows = parse_file(table)
+    if not isinstance(rows, list):
+        raise RecordError(f"{table} is no table of `embodied eval` or `judge`; make it again")
     try:
         return {
             _name(episodes_file(r["split"], r["agent"])): (

@@ -107,7 +107,8 @@ def open_recording(
     rr.set_strict_mode(True)  # a call that cannot be logged is an error, not a warning
     recording = rr.RecordingStream(APPLICATION)
     with contextlib.ExitStack() as stack:
-        outputs, file = [rr.GrpcSink(url) for url in sinks.viewers], None
+        outputs: list[rr.GrpcSink | rr.FileSink] = [rr.GrpcSink(url) for url in sinks.viewers]
+        file = None
         if sinks.rrd is not None:
             file = stack.enter_context(atomic_path(Path(sinks.rrd)))
             outputs.append(rr.FileSink(str(file)))
@@ -117,7 +118,7 @@ def open_recording(
             recording.send_blueprint(blueprint, make_active=True)
         recording.send_recording_name(name)
         if properties:
-            recording.send_property("fingerprint", rr.AnyValues(**properties))
+            recording.send_property("fingerprint", rr.AnyValues(drop_untyped_nones=True, **properties))
         yield recording
         try:
             recording.flush(timeout_sec=PATIENCE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Place, Pose, Sight, Step, Task
+from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Place, Pose, Reply, Sight, Step, Task
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
@@ -66,15 +66,14 @@ class Story:
             self.requests += 1
             self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
             if step.reply is not None:
-                self._heard(step)
+                self._heard(step.reply, step.pose)
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step
         self.count += 1
 
-    def _heard(self, step: Step) -> None:
-        reply = step.reply
-        said = reply.text or described(reply.description or (), step.pose if reply.intention is Intention.CUR else None)
+    def _heard(self, reply: Reply, pose: Pose) -> None:
+        said = reply.text or described(reply.description or (), pose if reply.intention is Intention.CUR else None)
         self.dialogue.append(f"**Assistant:** {said}")
         self.image = reply.image or self.image
         if reply.subtask is not None:
@@ -89,7 +88,8 @@ class Story:
           rows: lines of text, of `width` letters each, that there is room for; a gap between two speakers is one.
         """
         height = lambda line: 2 + len(line) // width
-        kept, left = [], rows + 1 - height(self.dialogue[0])
+        kept: list[str] = []
+        left = rows + 1 - height(self.dialogue[0])
         for line in reversed(self.dialogue[1:]):
             more = 0 if len(kept) + 2 == len(self.dialogue) else height("…")
             if kept and left < height(line) + more:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from embodied.records import from_plain, parse
 
 FORMAT, OLD_FORMAT = "embodied-agent-2", "embodied-agent-1"
 """The older one has no checksum."""
-NETWORKS = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 SHIPPED = SHIPPED_AGENT
 """The agent of this repository; see agents/weights/README.md."""
 

@@ -96,6 +96,7 @@ def collect(
     done = {f.index: f.episode for f in frames if f.episode is not None}
     episodes = tuple(done[i] for i in range(len(tasks)))
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
+    assert remembering.memory is not None, "somebody has acted"
     moments = remembering.memory.moments
     return Experience(episodes, join(moments), targets(moments, labels), remembering.seconds)
 
@@ -104,10 +105,9 @@ def join(moments: Sequence[Moment]) -> Said:
     """All steps below each other; A is the most actions of any step."""
     most = max(m.scores.navigation.shape[1] for m in moments)
     moves = [F.pad(m.scores.navigation, (0, most - m.scores.navigation.shape[1]), value=-torch.inf) for m in moments]
-    reasons = [m.scores.reasons for m in moments]
-    return Said(
-        torch.cat(moves), torch.cat([m.scores.ask for m in moments]), None if reasons[0] is None else torch.cat(reasons)
-    )
+    reasons = [m.scores.reasons for m in moments if m.scores.reasons is not None]
+    asks = torch.cat([m.scores.ask for m in moments])
+    return Said(torch.cat(moves), asks, torch.cat(reasons) if reasons else None)
 
 
 def targets(moments: Sequence[Moment], labels: Sequence[Sequence[Label]]) -> Targets:

@@ -128,8 +128,8 @@ class HannaPolicy:
           imposed: navigation actions (0 is stop, c + 1 candidate c) that replace the network's own
             choice in some episodes; whether to ask stays its own decision.
         """
-        positions = tuple(i for i, o in enumerate(observations) if o is not None)
-        seen = [observations[i] for i in positions]
+        running = [(i, o) for i, o in enumerate(observations) if o is not None]
+        positions, seen = tuple(i for i, _ in running), [o for _, o in running]
         memory = self.start(positions) if memory is None else memory.keep(positions)
         if not positions:
             return [None] * len(observations), memory
@@ -148,8 +148,8 @@ class HannaPolicy:
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
             thought = thought_of(moves[row], asks[row], reason, n)
             index = self.choose(moves[row, : n + 1], rng)  # drawn before asking, so asking shifts no draw
-            if imposed is not None and imposed[position] is not None:
-                index = imposed[position]
+            given = None if imposed is None else imposed[position]
+            index = index if given is None else given
             rule = RULES["every5"][0] if position < guided else self.ask_rule
             if Intention.HELP in o.can_ask and rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
                 actions[position] = Ask(Intention.HELP, thought)
@@ -215,8 +215,8 @@ class HannaPolicy:
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
         if self.turn_to_agent:
-            order = np.arange(VIEWS)[None]
-            order = send(order // HEADINGS * HEADINGS + (order + turns) % HEADINGS)  # (k, 36)
+            views_of_turn = np.arange(VIEWS)[None]
+            order = send(views_of_turn // HEADINGS * HEADINGS + (views_of_turn + turns) % HEADINGS)  # (k, 36)
             current, target = current[rows, order], target[rows, order]
         return Percept(
             tokens=send(np.stack([self.encode(o) for o in observations])),

@@ -135,5 +135,5 @@ def place_auc(nodes: Labelled, near: float = 2.5) -> float:
             others = np.arange(len(rows)) != i
             close.append(similar[others & (gap[i] <= near)])
             far.append(similar[others & (gap[i] > near)])
-    close, far = np.concatenate(close), np.sort(np.concatenate(far))
-    return float(np.searchsorted(far, close).mean() / len(far))
+    ranks = np.searchsorted(np.sort(np.concatenate(far)), np.concatenate(close))
+    return float(ranks.mean() / sum(map(len, far)))

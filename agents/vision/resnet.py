@@ -123,7 +123,9 @@ class ResNet(nn.Module):
     def feature_map(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) normalised images -> (n, D, H / stride, W / stride)."""
         x = F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
-        return self.layer4(self.layer3(self.layer2(self.layer1(x))))
+        for stage in (1, 2, 3, 4):
+            x = getattr(self, f"layer{stage}")(x)
+        return x
 
     def features(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) -> (n, D), the average of the feature map: what VLN calls ResNet features."""

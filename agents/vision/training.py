@@ -8,6 +8,8 @@ what room the camera stands. Labels come from the simulator's own ids and depths
 from __future__ import annotations
 
 import dataclasses
+import functools
+import operator
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -85,7 +87,9 @@ def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tenso
         "view room": F.cross_entropy(heads.view_room(views).flatten(0, 1), batch.room.repeat_interleave(views.shape[1]))
         * 0.5,
     }
-    return sum(parts.values()), {name: float(value.detach()) for name, value in parts.items()}
+    return functools.reduce(operator.add, parts.values()), {
+        name: float(value.detach()) for name, value in parts.items()
+    }
 
 
 def batches(
@@ -94,22 +98,22 @@ def batches(
     """One pass over all nodes in random order, each strip rolled, perhaps mirrored, and recoloured."""
     where = [(h, i) for h, house in enumerate(houses) for i in range(len(house.rgb))]
     order = rng.permutation(len(where))
-    classes = np.asarray(classes)
+    columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
         rgb, share, rooms, depth, room = [], [], [], [], []
         for h, i in chosen:
             house, turn, mirror = houses[h], int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
             rgb.append(recolour(turned(house.rgb[i], turn * CELL, mirror), rng=rng))
-            share.append(turned(house.share[i], turn, mirror)[..., classes])
+            share.append(turned(house.share[i], turn, mirror)[..., columns])
             rooms.append(turned(house.rooms[i], turn, mirror))
             depth.append(turned(house.log_depth[i], turn, mirror))
             room.append(house.room[i])
-        share = np.stack(share)
+        shares = np.stack(share)
         yield StripBatch(
             torch.from_numpy(np.stack(rgb)),
-            torch.from_numpy(share),
-            torch.from_numpy(visible_in_views(share)),
+            torch.from_numpy(shares),
+            torch.from_numpy(visible_in_views(shares)),
             torch.from_numpy(np.stack(rooms).astype(np.int64)),
             torch.from_numpy(np.stack(depth).astype(np.float32)),
             torch.from_numpy(np.array(room, dtype=np.int64)),
@@ -166,7 +170,8 @@ def train_encoder(
     updates = config.epochs * (nodes // config.batch)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, total_steps=max(updates, 1))
     note(f"{nodes} strips of {len(houses)} houses, {len(classes)} classes, {updates} updates")
-    done, began, smooth = 0, time.monotonic(), {}
+    done, began = 0, time.monotonic()
+    smooth: dict[str, float] = {}
     for epoch in range(config.epochs):
         for batch in batches(houses, classes, config.batch, rng=stream(config.seed, "vision", "epoch", epoch)):
             loss, parts = vision_loss(network, heads, batch)

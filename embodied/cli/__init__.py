@@ -78,6 +78,7 @@ def parser(chosen: str | None = None) -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
         text = ast.get_docstring(ast.parse((Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")))
+        assert text, "every subcommand says what it does"
         summary = text.splitlines()[0].rstrip(".")
         sub = commands.add_parser(
             name,

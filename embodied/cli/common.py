@@ -16,7 +16,7 @@ from embodied.cli.options import any_folder, any_path
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
-    from embodied.house.house import House
+    from embodied.house.house import House, Opening, Room
 
 T = TypeVar("T")
 PATIENCE = 2.0
@@ -92,7 +92,7 @@ def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> I
 
 def fetch(catalogue: Catalogue, house: House) -> None:
     """Import all models and materials that `house` needs into the cache, with a bar if that takes a while."""
-    surfaces = (*house.rooms, *house.openings)
+    surfaces: list[Room | Opening] = [*house.rooms, *house.openings]
     finishes = {getattr(s, f.name) for s in surfaces for f in dataclasses.fields(s) if f.name.endswith("finish")} - {
         None
     }

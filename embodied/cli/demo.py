@@ -60,7 +60,8 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     from embodied.generate import generate_house
     from embodied.house.floor_plan import save_plan
 
-    catalogue, seconds = catalogue_of(args), {}
+    catalogue = catalogue_of(args)
+    seconds: dict[str, float] = {}
     args.out.mkdir(parents=True, exist_ok=True)
     with timed("a house with people in it", seconds):
         house = generate_house(args.seed, catalogue=catalogue)
@@ -100,7 +101,9 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     return 0
 
 
-def inhabited(house: House, catalogue: Catalogue, args: argparse.Namespace) -> tuple[House, NavGraph, list[Route]]:
+def inhabited(
+    house: House, catalogue: Catalogue, args: argparse.Namespace
+) -> tuple[House, NavGraph, tuple[Route, ...]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
     from embodied.generate.people import add_people, meet

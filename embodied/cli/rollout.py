@@ -81,7 +81,7 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
         )
         rows = []
         for number, episode in enumerate(episodes):
-            row = {"task": episode.task.id, "request": episode.task.request}
+            row: dict[str, object] = {"task": episode.task.id, "request": episode.task.request}
             row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
             if args.video:
                 row["video"] = str(

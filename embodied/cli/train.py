@@ -74,11 +74,11 @@ def run_hari(args: argparse.Namespace) -> int:
     use_threads(args.threads)
     data = hari_data(args.data)
     if args.phase == "execution":
-        config = chosen(args, EXECUTION_SCALES[args.scale])
-        train_execution(data, config, args.out, minutes=args.minutes, note=note)
+        walking = chosen(args, EXECUTION_SCALES[args.scale])
+        train_execution(data, walking, args.out, minutes=args.minutes, note=note)
     else:
-        config = chosen(args, INTENTION_SCALES[args.scale])
-        train_intention(data, args.execution, config, args.out, minutes=args.minutes, note=note)
+        asking = chosen(args, INTENTION_SCALES[args.scale])
+        train_intention(data, args.execution, asking, args.out, minutes=args.minutes, note=note)
     return 0
 
 

@@ -17,6 +17,7 @@ from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError, from_plain, read_json
 
 T = TypeVar("T")
+R = TypeVar("R", Route, Task)
 Edges = set[tuple[int, int]]
 ASTRAY = 1.0
 """Metres that a viewpoint may lie outside its room: on a threshold, on a stair."""
@@ -158,7 +159,7 @@ def check_tasks(where: Path, tasks: Sequence[Task], kind: str, house: House, gra
     _each(where, tasks, lambda task: _wrong_task(task, kind, house, graph) or _wrong_goal(task, house, graph, edges))
 
 
-def _each(where: Path, items: Sequence[Route] | Sequence[Task], wrong: Callable[..., str | None]) -> None:
+def _each(where: Path, items: Sequence[R], wrong: Callable[[R], str | None]) -> None:
     seen: set[str] = set()
     for number, item in enumerate(items, 1):
         problem = "the id stands in an earlier line, too" if item.id in seen else wrong(item)

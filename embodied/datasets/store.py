@@ -27,7 +27,7 @@ from embodied.envs.make import environment_maker
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
-from embodied.records import read_lines
+from embodied.records import RecordError, from_plain, read_lines
 from embodied.render.pictures import PictureSettings
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 
@@ -149,9 +149,11 @@ class Dataset:
             return None
         if made_of.get("house") != self.place(name).house.digest:
             return None
-        return PictureSettings(
-            **{f.name: made_of[f.name] for f in dataclasses.fields(PictureSettings) if f.name in made_of}
-        )
+        fields = {f.name: made_of[f.name] for f in dataclasses.fields(PictureSettings) if f.name in made_of}
+        try:
+            return from_plain(PictureSettings, fields)
+        except RecordError:  # drawn by a version with other words for it
+            return None
 
     def routes(self, name: str) -> tuple[Route, ...]:
         """The routes that assistants know in a house.
