@@ -9,9 +9,9 @@ from pathlib import Path
 
 import safetensors
 import safetensors.torch
+import torch
 from torch import Tensor, nn
 
-from agents.vision.resnet import read_weights
 from assets.cache import write_bytes
 
 CHECKSUM = "checksum"
@@ -52,6 +52,28 @@ def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[
     if found is not None and found != checksum_of(tensors, about):
         raise ValueError(f"{path}: its contents do not fit its checksum, somebody or something changed it; {remedy}")
     return tensors, about
+
+
+def read_weights(path: Path) -> dict[str, Tensor]:
+    """Tensors of a .safetensors file or of a PyTorch file that holds nothing but tensors.
+
+    Raises:
+      ValueError: the file is truncated, of another kind, or would have to run code to be read.
+    """
+    path = Path(path)
+    try:
+        if path.suffix == ".safetensors":
+            return safetensors.torch.load_file(path)
+        weights = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError:
+        raise
+    except Exception as e:  # torch and safetensors raise half a dozen kinds for a damaged file
+        raise ValueError(
+            f"{path}: cannot be read as weights ({str(e).splitlines()[0]:.80}); download or train it again"
+        ) from e
+    if not isinstance(weights, Mapping) or not all(isinstance(v, Tensor) for v in weights.values()):
+        raise ValueError(f"{path}: expected a state dict (name -> tensor), got {type(weights).__name__}")
+    return dict(weights)
 
 
 def checksum_of(tensors: Mapping[str, Tensor], about: Mapping[str, str]) -> str:

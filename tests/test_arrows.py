@@ -92,35 +92,36 @@ embodied.gym <- assets.catalogue embodied.house embodied.generate embodied.inter
     embodied.world embodied.assistants embodied.envs embodied.datasets embodied.evaluation
 embodied.cli <- agents.shipped embodied.gl viz.sinks agents.imitation assets.importing assets.catalogue
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
-    embodied.language embodied.records embodied.render viz.blueprint viz.video embodied.light viz.report
-    embodied.policies embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs
-    embodied.datasets embodied.bench embodied.evaluation agents.vision agents.hanna agents.hari agents.bandit
-    agents.failures agents.judging agents.study
+    embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
+    embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
+    embodied.evaluation agents.vision agents.hanna agents.hari agents.bandit agents.failures agents.judging
+    agents.study
 embodied.__main__ <- embodied.cli
 agents.shipped <-
 agents.device <-
+agents.tensor_file <-
 agents.imitation <- agents.device
 agents.figures <- embodied.evaluation
 agents.vision <- agents.shipped agents.device assets.catalogue embodied.house embodied.scene embodied.interface
-    embodied.render embodied.world embodied.datasets embodied.gym
+    embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file embodied.locks embodied.records
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
-    embodied.datasets embodied.evaluation agents.vision
+    embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.locks embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
-    embodied.tasks embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.vision
+    embodied.tasks embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
-    embodied.datasets embodied.evaluation agents.vision agents.hanna
+    embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
 agents.failures <- embodied.interface embodied.teachers agents.vision agents.hanna
 agents.judging <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna
-    agents.failures
+    agents.failures embodied.locks
 agents.study <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.figures agents.vision
-    agents.hanna agents.failures agents.judging
+    agents.hanna agents.failures agents.judging embodied.locks
 viz.sinks <-
 viz.house3d <- embodied.scene
 viz.blueprint <- embodied.house embodied.interface
 viz.story <- embodied.interface
 viz.video <- embodied.interface
 viz.report <- embodied.interface embodied.records
-viz.recording <- embodied.interface viz.house3d viz.story embodied.world
+viz.recording <- embodied.interface viz.house3d viz.story embodied.world viz.sinks embodied.navigation viz.blueprint
 """
 """Every room (a module or folder of a package) and the rooms that it imports, GROUND apart, for type checkers only or
 late, too; from below to above, by package. A new arrow is a decision: it belongs here, and no circle may come of it."""

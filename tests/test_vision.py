@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 import torch
 
+from agents.tensor_file import read_weights
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import NETWORKS, PLAIN, VisionConfig, drawing
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
 from agents.vision.features import feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
-from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, read_weights
+from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from agents.vision.training import train_encoder, turned
 from embodied.interface import Sight
 from embodied.render.pictures import PictureSettings

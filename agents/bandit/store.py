@@ -13,7 +13,7 @@ from torch import nn
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
 from agents.bandit.words import Lexicon, lexicon_from_json
-from agents.vision.resnet import read_weights
+from agents.tensor_file import read_weights
 from assets.cache import atomic_path
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from torch import nn
 from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.words import FeatureWords
-from agents.vision.resnet import read_weights
+from agents.tensor_file import read_weights
 from assets.cache import atomic_path
 
 FORMAT = "embodied-hari-1"

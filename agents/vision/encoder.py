@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from agents.shipped import SHIPPED_ENCODER
-from agents.tensor_file import load_tensors, put, save_tensors
-from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise, read_weights
+from agents.tensor_file import load_tensors, put, read_weights, save_tensors
+from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 
 FORMAT, OLD_FORMAT = "embodied-encoder-2", "embodied-encoder-1"

@@ -9,10 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-import safetensors
-import safetensors.torch
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -143,28 +140,6 @@ def normalise(images: Tensor) -> Tensor:
     mean = torch.tensor(MEAN, device=images.device).view(1, 3, 1, 1)
     deviation = torch.tensor(DEVIATION, device=images.device).view(1, 3, 1, 1)
     return ((images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation).contiguous()
-
-
-def read_weights(path: Path) -> dict[str, Tensor]:
-    """Tensors of a .safetensors file or of a PyTorch file that holds nothing but tensors.
-
-    Raises:
-      ValueError: the file is truncated, of another kind, or would have to run code to be read.
-    """
-    path = Path(path)
-    try:
-        if path.suffix == ".safetensors":
-            return safetensors.torch.load_file(path)
-        weights = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError:
-        raise
-    except Exception as e:  # torch and safetensors raise half a dozen kinds for a damaged file
-        raise ValueError(
-            f"{path}: cannot be read as weights ({str(e).splitlines()[0]:.80}); download or train it again"
-        ) from e
-    if not isinstance(weights, Mapping) or not all(isinstance(v, Tensor) for v in weights.values()):
-        raise ValueError(f"{path}: expected a state dict (name -> tensor), got {type(weights).__name__}")
-    return dict(weights)
 
 
 def load_torchvision(name: str, weights: Mapping[str, Tensor]) -> ResNet:
