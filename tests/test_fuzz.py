@@ -123,8 +123,8 @@ def _of(data: Dataset) -> object:
 
 
 def _write_episodes(data: Dataset, path: Path) -> None:
-    tasks = data.tasks("test_unseen")[:3]
-    save_lines(path, play(data.environment("test_unseen"), PrivilegedAsking(Shortest(), ask_every_5), tasks, seed=0))
+    split = data.split("test_unseen")
+    save_lines(path, play(split.make_env, PrivilegedAsking(Shortest(), ask_every_5), split.tasks[:3], seed=0))
 
 
 def _agent():
