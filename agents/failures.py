@@ -26,7 +26,7 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5.
 
     'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
-    authors train an agent for each rule (`embodied train hanna --ask-rule ...`).
+    authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
     """
     learned = agent.policy(bank)
     return {

@@ -18,7 +18,7 @@ def sentence_bleu(words: Sequence[str], reference: Sequence[str]) -> float:
     more (3.1.4, footnote 3). The text's source, Chen and Cherry (2014), leaves unigrams as they
     are; the authors' program smooths them as well, which is done here: a translation that shares no
     word with its reference is still better short than long. Unlike in the program the end mark is
-    no word.
+    no word (docs/sources.md, S66).
     """
     logs = 0.0
     for n in ORDERS:

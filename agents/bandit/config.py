@@ -38,7 +38,7 @@ class BanditConfig:
     bandit_set: str = "bandit_overlap"
     """The split that is rated: 'bandit_overlap' (the dissertation's case) or 'bandit_disjoint'."""
     clip: float = 5.0
-    """Longest gradient; the authors' program's."""
+    """Longest gradient; the authors' program's (docs/sources.md, S73)."""
     checkpoint_minutes: float = 2.0
     """How often a run is saved, so that it can go on after an interruption."""
     seed: int = 0

@@ -50,7 +50,7 @@ def filtered(pairs: Iterable[Pair], shortest: int = 3, longest: int = 50, ratio:
     """Tokenized pairs of `shortest` to `longest` words a side, of similar length, each source once.
 
     The dissertation drops sentences of more than 50 words (3.1.5); the rest of the filter keeps
-    menus and headings, of which this source is full, from ruling the ratings.
+    menus and headings, of which this source is full, from ruling the ratings (docs/sources.md, S65).
     """
     seen, kept = set(), []
     for pair in pairs:

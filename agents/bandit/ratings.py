@@ -54,7 +54,7 @@ def deviation(score: float) -> float:
     """sigma(s) of Eq 3.9, here on the scale 0 to 1: how far people are from their mean.
 
     The authors' program multiplies it by lambda and clips the rating to [0, 1]; the text has
-    Nor(s, lambda sigma^2), which is done here: the mean stays the true score.
+    Nor(s, lambda sigma^2), which is done here: the mean stays the true score (docs/sources.md, S67).
     """
     percent = 100 * score
     return max(0.0, 0.64 * percent - 0.02 if percent < 50 else 67.0 - 0.67 * percent) / 100

@@ -106,7 +106,7 @@ def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str,
     """Supervised pre-training (3.1.5.2); writes weak.safetensors and full.safetensors into `folder`.
 
     Differs from the text in what 'full' is: not the tenth pass but the one of lowest dev perplexity,
-    because small corpora are learned by heart before the tenth.
+    because small corpora are learned by heart before the tenth (docs/sources.md, S69).
     """
     config, data = m.config, m.splits["supervised"]
     translator = m.translator()

@@ -28,7 +28,7 @@ class HannaConfig:
     similarity_attention: bool = True
     """False: ablation 'no cosine-similarity attention' (beta = 0)."""
     similarity_normaliser: str = "kept"
-    """'kept' or 'all', see attention.sim_attend (X10)."""
+    """'kept' or 'all', see attention.sim_attend (docs/sources.md, S26)."""
 
     def __post_init__(self) -> None:
         for name in ("words", "feature_size", "hidden_size", "navigation_embedding", "ask_embedding"):

@@ -2,13 +2,13 @@
 
 B agents, A navigation actions, h hidden size, D visual feature size, n steps so far plus one (a
 memory opens with zero vectors). Each line carries the number of the equation it computes. What
-differs from the text, and why, is said at the line; X-numbers are those differences between the
-dissertation and its authors' program that had to be decided here:
+differs from the text, and why, is said at the line; what dissertation and program do differently was
+decided so (docs/sources.md, by its numbers):
   * an agent's inter-task memory is reset when *its own* task changes (text; the program resets the
-    whole batch, X2), so results do not depend on the batch;
-  * the navigation score is the bilinear form of D.18, with biases (X8);
-  * reasons are three independent sigmoids, as loss 4.14 needs (D.20 prints a softmax, X9);
-  * the help-request network compares only with past steps at which it asked (X10).
+    whole batch; S23), so results do not depend on the batch;
+  * the navigation score is the bilinear form of D.18, with biases (S24);
+  * reasons are three independent sigmoids, as loss 4.14 needs (D.20 prints a softmax; S25);
+  * the help-request network compares only with past steps at which it asked (S26).
 """
 
 from __future__ import annotations
@@ -230,7 +230,7 @@ class HannaNetwork(nn.Module):
         else:
             self.ask_out = nn.Linear(h, 2)
         # An agent that asks at every second step hears a new text each time and learns to walk by none.
-        self.ask_out.bias.data = torch.tensor([1.0, -1.0])  # begins with one request in eight chances
+        self.ask_out.bias.data = torch.tensor([1.0, -1.0])  # one request in eight chances (docs/sources.md, S30)
 
     def start(self, batch: int, length: int) -> tuple[Memory, Memory]:
         """Memories of both networks before the first step of `batch` agents."""

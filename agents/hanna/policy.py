@@ -101,7 +101,7 @@ class HannaPolicy:
     instruction_length: int = 50
     turn_to_agent: bool = True
     """Rows of views begin at the agent's own heading. The authors' program keeps them absolute
-    (X27), which tells the agent where east is; D.1 leaves the order open and a robot has no compass."""
+    (docs/sources.md, S29), which tells the agent where east is; D.1 leaves the order open, a robot has no compass."""
     read_assistance: bool = True
     """False: on a route the text is empty, 'target image only' of Table 4.4."""
     environment_dropout: float = 0.0
@@ -211,7 +211,7 @@ class HannaPolicy:
             current, target = current * memory.channels[:, None], target * memory.channels[:, None]
         rows = torch.arange(k, device=device)[:, None]
         looks = current[rows, send(views)]  # (k, A, D)
-        facing = orientation(send(angles[0]), send(angles[1]), config.orientation_copies)  # exact bearing (X11)
+        facing = orientation(send(angles[0]), send(angles[1]), config.orientation_copies)  # docs/sources.md, S27
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
         if self.turn_to_agent:

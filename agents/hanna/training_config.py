@@ -59,10 +59,9 @@ class TrainingConfig:
     learning_rate: float = 1e-4
     """Of Adam."""
     cooldown: float = 0.0
-    """Share of the updates, the last ones, over which the learning rate falls linearly towards zero; not in the
-    dissertation."""
+    """The last share of the updates, over which the learning rate falls linearly to zero (docs/sources.md, S32)."""
     weight_decay: float = 5e-4
-    """The authors' program's; the text does not mention it (X12)."""
+    """The authors' program's; the text does not mention it (docs/sources.md, S28)."""
     batch: int = 32
     """Episodes per update."""
     training_houses: int = 0
@@ -72,10 +71,9 @@ class TrainingConfig:
     instruction_length: int = 50
     """Words of an instruction that are read."""
     alpha: float = 1.0
-    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
-    'learned'."""
+    """Weight of the curiosity-encouraging loss; 0: ablation. The authors: 0.5 with ask rules other than 'learned'."""
     curiosity_floor: float = 0.0
-    """Mistakes less likely than this are not pushed down further; 0 is Eq 4.13 as printed, without a bound."""
+    """Mistakes less likely than this are not pushed down further; 0: Eq 4.13, without bound (docs/sources.md, S34)."""
     evaluation_steps: int = 50
     """Horizon of episodes that are judged."""
     evaluation_batch: int = 32
@@ -83,7 +81,7 @@ class TrainingConfig:
     ask_rule: str = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
     guided_asking: float = 0.0
-    """Share of training episodes of the learned rule in which 'every5' asks in its place; not in the dissertation.
+    """Share of training episodes of the learned rule in which 'every5' asks in its place (docs/sources.md, S33).
     A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
@@ -94,13 +92,13 @@ class TrainingConfig:
     similarity_attention: bool = True
     """False: ablation of Table D.2 (beta = 0)."""
     turn_to_agent: bool = True
-    """Views in the agent's frame; False: in absolute order, as in the authors' program (X27)."""
+    """Views in the agent's frame; False: in absolute order, as in the authors' program (docs/sources.md, S29)."""
     environment_dropout: float = 0.0
-    """Share of feature channels hidden for a whole training episode (Tan et al. 2019); not in the dissertation."""
+    """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35)."""
     evaluation_temperature: float = 0.0
-    """How navigation actions are chosen when judged: 0 takes the likeliest (dissertation), 1 draws from
+    """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
     the distribution, between them it is sharpened. An agent that is often wrong and always takes its
-    likeliest action walks in circles."""
+    likeliest action walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
     """When judged, the learned rule asks where REQUEST is more probable than this."""
     validate_every: int = 500
@@ -171,4 +169,4 @@ SCALES: dict[str, TrainingConfig] = {
     ),
     "paper": TrainingConfig(),
 }
-"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU."""
+"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""

@@ -27,9 +27,9 @@ class ExecutionConfig:
     horizon: int = 15
     """Most steps of a pre-training episode."""
     clip: float = 1.0
-    """Norm to which gradients are cut; not in the dissertation, where it is open."""
+    """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
-    """Share of the updates, the last ones, over which the learning rate falls linearly; not in the dissertation."""
+    """Share of the updates, the last ones, over which the learning rate falls linearly (docs/sources.md, S79)."""
     validate_every: int = 500
     """Updates between validations."""
     validation_tasks: int = 300
@@ -65,10 +65,10 @@ class IntentionConfig:
     entropy: float = 1e-3
     """Weight of the policy's entropy."""
     clip: float = 1.0
-    """Norm to which gradients are cut; not in the dissertation, where it is open."""
+    """Norm to which gradients are cut (docs/sources.md, S76)."""
     knows_stack: bool = True
     """Whether it is told how many goals are on the stack, which it put there itself; the dissertation's is not, and
-    blames that for its critic's mistakes (4.3.6)."""
+    blames that for its critic's mistakes (4.3.6; docs/sources.md, S77)."""
     stack: int = 2
     """L, the most goals on the stack."""
     longest: int = 3

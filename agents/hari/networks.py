@@ -23,7 +23,7 @@ class ExecutionNetwork(nn.Module):
 
     "We adapt the V&L BERT architecture": an encoder reads each description by itself, a decoder
     attends from the previous hidden vector over both. What the text leaves open and is decided
-    here (docs/sources.md, section HARI): moves are scored by the product of b^s_t with the
+    here (docs/sources.md, S75): moves are scored by the product of b^s_t with the
     embedding of the feature set that an assistant would use for them, so that "go north" and the
     neighbour to the north are near each other from the start.
     """

@@ -124,7 +124,7 @@ class HariPolicy:
     executor: Executor
     actor: RecurrentHead
     sample: bool = True
-    """Intentions are drawn from psi; False takes the likeliest. The text leaves open which is judged."""
+    """Intentions are drawn from psi; False takes the likeliest. Open in the text: docs/sources.md, S78."""
     choices: list[Choice] | None = field(default=None, repr=False)
     """Where each step is written down for training; None: nowhere."""
 

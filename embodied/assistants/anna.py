@@ -26,7 +26,7 @@ class Anna:
 
     The dissertation says that a sub-task is guaranteed to bring the agent closer to a goal; its
     equations do not say so, nor does the authors' program: the best route of the zone may lead
-    away. We follow the equations.
+    away. We follow the equations (docs/sources.md, S10). Where zones overlap, the best route of all counts (S9).
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Anna:
         """The route xi* (4.4), the departure node (4.6) and the goal node g* (4.7).
 
         Routes that are equally good (the wordings of one path, above all) are drawn from. The
-        authors' program draws in training only and takes the first in evaluation.
+        authors' program draws in training only and takes the first in evaluation (docs/sources.md, S11).
 
         Raises:
           AssistantError: asked outside every zone.

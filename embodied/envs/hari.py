@@ -94,7 +94,7 @@ class HariEnv(HelpEnv):
         self._hops: dict[str, np.ndarray] = {}
 
     def task_error(self, node: int, goal: int) -> float:
-        """c(s, a_done): edges on the shortest path from node to goal (4.3.6)."""
+        """c(s, a_done): edges on the shortest path from node to goal (4.3.6; docs/sources.md, S61)."""
         return float(self._hops_here()[node, goal])
 
     def _hops_here(self) -> np.ndarray:

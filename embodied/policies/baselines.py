@@ -147,7 +147,7 @@ class PerfectInterpreter:
     On a route the teacher acts, so every instruction is understood (4.2.5). On the main task the
     agent has no skill but its memory: it goes to the least visited neighbour, asks whenever it
     meets somebody it has not asked about the same target, and stops once it is as near a goal as
-    the task demands (it recognises the object). The authors' row has a trained navigator there.
+    the task demands (it recognises the object). The authors' row has a trained navigator there (docs/sources.md, S40).
     """
 
     def act_privileged(
@@ -256,7 +256,7 @@ class HalfwaySkyline:
     """HARI with perfect navigation on sub-goals (Table 4.7, last row): it asks for a sub-goal, goes
     there, says so, and asks again, until a sub-goal turns out to be the goal itself.
 
-    Knowing that is privileged; the authors' skyline learns when to ask.
+    Knowing that is privileged; the authors' skyline learns when to ask (docs/sources.md, S62).
     """
 
     def act_privileged(
