@@ -96,7 +96,8 @@ FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ("play", PLAY, (("envs", "rules of play"),)),
     ("use", USE, (("datasets", "build, export"),)),
     ("use", USE, (("evaluation", "rollout, judges"),)),
-    ("use", USE, (("gym", "Gymnasium"), ("bench", "speed"))),
+    ("use", USE, (("gym", "Gymnasium"),)),
+    ("use", USE, (("bench", "speed, digests"),)),
     ("use", USE, (("cli", "alone composes agents and viz"),)),
 )
 """Column, colour, and the rooms (name in embodied/, what it is about) of one floor; each imports only from floors
