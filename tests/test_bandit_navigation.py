@@ -21,10 +21,10 @@ from agents.bandit.navigation import (
     score_of,
     shortest_path,
 )
-from agents.bandit.navigation_study import gain, raters
+from agents.bandit.navigation_study import NavigationSetting, gain, raters, run_raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
-from agents.hanna.agent import HannaAgent, new_agent
+from agents.hanna.agent import HannaAgent, new_agent, save_agent
 from agents.hanna.training import Split
 from agents.hanna.training_config import SCALES
 from agents.hanna.vocabulary import build_vocabulary
@@ -175,3 +175,19 @@ def test_settings_are_checked():
     with pytest.raises(ValueError, match="score must be one of"):
         RatingConfig(score="stars")
     assert navigation.StateCritic(4)(torch.zeros(3, 2, 4)).shape == (3, 2)
+
+
+def test_a_study_learns_judges_and_writes_once(split, tmp_path):
+    agent = agent_for(split)
+    save_agent(agent, tmp_path / "agent.safetensors")
+    out = tmp_path / "study"
+    setting = NavigationSetting(tmp_path, None, tmp_path / "agent.safetensors", out, STARS, (0, 1), "test_unseen", 8)
+    path = run_raters(setting, split, split, ["clean", "granularity 4"], note=silent)
+    text = path.read_text()
+    assert "| clean |" in text and "| granularity 4 |" in text and "Not run: granularity 1" in text
+    assert "on 8 tasks in 1 houses" in text
+    assert (out / "figure_navigation.png").exists()
+    made = {p: p.stat().st_mtime_ns for p in out.rglob("*.safetensors")}
+    assert len(made) == 4
+    run_raters(setting, split, split, ["clean"], note=silent)
+    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.safetensors")} == made

@@ -43,6 +43,7 @@ class NavigationSetting:
 
     data: Path
     encoder: Encoder
+    """Whose features the agents know."""
     agent: Path
     """The imitation-trained agent that all begin with."""
     out: Path
@@ -68,12 +69,16 @@ def run_navigation_study(setting: NavigationSetting, only: Sequence[str] | None 
     Raises:
       ValueError: an unknown rater, or a data set without the agent's features.
     """
-    known, wanted = raters(), list(only or raters())
-    if unknown := [name for name in wanted if name not in known]:
-        raise ValueError(f"unknown raters {unknown}; there are {list(known)}")
+    if unknown := [name for name in only or () if name not in raters()]:
+        raise ValueError(f"unknown raters {unknown}; there are {list(raters())}")
     torch.set_num_threads(setting.threads)
     data = Dataset(setting.data)
     rated, judged = split_of(data, "train", setting.encoder), split_of(data, setting.split, setting.encoder)
+    return run_raters(setting, rated, judged, list(only or raters()), note=note)
+
+
+def run_raters(setting: NavigationSetting, rated: Split, judged: Split, wanted: Sequence[str], *, note: Note) -> Path:
+    """Learn in the houses of `rated`, judge in those of `judged`, and write what there is."""
     _judge(setting, judged, None, None, note)
     for seed in setting.seeds:
         for name in wanted:
