@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from embodied.datasets.matterport import (
     view_index,
     write_features,
 )
-from embodied.interface import TURNS, FindObject, Pose, Route, Task
+from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import to_matterport
 from embodied.seeds import stream
@@ -56,6 +56,9 @@ MOST_NODES = 10
 LONGEST = 200
 """Actions after which a teacher's walk is given up; no house is that large."""
 
+Words = Counter[str]
+Item = dict[str, Any]
+"""An object of a program's JSON."""
 FeatureRows = Iterable[tuple[str, str, np.ndarray]]
 """(house, viewpoint id, (36, D) features in our order)."""
 
@@ -116,6 +119,18 @@ def readme(program: str, data: Dataset, with_features: bool) -> str:
     return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text).rstrip()
 
 
+def sought(task: Task) -> FindObject:
+    """What a task of HANNA or VNLA looks for."""
+    assert isinstance(task.goal, FindObject), "they look for objects"
+    return task.goal
+
+
+def route_of(task: Task) -> FollowRoute:
+    """What a task of Room-to-Room follows."""
+    assert isinstance(task.goal, FollowRoute), "they follow routes"
+    return task.goal
+
+
 def names_of(data: Dataset) -> list[str]:
     """The houses of all splits."""
     return sorted({n for s in data.splits for n in data.names(s)})
@@ -125,18 +140,18 @@ def names_of(data: Dataset) -> list[str]:
 
 
 def _hanna(data: Dataset, root: Path) -> list[Path]:
-    home, files, words, numbers = root / "data" / "hanna", [], Counter(), itertools.count(1)
+    home, files, words, numbers = root / "data" / "hanna", [], Words(), itertools.count(1)
     for split in data.splits:
         items = [_item(t, next(numbers), data.place(t.world)) for t in data.tasks(split)]
         if split == "train":
             words.update(w for i in items for w in i["instructions"][0].split())
         files.append(_json(home / f"hanna_{split}.json", items))
-    routes: dict[str, list[dict[str, object]]] = {}
+    routes: dict[str, list[Item]] = {}
     for name in names_of(data):
         routes[scan_name(name)] = [_route(r, data.place(name).graph) for r in data.routes(name)]
         words.update(w for r in data.routes(name) if r.split == "train_seen" for w in tokenised(r.instruction).split())
     groups = {g: [scan_name(n) for n in names_of(data) if n.startswith(g)] for g in ("train", "val", "test")}
-    objects = sorted({t.goal.object_class for s in data.splits for t in data.tasks(s)})
+    objects = sorted({sought(t).object_class for s in data.splits for t in data.tasks(s)})
     return [
         *files,
         _json(home / "routes.json", routes),
@@ -148,7 +163,7 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
     ]
 
 
-def action_space(data: Dataset) -> dict[str, list[dict[str, object]]]:
+def action_space(data: Dataset) -> dict[str, list[Item]]:
     """panoramic_action_space.json: '<scan>_<viewpoint>_<heading bin>' to the actions there."""
     table = {}
     for name in names_of(data):
@@ -159,7 +174,7 @@ def action_space(data: Dataset) -> dict[str, list[dict[str, object]]]:
     return table
 
 
-def _item(task: Task, number: int, place: StoredPlace, goals: Sequence[int] | None = None) -> dict[str, object]:
+def _item(task: Task, number: int, place: StoredPlace, goals: Sequence[int] | None = None) -> Item:
     ids, graph = place.graph.ids, place.graph
     goals = task.goal_nodes if goals is None else goals
     return {
@@ -171,7 +186,7 @@ def _item(task: Task, number: int, place: StoredPlace, goals: Sequence[int] | No
     }
 
 
-def _route(route: Route, graph: NavGraph) -> dict[str, object]:
+def _route(route: Route, graph: NavGraph) -> Item:
     return {
         "path_id": route.id.replace("_", "-"),
         "path": [graph.ids[v] for v in route.path],
@@ -187,7 +202,7 @@ def _route(route: Route, graph: NavGraph) -> dict[str, object]:
 def _vnla(data: Dataset, root: Path) -> list[Path]:
     teacher, files = VnlaTeacher(), []
     for prefix, item in (("asknav", _asknav), ("noroom", _noroom)):
-        home, words, numbers = root / "data" / prefix, Counter(), itertools.count(1)
+        home, words, numbers = root / "data" / prefix, Words(), itertools.count(1)
         for split in data.splits:
             made = (item(t, numbers, data, teacher) for t in data.tasks(split))
             items = [i for i in made if i is not None]
@@ -210,20 +225,20 @@ def _vnla(data: Dataset, root: Path) -> list[Path]:
     return [*files, _text(root / "data" / "region_label.txt", region_lines())]
 
 
-def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> dict[str, object]:
+def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item:
     place = data.place(task.world)
     return {**_item(task, next(numbers), place), **_vnla_fields(task, task.goal_nodes, place, teacher.plan(place))}
 
 
-def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> dict[str, object] | None:
+def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
     """The task without its room: any thing of the class in the house will do. None where that is too near."""
     place, config, plan = data.place(task.world), VnlaConfig(by_room=False), teacher.plan(data.place(task.world))
-    goals = _anywhere(place, config)[task.goal.object_class]
+    goals = _anywhere(place, config)[sought(task).object_class]
     goals = tuple(g for g in goals if plan.counts((g,))[state_of(task.start)] > 0)
     if count_hops(place.graph.next_hop)[task.start.node, list(goals)].min() + 1 < config.fewest_nodes:
         return None
     rng = stream(data.config.seed, "noroom", task.id)
-    request = PlainLanguage().request(FindObject(task.goal.object_class), rng=rng)
+    request = PlainLanguage().request(FindObject(sought(task).object_class), rng=rng)
     item = _item(task, next(numbers), place, goals)
     return {**item, "instructions": [tokenised(request)], **_vnla_fields(task, goals, place, plan)}
 
@@ -235,14 +250,14 @@ def _anywhere(place: StoredPlace, config: VnlaConfig) -> Mapping[str, tuple[int,
     return {c.object_class: c.goal_nodes for c in classes}
 
 
-def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> dict[str, object]:
+def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> Item:
     room, rooms = place.house.room_by_id, place.graph.room_of_node
     nearest = min(goals, key=lambda g: (place.graph.distance[task.start.node, g], g))
     return {
         "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST)[0]] for g in goals],
         "start_region_name": region_name(room[rooms[task.start.node]].kind),
         "end_region_name": region_name(room[rooms[nearest]].kind),
-        "object_name": task.goal.object_class,
+        "object_name": sought(task).object_class,
     }
 
 
@@ -283,12 +298,12 @@ def _r2r(data: Dataset, root: Path) -> list[Path]:
     return files + [_text(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
 
 
-def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[dict[str, object]]:
+def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[Item]:
     """One item per path with three instructions: the programs count on three, and where fewer people spoke (in seen
     splits, those whose wording was held out) theirs are repeated."""
     by_path: dict[tuple[str, tuple[int, ...]], list[Task]] = {}
     for t in data.tasks(split):
-        by_path.setdefault((t.world, t.goal.path), []).append(t)
+        by_path.setdefault((t.world, route_of(t).path), []).append(t)
     for (name, path), tasks in by_path.items():
         graph, texts = data.place(name).graph, [t.request for t in tasks]
         yield {
@@ -307,7 +322,7 @@ NAV_SPLITS = {"train": "train", "val": "val_unseen", "test": "test_unseen"}
 
 def _iliad_nav(data: Dataset, root: Path) -> list[Path]:
     """Paths of at most MOST_NODES nodes: training items with three instructions, the others with one."""
-    home, files, words, numbers = root / "data" / "nav", [], Counter(), itertools.count(1)
+    home, files, words, numbers = root / "data" / "nav", [], Words(), itertools.count(1)
     for theirs, ours in NAV_SPLITS.items():
         items = []
         for item in _paths(data, ours, numbers):
