@@ -47,7 +47,7 @@ def _all(stem: str, count: int) -> tuple[str, ...]:
 
 TASTES: Mapping[str, Taste] = {
     "light": Taste(
-        (
+        woods=(
             "light_oak_planks/0",
             "ash_planks/0",
             "light_oak_herringbone/0",
@@ -56,9 +56,9 @@ TASTES: Mapping[str, Taste] = {
             "beech_strips/0",
             "light_oak_laminate/0",
         ),
-        ("stoneware_tiles/3", "stoneware_tiles/0", "terrazzo/0", "long_stoneware_tiles/3"),
-        ("carpet/0", "carpet/2", "sisal/0"),
-        (
+        stones=("stoneware_tiles/3", "stoneware_tiles/0", "terrazzo/0", "long_stoneware_tiles/3"),
+        carpets=("carpet/0", "carpet/2", "sisal/0"),
+        walls=(
             "paint_white/0",
             "paint_warm_white/0",
             "paint_pale_grey/0",
@@ -66,15 +66,15 @@ TASTES: Mapping[str, Taste] = {
             "paint_pale_blue/0",
             "paint_mint/0",
         ),
-        ("paint_dusty_blue/0", "paint_sage_green/0", "paint_blush_pink/0", "paint_taupe/0", "brick_white/0"),
-        ("grasscloth/1", "wallpaper_leaves/0", "wallpaper_scallops/2", "wallpaper_stripes/2"),
-        ("stoneware_tiles/3", "hex_tiles/1", "hex_tiles/0", "terrazzo/0", "marble_tiles/0"),
-        ("metro_tiles/0", "square_tiles/0", "mosaic_tiles/1", "long_stoneware_tiles/3", "square_tiles/2"),
-        ("paint_white/0", "paint_white/0", "ash/0", "light_oak/0", "beech/0"),
-        ("paint_dusty_blue/0", "paint_sage_green/0", "light_oak/0", "paint_charcoal/0"),
+        accents=("paint_dusty_blue/0", "paint_sage_green/0", "paint_blush_pink/0", "paint_taupe/0", "brick_white/0"),
+        papers=("grasscloth/1", "wallpaper_leaves/0", "wallpaper_scallops/2", "wallpaper_stripes/2"),
+        wet_floors=("stoneware_tiles/3", "hex_tiles/1", "hex_tiles/0", "terrazzo/0", "marble_tiles/0"),
+        wet_walls=("metro_tiles/0", "square_tiles/0", "mosaic_tiles/1", "long_stoneware_tiles/3", "square_tiles/2"),
+        doors=("paint_white/0", "paint_white/0", "ash/0", "light_oak/0", "beech/0"),
+        front_doors=("paint_dusty_blue/0", "paint_sage_green/0", "light_oak/0", "paint_charcoal/0"),
     ),
     "warm": Taste(
-        (
+        woods=(
             "oak_planks/0",
             "oak_planks/1",
             "oak_herringbone/0",
@@ -83,9 +83,9 @@ TASTES: Mapping[str, Taste] = {
             "oak_strips/0",
             "oak_mosaic_parquet/0",
         ),
-        ("terracotta_tiles/0", "terracotta_tiles/1", "travertine_tiles/0", "stoneware_tiles/1", "slate_tiles/0"),
-        ("carpet/0", "carpet/7", "sisal/0"),
-        (
+        stones=("terracotta_tiles/0", "terracotta_tiles/1", "travertine_tiles/0", "stoneware_tiles/1", "slate_tiles/0"),
+        carpets=("carpet/0", "carpet/7", "sisal/0"),
+        walls=(
             "paint_warm_white/0",
             "paint_ivory/0",
             "paint_sand/0",
@@ -94,16 +94,23 @@ TASTES: Mapping[str, Taste] = {
             "plaster_white/0",
             "paint_butter_yellow/0",
         ),
-        ("paint_terracotta/0", "paint_olive/0", "plaster_ochre/0", "brick_red/0", "paint_ochre/0", "plaster_rose/0"),
-        ("wallpaper_leaves/2", "grasscloth/0", "wallpaper_trellis/2", "wallpaper_floral/0"),
-        ("travertine_tiles/0", "stoneware_tiles/1", "hex_tiles/2", "terracotta_tiles/0"),
-        ("square_tiles/1", "travertine_tiles/0", "metro_tiles/0", "long_stoneware_tiles/1", "metro_tiles/1"),
-        ("oak/0", "pine/0", "paint_ivory/0", "paint_warm_white/0", "beech/0"),
-        ("oak/0", "paint_sage_green/0", "mahogany/0", "cherry/0"),
-        ("paint_white/0", "oak/0", "paint_ivory/0"),
+        accents=(
+            "paint_terracotta/0",
+            "paint_olive/0",
+            "plaster_ochre/0",
+            "brick_red/0",
+            "paint_ochre/0",
+            "plaster_rose/0",
+        ),
+        papers=("wallpaper_leaves/2", "grasscloth/0", "wallpaper_trellis/2", "wallpaper_floral/0"),
+        wet_floors=("travertine_tiles/0", "stoneware_tiles/1", "hex_tiles/2", "terracotta_tiles/0"),
+        wet_walls=("square_tiles/1", "travertine_tiles/0", "metro_tiles/0", "long_stoneware_tiles/1", "metro_tiles/1"),
+        doors=("oak/0", "pine/0", "paint_ivory/0", "paint_warm_white/0", "beech/0"),
+        front_doors=("oak/0", "paint_sage_green/0", "mahogany/0", "cherry/0"),
+        frames=("paint_white/0", "oak/0", "paint_ivory/0"),
     ),
     "dark": Taste(
-        (
+        woods=(
             "walnut_planks/0",
             "smoked_oak_planks/0",
             "walnut_chevron/0",
@@ -112,10 +119,10 @@ TASTES: Mapping[str, Taste] = {
             "wenge_planks/0",
             "grey_oak_chevron/0",
         ),
-        ("concrete/1", "stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "long_stoneware_tiles/2"),
-        ("carpet/1", "carpet/3", "sisal/1"),
-        ("paint_white/0", "paint_pale_grey/0", "paint_greige/0", "plaster_white/0", "paint_warm_white/0"),
-        (
+        stones=("concrete/1", "stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "long_stoneware_tiles/2"),
+        carpets=("carpet/1", "carpet/3", "sisal/1"),
+        walls=("paint_white/0", "paint_pale_grey/0", "paint_greige/0", "plaster_white/0", "paint_warm_white/0"),
+        accents=(
             "paint_charcoal/0",
             "paint_navy_blue/0",
             "paint_forest_green/0",
@@ -123,15 +130,15 @@ TASTES: Mapping[str, Taste] = {
             "paint_aubergine/0",
             "brick_brown/0",
         ),
-        ("grasscloth/2", "wallpaper_damask/3", "wallpaper_trellis/0", "wallpaper_scallops/0"),
-        ("stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "concrete/1", "hex_tiles/0"),
-        ("marble_tiles/2", "long_stoneware_tiles/0", "metro_tiles/4", "metro_tiles/0", "mosaic_tiles/2"),
-        ("paint_white/0", "walnut/0", "smoked_oak/0", "paint_charcoal/0", "grey_oak/0"),
-        ("paint_charcoal/0", "walnut/0", "lacquer_black/0"),
-        ("paint_white/0", "lacquer_anthracite/0"),
+        papers=("grasscloth/2", "wallpaper_damask/3", "wallpaper_trellis/0", "wallpaper_scallops/0"),
+        wet_floors=("stoneware_tiles/2", "slate_tiles/0", "marble_tiles/2", "concrete/1", "hex_tiles/0"),
+        wet_walls=("marble_tiles/2", "long_stoneware_tiles/0", "metro_tiles/4", "metro_tiles/0", "mosaic_tiles/2"),
+        doors=("paint_white/0", "walnut/0", "smoked_oak/0", "paint_charcoal/0", "grey_oak/0"),
+        front_doors=("paint_charcoal/0", "walnut/0", "lacquer_black/0"),
+        frames=("paint_white/0", "lacquer_anthracite/0"),
     ),
     "classic": Taste(
-        (
+        woods=(
             "oak_herringbone/0",
             "oak_basket/0",
             "walnut_herringbone/0",
@@ -139,17 +146,17 @@ TASTES: Mapping[str, Taste] = {
             "oak_chevron/0",
             "cherry_planks/0",
         ),
-        ("marble_tiles/1", "checker_tiles/0", "marble_tiles/0", "travertine_tiles/0"),
-        ("carpet/2", "carpet/5", "carpet/6", "carpet/4"),
-        ("paint_ivory/0", "paint_warm_white/0", "paint_beige/0", "paint_greige/0", "paint_sand/0"),
-        (
+        stones=("marble_tiles/1", "checker_tiles/0", "marble_tiles/0", "travertine_tiles/0"),
+        carpets=("carpet/2", "carpet/5", "carpet/6", "carpet/4"),
+        walls=("paint_ivory/0", "paint_warm_white/0", "paint_beige/0", "paint_greige/0", "paint_sand/0"),
+        accents=(
             "wallpaper_damask/0",
             "wallpaper_damask/1",
             "wallpaper_stripes/3",
             "paint_forest_green/0",
             "paint_navy_blue/0",
         ),
-        (
+        papers=(
             "wallpaper_damask/1",
             "wallpaper_stripes/0",
             "wallpaper_stripes/3",
@@ -157,13 +164,13 @@ TASTES: Mapping[str, Taste] = {
             "wallpaper_trellis/1",
             "wallpaper_damask/2",
         ),
-        ("marble_tiles/0", "marble_tiles/1", "checker_tiles/0", "hex_tiles/1"),
-        ("marble_tiles/0", "square_tiles/0", "metro_tiles/0", "square_tiles/1", "marble_tiles/1"),
-        ("paint_white/0", "paint_ivory/0", "mahogany/0", "oak/0"),
-        ("mahogany/0", "lacquer_black/0", "paint_dusty_blue/0", "oak/0"),
+        wet_floors=("marble_tiles/0", "marble_tiles/1", "checker_tiles/0", "hex_tiles/1"),
+        wet_walls=("marble_tiles/0", "square_tiles/0", "metro_tiles/0", "square_tiles/1", "marble_tiles/1"),
+        doors=("paint_white/0", "paint_ivory/0", "mahogany/0", "oak/0"),
+        front_doors=("mahogany/0", "lacquer_black/0", "paint_dusty_blue/0", "oak/0"),
     ),
     "colourful": Taste(
-        (
+        woods=(
             "oak_planks/2",
             "maple_strips/0",
             "teak_narrow_planks/0",
@@ -172,9 +179,9 @@ TASTES: Mapping[str, Taste] = {
             "pine_narrow_planks/0",
             "oak_small_herringbone/0",
         ),
-        ("terrazzo/2", "hex_tiles/3", "terrazzo/1", "checker_tiles/0", "stoneware_tiles/3"),
-        ("carpet/4", "carpet/6", "carpet/1"),
-        (
+        stones=("terrazzo/2", "hex_tiles/3", "terrazzo/1", "checker_tiles/0", "stoneware_tiles/3"),
+        carpets=("carpet/4", "carpet/6", "carpet/1"),
+        walls=(
             "paint_white/0",
             "paint_warm_white/0",
             "paint_mint/0",
@@ -184,7 +191,7 @@ TASTES: Mapping[str, Taste] = {
             "paint_lavender/0",
             "paint_peach/0",
         ),
-        (
+        accents=(
             "paint_teal/0",
             "paint_ochre/0",
             "paint_terracotta/0",
@@ -192,17 +199,24 @@ TASTES: Mapping[str, Taste] = {
             "paint_aubergine/0",
             "paint_olive/0",
         ),
-        (
+        papers=(
             "wallpaper_scallops/0",
             "wallpaper_floral/2",
             "wallpaper_leaves/1",
             "wallpaper_stripes/1",
             "wallpaper_scallops/1",
         ),
-        ("hex_tiles/3", "terrazzo/2", "terrazzo/0", "hex_tiles/1", "stoneware_tiles/0"),
-        ("metro_tiles/1", "metro_tiles/2", "metro_tiles/3", "mosaic_tiles/0", "square_tiles/3", "mosaic_tiles/3"),
-        ("paint_white/0", "maple/0", "paint_sage_green/0", "paint_dusty_blue/0"),
-        ("lacquer_red/0", "lacquer_navy_blue/0", "paint_sage_green/0", "teak/0"),
+        wet_floors=("hex_tiles/3", "terrazzo/2", "terrazzo/0", "hex_tiles/1", "stoneware_tiles/0"),
+        wet_walls=(
+            "metro_tiles/1",
+            "metro_tiles/2",
+            "metro_tiles/3",
+            "mosaic_tiles/0",
+            "square_tiles/3",
+            "mosaic_tiles/3",
+        ),
+        doors=("paint_white/0", "maple/0", "paint_sage_green/0", "paint_dusty_blue/0"),
+        front_doors=("lacquer_red/0", "lacquer_navy_blue/0", "paint_sage_green/0", "teak/0"),
     ),
 }
 """Style name to taste; the names are those of embodied.house.validation.STYLES."""
@@ -263,23 +277,23 @@ def draw_palette(style: str | None, *, rng: np.random.Generator) -> Palette:
     door = _one(taste.doors, rng)
     frame = _one(taste.frames, rng)
     return Palette(
-        name,
-        floor,
-        hall,
-        kitchen,
-        private,
-        _some(taste.wet_floors, 2, rng),
-        _one(ROUGH, rng),
-        _some(taste.walls, 3, rng),
-        _some(taste.wet_walls, 2, rng),
-        _some(taste.accents, 2, rng),
-        _some(taste.papers, 2, rng),
-        _one(taste.ceilings, rng),
-        "paint_white/0" if "paint" in door or rng.random() < 0.5 else door,
-        door,
-        _one(taste.front_doors, rng),
-        frame,
-        float(rng.uniform(0.1, 0.6)),
+        style=name,
+        floor=floor,
+        hall_floor=hall,
+        kitchen_floor=kitchen,
+        private_floor=private,
+        wet_floors=_some(taste.wet_floors, 2, rng),
+        rough_floor=_one(ROUGH, rng),
+        walls=_some(taste.walls, 3, rng),
+        wet_walls=_some(taste.wet_walls, 2, rng),
+        accents=_some(taste.accents, 2, rng),
+        papers=_some(taste.papers, 2, rng),
+        ceiling=_one(taste.ceilings, rng),
+        skirting="paint_white/0" if "paint" in door or rng.random() < 0.5 else door,
+        door=door,
+        front_door=_one(taste.front_doors, rng),
+        frame=frame,
+        boldness=float(rng.uniform(0.1, 0.6)),
     )
 
 

@@ -91,7 +91,13 @@ def draw_plan(
 
 def _random_genome(footprints: int, spaces: int, rng: np.random.Generator) -> Genome:
     modules, rows, cuts = rng.integers(2**31, size=3).tolist()
-    return Genome(int(rng.integers(footprints)), modules, rows, cuts, tuple(rng.normal(0, 0.45, spaces).tolist()))
+    return Genome(
+        footprint=int(rng.integers(footprints)),
+        modules=modules,
+        rows=rows,
+        cuts=cuts,
+        privacy=tuple(rng.normal(0, 0.45, spaces).tolist()),
+    )
 
 
 def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:

@@ -51,7 +51,7 @@ def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall
     """For each cell its stretches of outer wall, longest first."""
     return [
         [
-            OuterWall(i, k, w.axis, w.across / 10, w.low / 10, w.high / 10, side)
+            OuterWall(cell=i, index=k, axis=w.axis, across=w.across / 10, low=w.low / 10, high=w.high / 10, side=side)
             for k, (w, side) in enumerate(outer_stretches(list(cells), walls, i))
         ]
         for i in range(len(cells))
@@ -106,7 +106,20 @@ class _Openings:
         self.counts[kind] += 1
         a, b = rounded(jambs[0]), rounded(jambs[1])
         leaf, name = self.leaves.of(kind), f"{kind}_{self.counts[kind]}"
-        self.found.append(Opening(name, kind, rooms, a, b, rounded(sill), rounded(head), leaf, hinge, rounded(angle)))
+        self.found.append(
+            Opening(
+                id=name,
+                kind=kind,
+                rooms=rooms,
+                a=a,
+                b=b,
+                sill=rounded(sill),
+                head=rounded(head),
+                leaf_finish=leaf,
+                hinge=hinge,
+                angle=rounded(angle),
+            )
+        )
 
     def add_outer(
         self,
@@ -139,7 +152,7 @@ def draw_openings(
     """
     outside = outer_walls(plan.cells, walls_between(list(plan.cells)))
     free = {(w.cell, w.index): [(w.low, w.high)] for walls in outside for w in walls}
-    made = _Openings(plan, names, leaves, outside, free)
+    made = _Openings(plan=plan, names=names, leaves=leaves, outside=outside, free=free)
     _front_door(made, rng)
     wide = [k for k in plan.links if _is_wide(plan, k)]
     for link in wide:

@@ -176,7 +176,13 @@ class _Site:
 
     def _placed(self, asset: Asset, spot: Sequence[float], z: float, yaw: float) -> Placement:
         return Placement(
-            CLASS, asset.key, CLASS, self.room.id, rounded((spot[0], spot[1], z)), rounded(yaw), asset.size
+            id=CLASS,
+            asset=asset.key,
+            object_class=CLASS,
+            room=self.room.id,
+            position=rounded((spot[0], spot[1], z)),
+            yaw=rounded(yaw),
+            size=asset.size,
         )
 
 
@@ -195,7 +201,7 @@ def _seats(house: House, catalogue: Catalogue) -> list[_Seat]:
             middle, wide = (left + right) / 2, right - left > 2.5 * ELBOWS
             for x in (middle, left + ELBOWS, right - ELBOWS) if wide else (middle,):
                 back = np.asarray(p.position[:2]) + rotation(p.yaw) @ np.array([x, seat.y1 * scale[1] + BACK])
-                seats.append(_Seat(p, p.room, back, p.size[1] > DEEP, max(lift, 0.0)))
+                seats.append(_Seat(placement=p, room=p.room, spot=back, deep=p.size[1] > DEEP, lift=max(lift, 0.0)))
     return seats
 
 

@@ -125,7 +125,7 @@ def plan(
     world: SeenPlace, path: Sequence[int], yaw: float, speaker: Speaker, *, rng: np.random.Generator
 ) -> list[Phrase]:
     """Clauses for `path`, with the nouns that the speaker chooses."""
-    telling = _Telling(world, Eyes(world), lexicon_of(world.catalogue), speaker, rng)
+    telling = _Telling(world=world, eyes=Eyes(world), lexicon=lexicon_of(world.catalogue), speaker=speaker, rng=rng)
     phrases: list[Phrase] = []
     legs = legs_of(world, path, yaw)
     for n, leg in enumerate(legs):

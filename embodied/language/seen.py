@@ -101,11 +101,11 @@ def look(world: SeenPlace, node: int) -> Seen:
     graph, house, assets = world.graph, world.house, world.catalogue.assets
     things = tuple(
         SeenThing(
-            s.placement,
-            assets[house.placement_by_id[s.placement].asset],
-            s.yaw,
-            s.distance * math.cos(s.pitch),
-            s.pixels,
+            placement=s.placement,
+            asset=assets[house.placement_by_id[s.placement].asset],
+            yaw=s.yaw,
+            distance=s.distance * math.cos(s.pitch),
+            pixels=s.pixels,
         )
         for s in world.sightings(node)
         if s.pixels >= SMALLEST and s.object_class not in UNFIT
@@ -120,12 +120,12 @@ def look(world: SeenPlace, node: int) -> Seen:
         ]
         ways.append(
             Way(
-                int(n),
-                math.atan2(step[1], step[0]),
-                float(np.hypot(step[0], step[1])),
-                house.room_by_id[other].kind,
-                other != room,
-                min(between)[1] if between else None,
+                node=int(n),
+                yaw=math.atan2(step[1], step[0]),
+                length=float(np.hypot(step[0], step[1])),
+                kind=house.room_by_id[other].kind,
+                leaves=other != room,
+                door=min(between)[1] if between else None,
             )
         )
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)

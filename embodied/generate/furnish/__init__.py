@@ -56,7 +56,13 @@ def _arranged(draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], se
     before = stock.used.copy()
     for attempt in range(ATTEMPTS):
         stock.used = before.copy()
-        ctx = Context(room_space(draft, room), stock, stream(seed, "furnish", room.id, attempt), kinds, attempt)
+        ctx = Context(
+            space=room_space(draft, room),
+            stock=stock,
+            rng=stream(seed, "furnish", room.id, attempt),
+            kinds=kinds,
+            attempt=attempt,
+        )
         furnish_room(ctx)
         short = missing(ctx)
         if best is None or short < best[0]:
@@ -80,17 +86,17 @@ def _placements(rooms: list[tuple[str, list[Thing]]]) -> tuple[Placement, ...]:
             ids[id(t)] = f"{name}_{numbers[name]}"
             placements.append(
                 Placement(
-                    ids[id(t)],
-                    t.asset.key,
-                    t.asset.object_class,
-                    room,
-                    rounded((t.x, t.y, t.z)),
-                    rounded(float(wrap(t.yaw))),
-                    rounded(t.size),
-                    ids[id(t.parent)] if t.parent is not None else None,
-                    t.surface,
-                    tuple(sorted(t.params)),
-                    f"{room}/{t.group}" if t.group else None,
+                    id=ids[id(t)],
+                    asset=t.asset.key,
+                    object_class=t.asset.object_class,
+                    room=room,
+                    position=rounded((t.x, t.y, t.z)),
+                    yaw=rounded(float(wrap(t.yaw))),
+                    size=rounded(t.size),
+                    parent=ids[id(t.parent)] if t.parent is not None else None,
+                    surface=t.surface,
+                    params=tuple(sorted(t.params)),
+                    group=f"{room}/{t.group}" if t.group else None,
                 )
             )
     return tuple(placements)

@@ -107,6 +107,16 @@ def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | N
         return False
     ctx.space.add([b])
     ctx.things.append(
-        Thing(lamp, x, y, top - h, 0.0, (w, d, h), looks(ctx, lamp), group="ceiling", role="ceiling lamp")
+        Thing(
+            asset=lamp,
+            x=x,
+            y=y,
+            z=top - h,
+            yaw=0.0,
+            size=(w, d, h),
+            params=looks(ctx, lamp),
+            group="ceiling",
+            role="ceiling lamp",
+        )
     )
     return True

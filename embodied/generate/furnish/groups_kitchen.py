@@ -56,7 +56,16 @@ def _kitchen_set(ctx: Context, tag: str) -> KitchenSet | None:
         hob = ctx.pick("cooktop", most=(0.6, 0.56, 0.1), avoid=())
         cooker = next((a for a in base if a.object_class == "base cabinet" and a.size[0] > 0.55), base[0])
     hood = ctx.pick("range hood", where=lambda a: tag in a.tags, avoid=()) or ctx.pick("range hood", avoid=())
-    return KitchenSet(unit, base, sinks[0], cooker, hob, upper, hood, max(a.size[1] for a in (*base, sinks[0])))
+    return KitchenSet(
+        unit=unit,
+        base=base,
+        sink=sinks[0],
+        cooker=cooker,
+        hob=hob,
+        upper=upper,
+        hood=hood,
+        depth=max(a.size[1] for a in (*base, sinks[0])),
+    )
 
 
 def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list[tuple[float, float]]:

@@ -47,13 +47,13 @@ def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Gene
         scale = min(max(p.size[0] / 0.5, 0.6), 1.6) if hanging else 1.0
         found.append(
             Light(
-                f"light_{len(found) + 1}",
-                p.room,
-                p.id,
-                rounded((x, y, bulb)),
-                NEUTRAL if cool else (red, green, blue),
-                round(lumens * scale, 0),
-                on,
+                id=f"light_{len(found) + 1}",
+                room=p.room,
+                placement=p.id,
+                position=rounded((x, y, bulb)),
+                color=NEUTRAL if cool else (red, green, blue),
+                power=round(lumens * scale, 0),
+                on=on,
             )
         )
     return tuple(found)

@@ -56,7 +56,18 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
     if not ctx.space.fits(exact, passage=hanging.passage) or any(overlap(wide, q) for q in ctx.space.solids):
         return None
     role = hanging.role or hanging.group
-    thing = Thing(asset, x, y, base, wall.yaw, (w, d, h), looks(ctx, asset), group=hanging.group, role=role, wall=wall)
+    thing = Thing(
+        asset=asset,
+        x=x,
+        y=y,
+        z=base,
+        yaw=wall.yaw,
+        size=(w, d, h),
+        params=looks(ctx, asset),
+        group=hanging.group,
+        role=role,
+        wall=wall,
+    )
     ctx.space.add([exact])
     ctx.things.append(thing)
     ctx.stock.note([asset])

@@ -201,13 +201,13 @@ class Tops:
     ) -> Thing:
         carrier = board.carrier
         thing = Thing(
-            asset,
-            own.x,
-            own.y,
-            own.bottom,
-            carrier.yaw + turn,
-            size,
-            looks(self.ctx, asset),
+            asset=asset,
+            x=own.x,
+            y=own.y,
+            z=own.bottom,
+            yaw=carrier.yaw + turn,
+            size=size,
+            params=looks(self.ctx, asset),
             parent=carrier,
             surface=board.surface.name,
             group=carrier.group,

@@ -273,7 +273,17 @@ def room_space(house: House, room: Room) -> RoomSpace:
             ring = np.asarray(part.exterior.coords)[:-1]
             cv2.fillPoly(walk, [np.rint((ring - origin) / CELL).astype(np.int32)], 1)
     space = RoomSpace(
-        room, storey.elevation, storey.height, floor, walls, openings, tuple(entries), keepouts, radius, walk, origin
+        room=room,
+        bottom=storey.elevation,
+        height=storey.height,
+        polygon=floor,
+        walls=walls,
+        openings=openings,
+        entries=tuple(entries),
+        keepouts=keepouts,
+        radius=radius,
+        walk=walk,
+        origin=origin,
     )
     for wall in walls:
         for s0, s1, o in wall.openings:
@@ -316,14 +326,14 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
         outer = any(None in o.rooms for _, _, o in found)
         walls.append(
             Wall(
-                i,
-                (float(ring[i][0]), float(ring[i][1])),
-                (float(along[0]), float(along[1])),
-                (float(inward[0]), float(inward[1])),
-                float(lengths[i]),
-                outer,
-                tuple(found),
-                (convex[i], convex[(i + 1) % n]),
+                index=i,
+                start=(float(ring[i][0]), float(ring[i][1])),
+                along=(float(along[0]), float(along[1])),
+                inward=(float(inward[0]), float(inward[1])),
+                length=float(lengths[i]),
+                outer=outer,
+                openings=tuple(found),
+                corners=(convex[i], convex[(i + 1) % n]),
             )
         )
     return tuple(walls)
