@@ -20,9 +20,11 @@ from embodied.generate.furnish import furnish
 from embodied.generate.furnish.lights import LUMENS
 from embodied.generate.furnish.rooms import BEDS
 from embodied.generate.furnish.space import box, overlap, room_space
+from embodied.generate.furnish.style import PREFERENCES
 from embodied.generate.lacking import lacking
 from embodied.geometry import facing_of, rectangle, wrap
-from embodied.house.house import DOORS, House, Opening, Room, Storey, check
+from embodied.house.house import DOORS, House, HouseError, Opening, Room, Storey, check
+from embodied.house.validation import STYLES
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "check")}
 TOUCH = 2e-3
@@ -343,6 +345,12 @@ def test_chairs_look_at_their_table():
 def test_a_large_house_holds_at_least_250_objects_and_a_middle_one_at_least_130():
     assert len(furnished(5, (350, 400)).placements) >= 250
     assert len(furnished(2, (110, 130)).placements) >= 130
+
+
+def test_every_style_has_a_taste_in_furniture_and_no_other_is_taken_for_one():
+    assert tuple(PREFERENCES) == STYLES
+    with pytest.raises(HouseError, match="unknown style 'rococo'"):
+        furnish(dataclasses.replace(two_rooms(), style="rococo"), catalogue(), seed=1)
 
 
 def test_rooms_of_one_kind_are_furnished_differently():

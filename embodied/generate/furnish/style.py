@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from assets.records import Asset
+from embodied.house.house import HouseError
 
 
 @dataclass(frozen=True)
@@ -22,39 +24,48 @@ class Style:
     """Colour of its lamps: 0 neutral white, 1 warm white."""
 
 
-STYLES = (
-    Style(
-        "light",
-        ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
-        ("black", "dark", "antique", "red", "gothic", "ornate"),
-    ),
-    Style(
-        "warm",
-        ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
-        ("black", "metal", "glass", "plastic", "purple"),
-    ),
-    Style(
-        "dark",
-        ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
-        ("pine", "pink", "rustic", "beige"),
-    ),
-    Style(
-        "classic",
-        ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
-        ("plastic", "modern", "white", "glass", "metal"),
-    ),
-    Style(
-        "colourful",
-        ("blue", "green", "red", "yellow", "orange", "white", "modern"),
-        ("brown", "dark", "antique", "black"),
-    ),
-)
+PREFERENCES: Mapping[str, Style] = {
+    style.name: style
+    for style in (
+        Style(
+            "light",
+            ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
+            ("black", "dark", "antique", "red", "gothic", "ornate"),
+        ),
+        Style(
+            "warm",
+            ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
+            ("black", "metal", "glass", "plastic", "purple"),
+        ),
+        Style(
+            "dark",
+            ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
+            ("pine", "pink", "rustic", "beige"),
+        ),
+        Style(
+            "classic",
+            ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
+            ("plastic", "modern", "white", "glass", "metal"),
+        ),
+        Style(
+            "colourful",
+            ("blue", "green", "red", "yellow", "orange", "white", "modern"),
+            ("brown", "dark", "antique", "black"),
+        ),
+    )
+}
+"""Name of a style to what its owner prefers; the names are those of embodied.house.validation.STYLES."""
 
 
 def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Style:
-    """The taste called `name` (House.style), drawn up for one house of that disorder."""
-    base = next((s for s in STYLES if s.name == name), STYLES[0])
-    return replace(base, tidiness=1.0 - disorder, warmth=float(rng.uniform(0.2, 1.0)))
+    """The taste called `name` (House.style), drawn up for one house of that disorder.
+
+    Raises:
+      HouseError: nobody has such a taste.
+    """
+    if name not in PREFERENCES:
+        raise HouseError(f"the house has the unknown style {name!r}; use one of {tuple(PREFERENCES)}")
+    return replace(PREFERENCES[name], tidiness=1.0 - disorder, warmth=float(rng.uniform(0.2, 1.0)))
 
 
 def liking(style: Style, asset: Asset) -> float:
