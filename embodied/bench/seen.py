@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -54,8 +55,8 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
     for name, channels, view, aim in LINES:
         env = _env(world, tasks, PictureEyes(store, channels, view))
         steps = 40 if view.frame == "views36" else STEPS
-        line = measure(f"steps, {name}", lambda env=env, n=steps: _walk(env, n, seed), "1/s", per=steps, aim=aim)
-        yield line
+        walk = functools.partial(_walk, env, steps, seed)
+        yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
     envs = in_step(lambda: _env(world, tasks, PictureEyes(store, ("rgb",), ViewSettings())), BATCH)
     yield measure(
         f"steps of {BATCH} environments, rgb, 128 x 128", lambda: _walk_together(envs), "1/s", per=10 * BATCH, aim=None

@@ -23,6 +23,7 @@ from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
+from embodied.envs.hari import HariEnv
 from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
@@ -92,7 +93,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
         self._env, self._tasks, self._eyes, self._layout = make_env(), tuple(tasks), eyes, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
         self.render_mode = render_mode
-        self.action_space = action_space(layout)
+        self.action_space: gym.Space[Any] = action_space(layout)
         self.observation_space = observation_space(layout, eyes)
 
     def reset(
@@ -143,7 +144,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], int]):
 
     def _potential(self) -> float:
         e = self._env
-        if e.task.kind == "hari":
+        if isinstance(e, HariEnv):
             return e.task_error(e.pose.node, e.targets[0])
         return min(float(e.world.graph.distance[e.pose.node, g]) for g in e.task.goal_nodes) / 10.0
 
@@ -247,7 +248,7 @@ COPIES = 3
 """Of an observation that a vector environment holds per slot: its own, the batch's, and what is handed out."""
 
 
-def refuse_too_many(num_envs: int, space: gym.Space[Any]) -> None:
+def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
     """Raises ValueError where the observations of a batch do not fit into memory."""
     each = sum(int(np.prod(s.shape)) * np.dtype(s.dtype).itemsize for s in space.values() if s.shape is not None)
     wanted, free = COPIES * num_envs * each, psutil.virtual_memory().available

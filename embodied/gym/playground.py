@@ -23,7 +23,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
-from embodied.interface import Language, SeenPlace, Task
+from embodied.interface import Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
@@ -100,7 +100,7 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
         if path.exists():
             with PanoramaFile(path) as file:
                 meta = file.meta
-            light = meta["light"] if meta["quality"] not in ("none", "unlit") else None
+            light = str(meta["light"]) if meta["quality"] not in ("none", "unlit") else None
             settings = PictureSettings(int(str(meta["size"])), str(meta["quality"]), str(meta["backend"]), light)
             found[name] = settings
     if wanted and len(found) < len(names):
@@ -156,7 +156,7 @@ def _flat(
             house = add_people(house, met, (p[0] for p in paths))
         worlds = {name: open_world(house, catalogue, cache, graph=graph, pictures=pictures)}
     name, world = next(iter(worlds.items()))
-    routes = ()
+    routes: tuple[Route, ...] = ()
     if kind in ("hanna", "vln"):
         paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
         routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)

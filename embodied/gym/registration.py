@@ -48,5 +48,5 @@ class WhenImported(MetaPathFinder):
                 execute(module)
                 register(module)
 
-            spec.loader.exec_module = execute_and_register
+            spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]  # on this one loader
         return spec

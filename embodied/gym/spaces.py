@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -70,7 +71,7 @@ def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
     return spaces.Dict(whole)
 
 
-def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, object]:
+def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, Any]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
@@ -89,7 +90,7 @@ def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, object]:
     views = np.zeros(layout.candidates, dtype=np.int64)
     views[:n] = c.view + 1
     left = LARGE if o.requests_left is None else o.requests_left
-    whole = {
+    whole: dict[str, Any] = {
         **eyes.look(o),
         "has_target": np.int64(o.target is not None),
         "instruction": codes_of(o.instruction, layout.text),
@@ -174,7 +175,7 @@ class Numbers(gym.ObservationWrapper):
         size = len(self.observation(env.observation_space.sample()))
         self.observation_space = spaces.Box(-LARGE, LARGE, (size,), np.float32)
 
-    def observation(self, observation: dict[str, object]) -> np.ndarray:
+    def observation(self, observation: dict[str, Any]) -> np.ndarray:
         words = np.zeros(self._vocabulary, dtype=np.float32)
         for word in text_of(observation["instruction"]).lower().split():
             words[_stable(word) % self._vocabulary] += 1.0
