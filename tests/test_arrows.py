@@ -108,6 +108,7 @@ agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teac
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.locks embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
     embodied.tasks embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
+    embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
 agents.failures <- embodied.interface embodied.teachers agents.vision agents.hanna

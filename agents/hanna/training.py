@@ -12,6 +12,7 @@ had not been, and a run folder is continued by calling `train` on it again.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -86,26 +87,23 @@ def train(
       LockedError: another process trains in `folder`.
       CheckpointError, OSError.
     """
-    if parallel.rank() == 0:
-        with locked(folder):
-            return _train(agent, training, validation, teacher, folder, Session(minutes, note, on_validation))
-    return _train(agent, training, validation, teacher, folder, Session(minutes, parallel.one_voice(note)))
-
-
-@dataclass(frozen=True)
-class Session:
-    """One run of the program that trains an agent; a training may take several."""
-
-    minutes: float | None
-    note: Note
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None
+    note = parallel.one_voice(note)
+    with locked(folder) if parallel.rank() == 0 else contextlib.nullcontext():
+        return _train(agent, training, validation, teacher, Path(folder), minutes, note, on_validation)
 
 
 def _train(
-    agent: HannaAgent, training: Split, validation: Split, teacher: Teacher, folder: Path, session: Session
+    agent: HannaAgent,
+    training: Split,
+    validation: Split,
+    teacher: Teacher,
+    folder: Path,
+    minutes: float | None,
+    note: Note,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None,
 ) -> Progress:
     """See `train`; nobody else writes into `folder`."""
-    config, minutes, note = agent.config, session.minutes, session.note
+    config = agent.config
     optimizer = torch.optim.Adam(agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay)
     checkpoint = folder / "checkpoint.pt"
     progress = load_checkpoint(checkpoint, agent, optimizer) if checkpoint.exists() else Progress()
@@ -130,9 +128,7 @@ def _train(
                 last = progress.update == config.iterations
                 if parallel.rank() == 0 and (progress.update % config.validate_every == 0 or last):
                     with report.clock.on("validation"):
-                        progress = validate(
-                            agent, validation, progress, folder, report, now().seconds, session.on_validation
-                        )
+                        progress = validate(agent, validation, progress, folder, report, now().seconds, on_validation)
                 device = next(agent.network.parameters()).device
                 late = parallel.any_of_us(minutes is not None and time.monotonic() - began > 60 * minutes, device)
                 stopped = parallel.any_of_us(stop.is_set(), device)

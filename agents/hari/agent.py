@@ -6,18 +6,16 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-import safetensors
-import safetensors.torch
 import torch
 from torch import nn
 
 from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.words import FeatureWords
-from agents.tensor_file import read_weights
-from assets.cache import atomic_path
+from agents.tensor_file import load_tensors, save_tensors
 
-FORMAT = "embodied-hari-1"
+FORMAT, OLD_FORMAT = "embodied-hari-2", "embodied-hari-1"
+"""The older one has no checksum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,17 +98,12 @@ def _save(
     modules: dict[str, nn.Module], settings: dict[str, dict[str, object]], words: FeatureWords, path: Path
 ) -> None:
     about = {"format": FORMAT, "settings": json.dumps(settings), "names": json.dumps(words.names)}
-    tensors = {f"{n}.{k}": v.detach().contiguous() for n, m in modules.items() for k, v in m.state_dict().items()}
-    with atomic_path(Path(path)) as temporary:
-        safetensors.torch.save_file(tensors, temporary, metadata=about)
+    tensors = {f"{n}.{k}": v for n, m in modules.items() for k, v in m.state_dict().items()}
+    save_tensors(Path(path), tensors, about)
 
 
 def _load(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, dict], FeatureWords]:
-    tensors = read_weights(path)
-    with safetensors.safe_open(path, "pt") as f:
-        about = f.metadata() or {}
-    if about.get("format") != FORMAT:
-        raise ValueError(f"{path}: format {about.get('format')!r}, this version reads {FORMAT!r}; train it again")
+    tensors, about = load_tensors(path, (FORMAT, OLD_FORMAT), "train it again with `embodied train hari`")
     return tensors, json.loads(about["settings"]), FeatureWords(tuple(json.loads(about["names"])))
 
 

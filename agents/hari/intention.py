@@ -33,6 +33,7 @@ from embodied.envs.hari import shaped_costs
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, Move, Place, Task
+from embodied.locks import locked
 from embodied.tasks.goals import count_hops
 
 FORMAT = "embodied-hari-intention-1"
@@ -69,6 +70,7 @@ def train(
 
     Raises:
       DivergedError: a loss or gradient is not finite; the last checkpoint is intact.
+      LockedError: another process trains in `folder`.
       CheckpointError: the folder's run has other settings or another execution policy, or is damaged.
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
@@ -80,14 +82,17 @@ def train(
     write_json(folder / "settings.json", as_dict(config), indent=1)
     hops = {name: count_hops(p.graph.next_hop) for name, p in training.places.items()}
     seen: list[dict[str, float]] = []
-    with Session(
-        progress,
-        config.updates,
-        lambda p: run.save(folder / "checkpoint.pt", p),
-        minutes=minutes,
-        checkpoint_minutes=config.checkpoint_minutes,
-        note=note,
-    ) as session:
+    with (
+        locked(folder),
+        Session(
+            progress,
+            config.updates,
+            lambda p: run.save(folder / "checkpoint.pt", p),
+            minutes=minutes,
+            checkpoint_minutes=config.checkpoint_minutes,
+            note=note,
+        ) as session,
+    ):
         for update in session:
             seen.append(learn_once(run, training, hops, update))
             done, last = update + 1, update + 1 == config.updates

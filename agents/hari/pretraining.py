@@ -30,6 +30,7 @@ from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.interface import Description, FindObject, Move, Place, Pose, Task
+from embodied.locks import locked
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
@@ -75,6 +76,7 @@ def pretrain(
 
     Raises:
       TrainingError: the loss or a gradient is not finite; the last checkpoint is intact.
+      LockedError: another process trains in `folder`.
       CheckpointError: the folder's run has other settings or words, or is damaged.
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
@@ -88,9 +90,12 @@ def pretrain(
     def save(progress: Progress) -> None:
         _save(folder / "checkpoint.pt", executor, optimizer, progress)
 
-    with Session(
-        progress, config.iterations, save, minutes=minutes, checkpoint_minutes=config.checkpoint_minutes, note=note
-    ) as session:
+    with (
+        locked(folder),
+        Session(
+            progress, config.iterations, save, minutes=minutes, checkpoint_minutes=config.checkpoint_minutes, note=note
+        ) as session,
+    ):
         for update in session:
             seen.append(learn_once(executor, optimizer, lessons, update))
             done, last = update + 1, update + 1 == config.iterations

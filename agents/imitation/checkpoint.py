@@ -35,16 +35,21 @@ def read_checkpoint(path: Path, kind: str) -> dict[str, Any]:
     Raises:
       CheckpointError: truncated, changed, or of another kind or version.
     """
-    damage = f"{path}: cannot be read, it was cut short or changed; delete it to begin again"
+    wrong = None
     try:
-        with zipfile.ZipFile(path) as z:
-            if bad := z.testzip():  # torch does not look at the checksums itself
-                raise CheckpointError(f"{damage} ({bad} does not fit its checksum)")
-        body = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, CheckpointError):
+        with zipfile.ZipFile(path) as z:  # torch does not look at the checksums itself
+            if (bad := z.testzip()) is None:
+                body = torch.load(path, map_location="cpu", weights_only=True)
+            else:
+                wrong = f"{bad} does not fit its checksum"
+    except OSError:
         raise
-    except Exception as e:  # a truncated file raises one of half a dozen kinds
-        raise CheckpointError(f"{damage} ({e})") from e
+    except Exception as e:  # a damaged file raises one of half a dozen kinds
+        wrong = str(e)
+    if wrong is not None:
+        raise CheckpointError(
+            f"{path}: cannot be read ({wrong}); it was changed or cut short, delete it to begin again"
+        )
     if not isinstance(body, dict) or body.get("format") != kind:
         found = body.get("format") if isinstance(body, dict) else type(body).__name__
         raise CheckpointError(f"{path}: format {found!r}, this version reads {kind!r}; begin a new run")
