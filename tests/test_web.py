@@ -84,7 +84,7 @@ def test_usd_names_the_remedy_where_openusd_is_missing_and_holds_all_meshes_wher
     try:
         from pxr import Usd, UsdGeom
     except ImportError:
-        with pytest.raises(UnableError, match="pip install 'embodied\\[usd\\]'"):
+        with pytest.raises(UnableError, match="pip install 'embodied-houses\\[usd\\]'"):
             export_usd(two_rooms(), lit_pages(), tmp_path / "house.usdz")
         return
     with pytest.raises(ValueError, match=r"\.usdz"):

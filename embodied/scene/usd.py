@@ -1,6 +1,6 @@
 """A lit house as USDZ: its baked pages as what each surface gives off, with names, classes and rooms.
 
-Needs OpenUSD (`pip install embodied[usd]`). There is no maintained converter from glTF to USD for Python, so the stage
+Needs OpenUSD (`pip install embodied-houses[usd]`). There is no maintained converter from glTF to USD for Python, so the stage
 is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh says
 what it is, as the extras of the glTF do (embodied.scene.web).
 """
@@ -32,7 +32,7 @@ def export_usd(house: House, lit: LitPages, path: Path) -> Path:
     try:
         from pxr import Sdf, Usd, UsdGeom, UsdUtils
     except ImportError as e:
-        raise UnableError("USD needs OpenUSD; install it with: pip install 'embodied[usd]'") from e
+        raise UnableError("USD needs OpenUSD; install it with: pip install 'embodied-houses[usd]'") from e
     if Path(path).suffix != ".usdz":
         raise ValueError(f"{path} should end in .usdz: the house and its pages are one file")
     with tempfile.TemporaryDirectory() as folder:

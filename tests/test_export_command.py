@@ -1,0 +1,61 @@
+"""`embodied export`: what is written, and what wrong orders are told."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from test_datasets import build
+
+from agents.shipped import SHIPPED_ENCODER
+from agents.vision.encoder import load_encoder
+from agents.vision.features import feature_path, save_features
+from embodied import cli
+from embodied.datasets.folders import names_of
+from embodied.datasets.matterport import read_features
+
+
+@pytest.fixture
+def data(tmp_path):
+    return build(tmp_path / "data", tmp_path / "cache", "vln")
+
+
+def test_features_are_written_as_tsv_filled_up_to_the_length_that_programs_count_on(data, tmp_path, capsys):
+    encoder = load_encoder(SHIPPED_ENCODER)
+    made = {}
+    for name in names_of(data):
+        place = data.place(name)
+        made[name] = np.random.default_rng(1).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
+        path = feature_path(data.folder / "features", encoder.digest, name)
+        save_features(path, made[name], encoder, place.house.digest)
+    order = ["export", "r2r", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--features"]
+    assert cli.main([*order, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["program"] == "r2r" and told["readme"].endswith("README-embodied.md")
+    table = read_features(tmp_path / "out/img_features/ResNet-152-imagenet.tsv")
+    name = names_of(data)[0]
+    key = data.place(name).graph.ids[0]
+    row = table[name.replace("_", ""), key]
+    assert row.shape == (36, 2048) and not row[:, encoder.size :].any()
+    assert np.array_equal(row[:, : encoder.size], made[name][0].astype(np.float32))
+    assert cli.main([*order, "--pad", "8"]) == 2
+    assert "--pad is 8" in capsys.readouterr().err
+
+
+def test_missing_features_name_the_command_that_makes_them(data, tmp_path, capsys):
+    order = ["export", "iliad-nav", "--data", str(data.folder), "--out", str(tmp_path / "out")]
+    assert cli.main([*order, "--features"]) == 2
+    assert "embodied features" in capsys.readouterr().err
+    assert cli.main(order) == 0
+    assert "add --features" in capsys.readouterr().err
+
+
+def test_a_data_set_of_another_kind_is_refused(data, tmp_path, capsys):
+    assert cli.main(["export", "hanna", "--data", str(data.folder), "--out", str(tmp_path / "out")]) == 2
+    assert "reads data sets of kind 'hanna'" in capsys.readouterr().err
+
+
+def test_parquet_is_written(data, tmp_path):
+    assert cli.main(["export", "parquet", "--data", str(data.folder), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out/tasks/train.parquet").exists() and (tmp_path / "out/README.md").exists()
