@@ -8,12 +8,15 @@ they are computed once per pose and shared by all episodes.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from embodied.geometry import wrap
 from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, Candidates, Place, Pose
+
+if TYPE_CHECKING:
+    from embodied.navigation.graph import NavGraph
 
 WORDS = ("forward", "left", "right", "up", "down")
 """VNLA's moves, in the order of its candidates; stopping is an action of its own."""
@@ -61,7 +64,7 @@ class MonocularMoves:
         return reach
 
 
-def directions(graph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def directions(graph: NavGraph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Neighbours of `node`, ascending, and where they are seen: (n,) nodes, yaws and pitches in radians."""
     nodes = np.array(sorted(int(j) for j in graph.neighbours(node)), dtype=np.int64)
     offset = np.asarray(graph.positions)[nodes] - np.asarray(graph.positions)[node]
@@ -78,11 +81,11 @@ def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
 
 
 def bearing_order(bearing: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(n,) int64: candidates by |bearing|, those that differ by rounding alone by their node; exported files keep it."""
+    """(n,) int64: candidates by |bearing|, those that differ by rounding alone by node; exported files keep it."""
     return np.lexsort((nodes, np.round(np.abs(bearing), 9)))
 
 
-def panoramic_reach(graph, pose: Pose) -> Reach:
+def panoramic_reach(graph: NavGraph, pose: Pose) -> Reach:
     """Neighbours sorted by |bearing| from the agent's yaw (docs/sources.md, S2); the tilt does not matter."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)
@@ -95,7 +98,7 @@ def panoramic_reach(graph, pose: Pose) -> Reach:
     return candidates, poses
 
 
-def monocular_reach(graph, pose: Pose) -> Reach:
+def monocular_reach(graph: NavGraph, pose: Pose) -> Reach:
     """The five moves of WORDS; 'forward' keeps the camera's angles."""
     ahead = node_ahead(graph, pose)
     forward = pose if ahead is None else Pose(ahead, pose.turn, pose.tilt)
@@ -117,7 +120,7 @@ def monocular_reach(graph, pose: Pose) -> Reach:
     return candidates, poses
 
 
-def node_ahead(graph, pose: Pose) -> int | None:
+def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
     """The neighbour nearest the middle of the view among those within FIELD sideways, if any."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 
 TWO_PI = 2.0 * np.pi
 
 
-def wrap(angle):
+@overload
+def wrap(angle: float) -> np.float64: ...
+@overload
+def wrap(angle: np.ndarray) -> np.ndarray: ...
+def wrap(angle: float | np.ndarray) -> np.floating | np.ndarray:
     """Angle(s) brought into [-pi, pi)."""
     return (np.asarray(angle) + np.pi) % TWO_PI - np.pi
 
 
-def heading_of_yaw(yaw):
+@overload
+def heading_of_yaw(yaw: float) -> np.float64: ...
+@overload
+def heading_of_yaw(yaw: np.ndarray) -> np.ndarray: ...
+def heading_of_yaw(yaw: float | np.ndarray) -> np.floating | np.ndarray:
     """Matterport heading (clockwise from +y, in [0, 2 pi)) of a yaw (ccw from +x)."""
     return (np.pi / 2 - np.asarray(yaw)) % TWO_PI
 
 
-def yaw_of_heading(heading):
+@overload
+def yaw_of_heading(heading: float) -> np.float64: ...
+@overload
+def yaw_of_heading(heading: np.ndarray) -> np.ndarray: ...
+def yaw_of_heading(heading: float | np.ndarray) -> np.floating | np.ndarray:
     """Yaw (ccw from +x, in [-pi, pi)) of a Matterport heading (clockwise from +y)."""
     return wrap(np.pi / 2 - np.asarray(heading))
 
@@ -45,10 +59,3 @@ def rectangle(x: float, y: float, width: float, depth: float, yaw: float = 0.0) 
     """(4, 2) corners, counter-clockwise, of a rectangle centred at (x, y)."""
     half = np.array([[-width, -depth], [width, -depth], [width, depth], [-width, depth]]) / 2
     return half @ rotation(yaw).T + [x, y]
-
-
-def polygon_area(polygon) -> float:
-    """Signed area in square metres, positive for counter-clockwise corners (n, 2)."""
-    p = np.asarray(polygon, dtype=float)
-    q = np.roll(p, -1, axis=0)
-    return float(0.5 * np.sum(p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]))

@@ -15,6 +15,7 @@ import importlib.util
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from embodied.errors import UnableError
 
@@ -169,7 +170,7 @@ def make_current() -> None:
     owner.context.make_current()
 
 
-def _create(backend: str):
+def _create(backend: str) -> Any:
     _load_triton_first()
     try:
         if backend == "egl":

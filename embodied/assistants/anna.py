@@ -105,13 +105,13 @@ class _Home:
         key = (node, goals)
         if key not in self._best:
             here = self.enterable[node]
-            nearest = self.closest[np.ix_(here, list(goals))].min(axis=1)  # Eq 4.5
+            nearest = self.closest[np.ix_(here, np.array(goals))].min(axis=1)  # Eq 4.5
             winners = here[nearest <= nearest.min() + TIE]  # Eq 4.4
             self._best[key] = tuple(self.routes[i] for i in winners if self.routes[i].split == self.split)
         return self._best[key]
 
     def departure(self, path: tuple[int, ...], goals: tuple[int, ...]) -> tuple[int, int]:
         """v_depart (4.6), the first along the path of equals, and the goal g* nearest to it (4.7)."""
-        table = np.asarray(self.graph.distance)[np.ix_(path, goals)]
+        table = np.asarray(self.graph.distance)[np.ix_(np.array(path), np.array(goals))]
         depart = int(np.argmin(np.round(table.min(axis=1), 9)))
         return path[depart], goals[int(np.argmin(table[depart]))]

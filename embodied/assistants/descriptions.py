@@ -61,7 +61,7 @@ class Describer:
     def pretraining_goal(
         self, world: Place, node: int, start: int, object_class: str, *, rng: np.random.Generator
     ) -> Description:
-        """The goal description of a pre-training task (appendix E, second "For d_t^s", read as d_t^g: docs/sources.md, S57).
+        """The goal description of a pre-training task (appendix E, second "For d_t^s"; docs/sources.md, S57).
 
         Dense, or the target object and the room's name, each with probability 1/2; next to the goal
         or at it, the next action is a third possibility of 1/3.

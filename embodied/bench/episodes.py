@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 from assets.catalogue import Catalogue
@@ -12,7 +13,7 @@ from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
-from embodied.interface import Ask, Intention, Move, Task
+from embodied.interface import Ask, Intention, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
 
@@ -35,7 +36,7 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         asked = counts[1] / counts[0]
         yield measure(
             f"{kind} steps, {100 * asked:.0f} % requests",
-            lambda env=env, tasks=tasks: walk(env, tasks),
+            functools.partial(walk, env, tasks),
             "1/s",
             repeats=7,
             per=counts[0],
@@ -53,7 +54,7 @@ def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:
     """Play tasks by a fixed rule that asks at every fifth step where it can; (steps, requests) taken."""
     steps = requests = 0
     for task in tasks:
-        o = env.reset(task)
+        o: Observation | None = env.reset(task)
         while o is not None:
             help_wanted = o.can_ask and o.time % 5 == 4 and o.time_on_task
             action = Ask(o.can_ask[0] if o.can_ask[0] is Intention.HELP else o.can_ask[-1]) if help_wanted else _move(o)
@@ -63,6 +64,6 @@ def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:
     return steps, requests
 
 
-def _move(o) -> Move:
+def _move(o: Observation) -> Move:
     choice = o.time % len(o.candidates)
     return Move(choice if o.candidates.allowed[choice] else 1)

@@ -1,4 +1,4 @@
-"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk, and one picture sheet."""
+"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk, one sheet."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -25,6 +26,15 @@ from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.render.filament import Painter
 
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+
+HOUSES, VIEWS = 4, 3
+"""How many houses are compared, and rooms of each."""
+SIZE = (160, 240)
+"""Height and width of the pictures."""
+RAYS = 64
+"""Per pixel of the path-traced ways."""
 AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
 DRAWN = ("unlit", "normal", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
@@ -56,38 +66,26 @@ class Report:
 
 
 def compare(
-    catalogue,
-    cache: Path,
-    out: Path,
-    *,
-    seed: int = 1,
-    houses: int = 4,
-    views: int = 3,
-    settings: str = "normal",
-    size: tuple[int, int] = (160, 240),
-    rays: int = 64,
-    progress: Callable[[str], None] = lambda text: None,
+    catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
 ) -> Report:
-    """Draw `views` rooms of each of `houses` houses in every way, measure, write `out`/light.jpg and `out`/light.json.
+    """Draw VIEWS rooms of each of HOUSES houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Args:
-      houses: seeds from `seed` on, each at another time of day.
-      size: (height, width) of the pictures.
-      rays: per pixel of the path-traced ways.
+      seed: of the first house; the others have the next ones, each at another time of day.
     """
     shots: list[Shot] = []
     bakes: list[Bake] = []
     kinds: list[str] = []
-    for k in range(houses):
+    for k in range(HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
         house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
         progress(
             f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
         )
-        bakes.append(bake(house, catalogue, cache, settings))
-        chosen = viewpoints(house, catalogue, views, kinds)
+        bakes.append(bake(house, catalogue, cache, "normal"))
+        chosen = viewpoints(house, catalogue, VIEWS, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
-        shots += draw(house, catalogue, bakes[-1], chosen, size, rays)
+        shots += draw(house, catalogue, bakes[-1], chosen, SIZE, RAYS)
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
@@ -98,15 +96,19 @@ def compare(
     return Report(facts, table(facts))
 
 
-def viewpoints(house: House, catalogue, count: int, shown: Sequence[str] = ()) -> list[tuple[str, np.ndarray, float]]:
+def viewpoints(
+    house: House, catalogue: Catalogue, count: int, shown: Sequence[str] = ()
+) -> list[tuple[str, np.ndarray, float]]:
     """Rooms of different kinds: id, eye, and the yaw with the longest view.
 
     Args:
-      shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the largest.
+      shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the
+        largest.
     """
     graph = build_graph(house, catalogue)
     area = {r.id: abs(float(np.ptp(np.array(r.polygon), axis=0).prod())) for r in house.rooms}
-    found, kinds = [], set()
+    found: list[tuple[str, np.ndarray, float]] = []
+    kinds: set[str] = set()
     for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
         if not nodes or room.kind in kinds or len(found) == count:
@@ -120,7 +122,7 @@ def viewpoints(house: House, catalogue, count: int, shown: Sequence[str] = ()) -
 
 def draw(
     house: House,
-    catalogue,
+    catalogue: Catalogue,
     baked: Bake,
     views: Sequence[tuple[str, np.ndarray, float]],
     size: tuple[int, int],
@@ -187,7 +189,8 @@ def table(facts: dict) -> str:
     """The measures as Markdown."""
     number = lambda x, form: "" if x is None else format(x, form)
     lines = [
-        "| way | ms per 256 × 256 | PSNR / SSIM to reference | to diffuse reference | the same with mirrors and metal |",
+        "| way | ms per 256 × 256 | PSNR / SSIM to reference | to diffuse reference "
+        "| the same with mirrors and metal |",
         "|---|---|---|---|---|",
     ]
     for r in facts["rows"]:
@@ -197,7 +200,8 @@ def table(facts: dict) -> str:
         ]
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
     lines.append(
-        f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or metal; {facts['renderer']}. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
+        f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or "
+        f"metal; {facts['renderer']}. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
         f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
     )
     return "\n".join(lines)

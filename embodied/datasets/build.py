@@ -14,7 +14,7 @@ from pathlib import Path
 import joblib
 
 from assets.cache import digest, draft_prefix, write_bytes
-from assets.catalogue import load_catalogue
+from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
@@ -93,7 +93,7 @@ class UnitFacts:
 
 
 Watch = Callable[[Iterable[str], int], Iterable[str]]
-HouseMaker = Callable[[int, str, DatasetConfig, object], tuple[House, NavGraph]]
+HouseMaker = Callable[[int, str, DatasetConfig, Catalogue], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
 
 
@@ -217,7 +217,7 @@ def build_unit(
     return unit.name
 
 
-def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: object) -> tuple[House, NavGraph]:
+def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: Catalogue) -> tuple[House, NavGraph]:
     """The house `name` of a data set and its graph; a seed that gives no walkable house is passed over.
 
     Raises:
@@ -302,8 +302,8 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
             raise ValueError(f"{folder} holds another data set ({theirs}); this one is {mine}; choose another folder")
         if begun_by != program() and any(missing_units(config, folder)):
             raise ValueError(
-                f"{folder} was begun by another version of the program ({begun_by}, this is {program()}), whose houses and words "
-                "would not match; finish it with that version, or build it anew in another folder"
+                f"{folder} was begun by another version of the program ({begun_by}, this is {program()}), whose houses "
+                "and words would not match; finish it with that version, or build it anew in another folder"
             )
     else:
         if any(f.name != LOCK for f in folder.iterdir()):
@@ -312,7 +312,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
 
 
 def program() -> str:
-    """A digest of the code and the catalogue that make data sets: what one of them began, only the same one may finish."""
+    """A digest of the code and the catalogue that make data sets: what one began, only the same one may finish."""
     return code_digest(__name__)
 
 

@@ -20,7 +20,7 @@ from embodied.datasets.checks import (
     read_config,
     read_index,
 )
-from embodied.datasets.scale import Scale, scale
+from embodied.datasets.scale import Scale, SplitPlan, scale
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import environment_maker
@@ -236,7 +236,7 @@ class Dataset:
             lines.append(f"| {name} | {row.houses} | {row.tasks:,} | {row.routes:,} | {nodes:.0f} |")
         return "\n".join(lines) + "\n"
 
-    def _split(self, name: str):
+    def _split(self, name: str) -> SplitPlan:
         for split in self.scale.splits:
             if split.name == name:
                 return split
@@ -244,7 +244,11 @@ class Dataset:
 
     @functools.cache  # noqa: B019 - as above
     def _vnla_limits(self) -> dict[tuple[str, str], int]:
-        lengths = [(*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon) for t in self.tasks("train")]
+        lengths = [
+            (*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon)
+            for t in self.tasks("train")
+            if isinstance(t.goal, FindObject)  # as all of VNLA's are
+        ]
         return time_limits(lengths, VnlaConfig().most_actions)
 
     def _with_limit(self, task: Task, limits: Mapping[tuple[str, str], int]) -> Task:

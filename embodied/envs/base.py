@@ -8,6 +8,7 @@ does, what stopping does, and what may be asked.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from embodied.action_spaces import Moves, PanoramicMoves, Reach
 from embodied.interface import (
@@ -27,9 +28,12 @@ from embodied.interface import (
     Situation,
     Step,
     Stop,
+    Subtask,
     Task,
 )
 from embodied.seeds import stream
+
+T = TypeVar("T")
 
 
 class TaskError(ValueError):
@@ -76,12 +80,15 @@ class HelpEnv:
         check_task(task, self.worlds)
         self.task, self.seed, self.world = task, seed, self.worlds[task.world]
         self.pose = task.start
-        self.mode, self.instruction, self.target = Mode.MAIN, task.request, None
-        self.targets, self.subtask = task.goal_nodes, None
+        self.mode, self.instruction = Mode.MAIN, task.request
+        self.target: Sight | None = None
+        self.targets = task.goal_nodes
+        self.subtask: Subtask | None = None
         self.time = self.time_on_task = self.requests = 0
         self.budget = self._budget()
         self.ended = None
-        self._steps, self._trail = [], []
+        self._steps = []
+        self._trail: list[int] = []
         self._begin()
         return self._look()
 
@@ -102,7 +109,7 @@ class HelpEnv:
             self._moved()
         elif isinstance(action, Ask):
             rng = stream(self.seed, "assistant", self.task.id, self.time)
-            reply = self.assistant.answer(situation, action.intention, rng=rng)
+            reply = required(self.assistant, "assistant").answer(situation, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)
         else:
@@ -158,7 +165,8 @@ class HelpEnv:
     def _replied(self, reply: Reply) -> None:
         """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
         raise TypeError(
-            f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, or override _replied"
+            f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, "
+            "or override _replied"
         )
 
     def _stopped(self) -> None:
@@ -257,6 +265,17 @@ class HelpEnv:
                 )
         elif not isinstance(action, Stop):
             raise ActionError(f"expected Move, Ask or Stop, got {action!r}")
+
+
+def required(value: T | None, what: str) -> T:
+    """What a rule of play cannot do without.
+
+    Raises:
+      TypeError: it is not there; the assistant does not fit the rule.
+    """
+    if value is None:
+        raise TypeError(f"there is no {what}, which this rule of play needs; give the environment another assistant")
+    return value
 
 
 def check_task(task: Task, worlds: Mapping[str, Place]) -> None:

@@ -155,7 +155,9 @@ class Driver:
         way = float(np.linalg.norm(goal - origin))
         along = (goal - origin) / max(way, 1e-9)
         limit = 4.0 * (way / FASTEST + math.pi / TURNING) + PATIENCE
-        metres, bumps, touching = 0.0, [], frozenset()
+        metres = 0.0
+        bumps: list[str] = []
+        touching: frozenset[str] = frozenset()
         while self.data.time - start < limit:
             before = self.position
             distance = float(np.linalg.norm(goal - before))

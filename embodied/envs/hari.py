@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
-from embodied.envs.base import HelpEnv
+from embodied.envs.base import HelpEnv, required
 from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
 from embodied.tasks.goals import count_hops
 
@@ -110,16 +110,17 @@ class HariEnv(HelpEnv):
 
     def _replied(self, reply: Reply) -> None:
         """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
+        description = required(reply.description, "description in the reply")
         if reply.intention is Intention.CUR:
-            self._state = reply.description
+            self._state = description
         elif reply.intention is Intention.GOAL:
             top = self._goals[-1]
-            self._goals[-1] = StackedGoal(top.node, reply.description, top.patience)
+            self._goals[-1] = StackedGoal(top.node, description, top.patience)
         else:
-            target = reply.subtask.target
+            self.subtask = required(reply.subtask, "sub-task in the reply")
+            target = self.subtask.target
             patience = 3 * max(1, int(self.task_error(self.pose.node, target)))
-            self._goals.append(StackedGoal(target, reply.description, patience))
-            self.subtask = reply.subtask
+            self._goals.append(StackedGoal(target, description, patience))
         self._on_top()
 
     def _moved(self) -> None:

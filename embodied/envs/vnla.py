@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from embodied.action_spaces import WORDS, Reach, directions
-from embodied.envs.base import HelpEnv
+from embodied.envs.base import HelpEnv, required
 from embodied.geometry import wrap
 from embodied.interface import STEP, Action, Ask, Intention, Mode, Move, Observation, Pose, Reply, Situation, Stop
 from embodied.teachers.shortest import nearest
@@ -67,7 +67,7 @@ class DirectVnlaEnv(VnlaEnv):
 
     def _replied(self, reply: Reply) -> None:
         super()._replied(reply)
-        self._orders = reply.subtask.words
+        self._orders = required(reply.subtask, "sub-task in the reply").words
 
     def step(self, action: Action) -> Observation | None:
         """Like HelpEnv.step, but a move or stop is replaced while orders are pending; the Step says by what."""
@@ -83,8 +83,9 @@ class Algorithm6Env(HelpEnv):
     and stopping in a sub-task goes back to the request (the operator (+) of 4.1.3 overwrites)."""
 
     def _replied(self, reply: Reply) -> None:
-        self.mode, self.instruction, self.subtask = Mode.SUB, reply.text, reply.subtask  # lines 6-8
-        self.targets = (reply.subtask.target,)
+        self.mode, self.subtask = Mode.SUB, required(reply.subtask, "sub-task in the reply")
+        self.instruction = required(reply.text, "text in the reply")  # lines 6-8
+        self.targets = (self.subtask.target,)
         self.time_on_task = 0
 
     def _stopped(self) -> None:

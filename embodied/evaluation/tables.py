@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import stdtrit
 import scipy.stats
+from scipy.special import stdtrit
 
 from assets.cache import write_bytes
 from embodied.evaluation import metrics
@@ -179,7 +179,7 @@ def _number(x: float) -> float | None:
     return None if math.isnan(x) else float(np.round(x, 9))
 
 
-def save(rows: Sequence[Row], folder: Path, name: str) -> tuple[Path, Path, Path]:
+def save(rows: Sequence[Row], folder: Path, name: str) -> tuple[Path, ...]:
     """Write name.md, name.csv and name.json into `folder`."""
     folder = Path(folder)
     paths = tuple(folder / f"{name}{suffix}" for suffix in (".md", ".csv", ".json"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
-from embodied.house.house import DOORS, House, HouseError
+from embodied.house.house import DOORS, House, HouseError, Room
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
 RADIUS = 0.2
@@ -157,7 +158,7 @@ def reachable(house: House, storey: int) -> tuple[Grid, np.ndarray, np.ndarray]:
     return grid, room_of_cell, _largest_reach(grid, room_of_cell)
 
 
-def _rooms_of_cells(grid: Grid, rooms) -> np.ndarray:
+def _rooms_of_cells(grid: Grid, rooms: Sequence[Room]) -> np.ndarray:
     """(n,) index of the room each cell lies in; cells inside a wall's doorway belong to the nearest room."""
     room_of_cell = np.full(len(grid.xy), -1)
     for k, r in enumerate(rooms):
@@ -195,7 +196,7 @@ class Grid:
         self.clearance = (distance_transform_edt(padded)[1:-1, 1:-1] * CELL)[self.inside]
         self.matrix = self._matrix(space)
 
-    def _matrix(self, space) -> csr_matrix:
+    def _matrix(self, space: shapely.Geometry) -> csr_matrix:
         """Sparse 8-neighbour graph of the cells, dearer near obstacles; steps out of `space` are left out."""
         rows, cols, costs = [], [], []
         for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
@@ -217,8 +218,10 @@ class Grid:
         return csr_matrix((np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n))
 
 
-def _spread(space, grid: Grid, room_of_cell: np.ndarray, rooms, spacing: float) -> list[int]:
-    """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see others."""
+def _spread(
+    space: shapely.Geometry, grid: Grid, room_of_cell: np.ndarray, rooms: Sequence[Room], spacing: float
+) -> list[int]:
+    """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see more."""
     chosen: list[int] = []
     apart = APART * spacing
     order = sorted(range(len(rooms)), key=lambda k: (rooms[k].kind not in ("hall", "corridor", "stairwell"), k))
@@ -243,7 +246,7 @@ def _spread(space, grid: Grid, room_of_cell: np.ndarray, rooms, spacing: float) 
     return chosen
 
 
-def _seen(space, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
+def _seen(space: shapely.Geometry, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
     """(n,) how many chosen viewpoints, not too near, each cell sees."""
     if not chosen:
         return np.zeros(len(cells))
@@ -254,7 +257,9 @@ def _seen(space, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: floa
     return np.bincount(i[ok], np.minimum(d[i[ok], j[ok]] / spacing, 1.3), minlength=len(cells))
 
 
-def _thinned(space, grid: Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float) -> list[int]:
+def _thinned(
+    space: shapely.Geometry, grid: Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float
+) -> list[int]:
     """The nodes without those that crowd another one and that neither their room nor the graph needs."""
     xy = grid.xy[nodes]
     pairs = _visible_pairs(space, xy, LONGEST * spacing)
@@ -285,7 +290,7 @@ def _visible_pairs(space: shapely.Polygon, xy: np.ndarray, longest: float) -> np
 
 
 def _join(
-    house: House, storey: int, space, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float
+    house: House, storey: int, space: shapely.Geometry, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float
 ) -> list[int]:
     """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
     ids = {r.id for r in house.rooms if r.storey == storey}
@@ -320,12 +325,12 @@ def _join(
     raise HouseError("viewpoints could not be connected although the floor is; this is a defect of build_graph")
 
 
-def _components(space, xy: np.ndarray, longest: float) -> np.ndarray:
+def _components(space: shapely.Geometry, xy: np.ndarray, longest: float) -> np.ndarray:
     pairs = _visible_pairs(space, xy, longest)
     return connected_components(csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(xy), len(xy))), directed=False)[1]
 
 
-def _bridge(space, grid: Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
+def _bridge(space: shapely.Geometry, grid: Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
     """New cells along the cheapest way from the smallest component to the nearest other node."""
     sizes = np.bincount(label)
     small = int(np.argmin(sizes))
@@ -335,7 +340,7 @@ def _bridge(space, grid: Grid, nodes: list[int], label: np.ndarray, spacing: flo
     way = [int(others[np.argmin(cost[others])])]
     while way[-1] not in inside:
         way.append(int(before[way[-1]]))
-    added = []
+    added: list[int] = []
     at = 0
     while True:
         ends = np.arange(len(way) - 1, at, -1)

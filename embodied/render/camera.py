@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,13 +34,20 @@ class Camera:
     """Vertical field of view, radians."""
 
 
-def camera_at(position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2) -> Camera:
+def camera_at(
+    position: Sequence[float] | np.ndarray, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2
+) -> Camera:
     """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    return Camera(tuple(float(x) for x in position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
+    return Camera(_point(position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
 
 
-def face_cameras(position) -> list[Camera]:
+def face_cameras(position: Sequence[float] | np.ndarray) -> list[Camera]:
     """The cameras of the six cube faces, in the order of panorama.FACES."""
-    at = tuple(float(x) for x in position)
+    at = _point(position)
     return [Camera(at, forward, up) for forward, up in FACES]
+
+
+def _point(position: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+    x, y, z = position
+    return float(x), float(y), float(z)

@@ -7,6 +7,7 @@ behind walls, things outside the field of view) is left out of the list of geoms
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
 from embodied import gl
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 NEAR, FAR = 0.03, 200.0
 """Clipping planes, metres."""
 SUPERSAMPLING = 1.5
-"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper
-there than multi-sampling, which multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
+"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
+multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
@@ -106,7 +107,7 @@ class Renderer:
 
     def view(
         self,
-        position,
+        position: Sequence[float] | np.ndarray,
         yaw: float,
         pitch: float = 0.0,
         vfov: float = math.pi / 3,
@@ -132,7 +133,7 @@ class Renderer:
         self._choose(camera, size, True)
         return self._rgb(camera, size)
 
-    def panorama(self, position, size: int | None = None) -> Panorama:
+    def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
         rgb = np.empty((6, s, s, 3), np.uint8)
@@ -143,7 +144,7 @@ class Renderer:
             depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
         return Panorama(rgb, depth, ids)
 
-    def seen(self, position, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
+    def seen(self, position: Sequence[float] | np.ndarray, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
         depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
         for k, camera in enumerate(face_cameras(position)):
@@ -175,7 +176,8 @@ class Renderer:
         gl.make_current()
         mujoco.mjr_restoreBuffer(self._mjr)
         if any(n > b for n, b in zip(self._drawn_size(size), self._buffer, strict=True)):
-            self._buffer = tuple(max(n, b) for n, b in zip(self._drawn_size(size), self._buffer, strict=True))
+            height, width = self._drawn_size(size)
+            self._buffer = max(height, self._buffer[0]), max(width, self._buffer[1])
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
         mask = self._is_visual
         if cull:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied import gl
 
@@ -19,6 +20,10 @@ from assets.cache import atomic_path
 from embodied.scene import model as scene
 from embodied.scene.part import Part
 
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from assets.records import Asset
+
 COLUMNS, ROWS = 6, 4
 TILE, LABEL, INSET = 300, 44, 104
 """Pixels: side of a picture, height of its caption, side of the view from behind."""
@@ -28,7 +33,7 @@ FRONT, BACK, ELEVATION = 62.0, 242.0, -24.0
 """Azimuths and elevation of the cameras, degrees: three quarters from the front, and from behind."""
 
 
-def draw_sheets(catalogue, keys: Sequence[str], out: Path, *, surfaces: bool = False) -> tuple[Path, ...]:
+def draw_sheets(catalogue: Catalogue, keys: Sequence[str], out: Path, *, surfaces: bool = False) -> tuple[Path, ...]:
     """Write PNGs of 24 models each to the folder `out`, in the order of `keys`.
 
     A red arrow on the floor points where the front looks; the grid has 10 cm squares for small
@@ -46,7 +51,7 @@ def draw_sheets(catalogue, keys: Sequence[str], out: Path, *, surfaces: bool = F
     return tuple(paths)
 
 
-def sheet(catalogue, keys: Sequence[str], *, surfaces: bool = False) -> Image.Image:
+def sheet(catalogue: Catalogue, keys: Sequence[str], *, surfaces: bool = False) -> Image.Image:
     """One picture of up to 24 models."""
     model = _model(catalogue, keys, surfaces)
     data = mujoco.MjData(model)
@@ -71,7 +76,7 @@ def sheet(catalogue, keys: Sequence[str], *, surfaces: bool = False) -> Image.Im
     return page
 
 
-def _model(catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
+def _model(catalogue: Catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth = spec.visual.global_.offheight = TILE
     spec.visual.quality.shadowsize = 0
@@ -106,14 +111,14 @@ def _model(catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _measure(spec: mujoco.MjSpec, asset, x: float) -> None:
+def _measure(spec: mujoco.MjSpec, asset: Asset, x: float) -> None:
     """Grid, arrow and figure beside a model at `x`."""
     width, depth, _ = asset.size
     large = max(asset.size) > 0.6
     step, thin = (0.5, 0.004) if large else (0.1, 0.0008)
     nx, ny = math.ceil(width / 2 / step) + 1, math.ceil(depth / 2 / step) + 1
 
-    def box(pos, half, rgba):
+    def box(pos: Sequence[float], half: Sequence[float], rgba: Sequence[float]) -> None:
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=half, rgba=rgba, contype=0, conaffinity=0)
 
     for k in range(-nx, nx + 1):
@@ -128,7 +133,7 @@ def _measure(spec: mujoco.MjSpec, asset, x: float) -> None:
         box([figure[0], figure[1], 1.58], [0.09, 0.01, 0.12], [0.35, 0.45, 0.6, 1])
 
 
-def _picture(renderer: mujoco.Renderer, data: mujoco.MjData, i: int, asset, azimuth: float) -> Image.Image:
+def _picture(renderer: mujoco.Renderer, data: mujoco.MjData, i: int, asset: Asset, azimuth: float) -> Image.Image:
     camera = mujoco.MjvCamera()
     camera.lookat = [SPACING * i, 0.0, asset.size[2] / 2]
     camera.distance = 1.32 * float(np.linalg.norm(asset.size)) + 0.02

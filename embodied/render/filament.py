@@ -12,6 +12,8 @@ import ctypes
 import ctypes.util
 import functools
 import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from embodied import gl
 
@@ -26,6 +28,9 @@ from embodied.house.house import House
 from embodied.render.camera import Camera
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
 
 EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""
@@ -57,7 +62,7 @@ class VulkanError(UnableError):
 class Painter:
     """Draws the colours of one lit house. Owns its meshes and textures on the graphics side until `close`."""
 
-    def __init__(self, house: House, catalogue, lit: LitPages) -> None:
+    def __init__(self, house: House, catalogue: Catalogue, lit: LitPages) -> None:
         """Upload `lit`.
 
         Raises:
@@ -77,11 +82,11 @@ class Painter:
         self._lights.update(data)
         self._renderables.update(data)
         self._model, self._house = model, house
-        self._targets: dict[tuple[int, int], object] = {}
+        self._targets: dict[tuple[int, int], Any] = {}
         self._lights_of_room: dict[str, tuple] = {}
         self._room: str | None = None
 
-    def rgb(self, camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
+    def rgb(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
         """(h, w, 3) uint8 as an embodied.render.classic.Camera sees it, top row first."""
         room = room_at(self._house, camera.position)
         if room != self._room:
@@ -118,7 +123,7 @@ class Painter:
         self._scene.add_light(self._lights_of_room[room][0])
         self._room = room
 
-    def _draw(self, camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
+    def _draw(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
         mjrf = self._mjrf
         if size not in self._targets:
             config = mjrf.RenderTargetConfig(color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8)
@@ -151,11 +156,10 @@ class Painter:
         if self._room is not None:
             self._scene.remove_light(self._lights_of_room[self._room][0])
         for name in ("_lights_of_room", "_targets", "_renderables", "_lights", "_scene", "_resources"):
-            if hasattr(self, name):
-                delattr(self, name)
+            vars(self).pop(name, None)
 
 
-def emissive_model(house: House, catalogue, lit: LitPages) -> mujoco.MjModel:
+def emissive_model(house: House, catalogue: Catalogue, lit: LitPages) -> mujoco.MjModel:
     """The lit house with its pages as light sources, and a black, smooth coat over what is glossy."""
     spec = build_spec(house, catalogue, collisions=False, lit=lit)
     role = mujoco.mjtTextureRole
@@ -193,7 +197,7 @@ def _add_coats(spec: mujoco.MjSpec, lit: LitPages) -> None:
         geom.material = known[key]
 
 
-def room_at(house: House, position) -> str | None:
+def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
     """The room that `position` (x, y, z) is in; None outdoors."""
     at = shapely.Point(position[:2])
     for room in house.rooms:
@@ -211,7 +215,7 @@ def middle_of(house: House, room: str) -> tuple[float, float, float]:
 
 
 @functools.cache
-def _context(pid: int):
+def _context(pid: int) -> Any:
     """The process's one Filament context: a second one crashes."""
     if _context.cache_info().currsize:
         raise VulkanError("this process was forked from one that had opened Filament; start workers with 'spawn'")

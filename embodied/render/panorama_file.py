@@ -18,7 +18,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 import cv2
 import numpy as np
@@ -107,7 +107,12 @@ class PanoramaFile:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again"
             )
-        return cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+        if picture is None:
+            raise PanoramaFileError(
+                f"{self.path}: the {channel} of node {node} is no picture; delete the file, it is made again"
+            )
+        return picture
 
     def _data(self, node: int, channel: str) -> bytes | None:
         """The picture as a file, or None where it is damaged."""
@@ -174,7 +179,7 @@ def _apart(strip: np.ndarray) -> np.ndarray:
     return np.stack(np.split(strip, 6, axis=1))
 
 
-def _read_index(f, path: Path) -> dict:
+def _read_index(f: BinaryIO, path: Path) -> dict:
     end = f.seek(0, 2)
     f.seek(0)
     broken = f"{path} is no complete panorama file ({end} bytes); delete it, it is made again"

@@ -12,7 +12,7 @@ DRAWN = ("unlit", "fast", "normal")
 TRACED = ("glossy", "reference")
 """Qualities whose panoramas are ray-traced, from the viewpoints only."""
 BACKENDS = ("classic", "filament")
-"""Who draws colours: MuJoCo's OpenGL, or MuJoCo's Filament through Vulkan. Depth and ids are always the classic one's."""
+"""Who draws colours: MuJoCo's OpenGL, or its Filament through Vulkan. Depth and ids are always the classic one's."""
 SIZES = (8, 4096)
 """Smallest and largest side of a cube face, pixels."""
 
@@ -38,7 +38,7 @@ class PictureSettings:
         check_size(self.size)
         if self.backend == "filament" and self.quality not in ("fast", "normal"):
             raise ValueError(
-                f"backend 'filament' draws the qualities 'fast' and 'normal', not {self.quality!r}; use backend 'classic'"
+                f"backend 'filament' draws qualities 'fast' and 'normal', not {self.quality!r}; use backend 'classic'"
             )
         if self.light is not None and not self.lit:
             raise ValueError(f"quality {self.quality!r} is without light, so light={self.light!r} means nothing")

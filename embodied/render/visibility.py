@@ -7,7 +7,7 @@ what is left out is never missed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +52,7 @@ class Portals:
 
 def portals_of(house: House) -> Portals:
     """All openings of `house`, each once per side."""
-    of_room: dict[str, list[Portal]] = {r.id: [] for r in house.rooms} | {OUTDOORS: []}
+    of_room: dict[str, list[Portal]] = {name: [] for name in (*(r.id for r in house.rooms), OUTDOORS)}
     for o in house.openings:
         a, b, out = np.array(o.a), np.array(o.b), _outward(house, o)
         first, second = o.rooms[0], o.rooms[1] or OUTDOORS
@@ -73,7 +73,7 @@ def _outward(house: House, o: Opening) -> np.ndarray:
     return -normal if shapely.Polygon(house.room_by_id[o.rooms[0]].polygon).contains(shapely.Point(probe)) else normal
 
 
-def room_at(house: House, position) -> str | None:
+def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
     """The room that the point (x, y, z) is in; None outdoors."""
     for room in house.rooms:
         storey = house.storey_of(room)
@@ -83,7 +83,9 @@ def room_at(house: House, position) -> str | None:
     return None
 
 
-def visible_rooms(house: House, portals: Portals, position) -> dict[str, list[Sector]] | None:
+def visible_rooms(
+    house: House, portals: Portals, position: Sequence[float] | np.ndarray
+) -> dict[str, list[Sector]] | None:
     """Rooms that may be seen from `position`, each with the directions in which it may be seen.
 
     Returns:

@@ -203,7 +203,8 @@ def grid_boxes(
     lows, highs = lows.reshape(*shape, 3), highs.reshape(*shape, 3)
     occupied = np.isfinite(lows[..., 0])
     filled = ndimage.binary_fill_holes(occupied)
-    snap, boxes = 0.25 * (high - low) / counts, []
+    snap = 0.25 * (high - low) / counts
+    boxes: list[tuple[np.ndarray, np.ndarray]] = []
     for x, y, z in np.argwhere(filled).tolist():
         if not filled[x, y, z]:
             continue

@@ -6,6 +6,7 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -19,12 +20,15 @@ from embodied.scene.house_meshes import Part, house_parts
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec, load_texture
 
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+
 MESHES, TEXTURES = "meshes", "textures"
 """Folders beside house.xml."""
 
 
 def export_mjcf(
-    house: House, catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None
+    house: House, catalogue: Catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None
 ) -> Path:
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer as it is.
 
@@ -63,7 +67,7 @@ def _png(image: np.ndarray) -> bytes:
     return cv2.imencode(".png", cv2.cvtColor(image, order))[1].tobytes()
 
 
-def export_glb(house: House, catalogue, path: Path, *, ceilings: bool = True) -> Path:
+def export_glb(house: House, catalogue: Catalogue, path: Path, *, ceilings: bool = True) -> Path:
     """Write the house as one binary glTF file with its textures; y is up there, as the format asks.
 
     Every node is named after its owner: a placement id, or '<room>/floor' and the like.
@@ -125,7 +129,8 @@ def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
 def _picture(path: str) -> PIL.Image.Image:
     image = PIL.Image.fromarray(load_texture(path))
     buffer = io.BytesIO()
-    image.save(
-        buffer, *(("PNG",) if image.mode == "RGBA" else ("JPEG",)), **({} if image.mode == "RGBA" else {"quality": 90})
-    )
+    if image.mode == "RGBA":
+        image.save(buffer, "PNG")
+    else:
+        image.save(buffer, "JPEG", quality=90)
     return PIL.Image.open(buffer)

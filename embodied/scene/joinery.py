@@ -124,7 +124,7 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
     o = hole.opening
     first = house.room_by_id[o.rooms[0]]
     second = house.room_by_id[o.rooms[1]] if o.rooms[1] is not None else first
-    strip = hole.world(quads([[(0, y0, 0), (hole.length, y0, 0), (hole.length, y1, 0), (0, y1, 0)]]))
+    strip = hole.world(quads(np.array([[(0, y0, 0), (hole.length, y0, 0), (hole.length, y1, 0), (0, y1, 0)]])))
     strip = Shape(strip.vertices, strip.faces, strip.normals, strip.vertices[:, :2].copy())
     owner = f"{o.id}/threshold"
     parts = [
@@ -184,13 +184,13 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
     outer, sash = 0.045, 0.055
     count = max(1, min(6, round(w / (0.85 if french else 0.95))))
     bars = stream(house.seed, "joinery", "bars").random() < 0.3
-    frame = _ring(0, w, z0, z1, outer, y0, y1, 0.0)
+    frame = _ring(0, w, z0, z1, outer, (y0, y1), 0.0)
     cells = np.linspace(outer, w - outer, count + 1)
     panes, handles = [], []
     for i in range(count):
         x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
         b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
-        frame += _ring(x0, x1, b0, b1, sash, y0 + 0.012, y1 + 0.012, 0.006, low=0.12 if french else sash)
+        frame += _ring(x0, x1, b0, b1, sash, (y0 + 0.012, y1 + 0.012), 0.006, low=0.12 if french else sash)
         gx0, gx1, gz0, gz1 = (
             x0 + sash - 0.006,
             x1 - sash + 0.006,
@@ -198,7 +198,7 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
             b1 - sash + 0.006,
         )
         ym = (y0 + y1) / 2
-        pane = quads([[(gx1, ym, gz0), (gx0, ym, gz0), (gx0, ym, gz1), (gx1, ym, gz1)]])
+        pane = quads(np.array([[(gx1, ym, gz0), (gx0, ym, gz0), (gx0, ym, gz1), (gx1, ym, gz1)]]))
         panes.append(two_sided(pane))
         if bars:
             for k in range(1, max(1, round((gz1 - gz0) / 0.5))):
@@ -220,12 +220,12 @@ def _ring(
     z0: float,
     z1: float,
     width: float,
-    y0: float,
-    y1: float,
+    depth: tuple[float, float],
     bevel: float,
     low: float | None = None,
 ) -> list[Shape]:
-    """Four boards around a rectangle; `low` is the height of the bottom one."""
+    """Four boards around a rectangle, from depth[0] to depth[1]; `low` is the height of the bottom one."""
+    y0, y1 = depth
     low = width if low is None else low
     return [
         box([x0, y0, z0], [x0 + width, y1, z1], bevel),
@@ -309,8 +309,8 @@ def _casing(hole: _Hole, y: float, side: float) -> list[Shape]:
     for (a, ya), (b, yb) in itertools.pairwise(lines):
         for k in range(3):
             quad = [(a[k], ya), (b[k], yb), (b[k + 1], yb), (a[k + 1], ya)]
-            quad = [(x, y + side * depth, z) for (x, z), depth in quad]
-            corners.append(quad if side > 0 else quad[::-1])
+            placed = [(x, y + side * depth, z) for (x, z), depth in quad]
+            corners.append(placed if side > 0 else placed[::-1])
     return [_grain_up(quads(np.asarray(corners, float)))]
 
 
@@ -379,7 +379,7 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
         for x0, x1 in columns:
             if style == "glazed" and r == 1:
                 ym = -thick / 2
-                panes.append(two_sided(quads([[(x1, ym, z0), (x0, ym, z0), (x0, ym, z1), (x1, ym, z1)]])))
+                panes.append(two_sided(quads(np.array([[(x1, ym, z0), (x0, ym, z0), (x0, ym, z1), (x1, ym, z1)]]))))
             else:
                 shapes.append(_panel(x0, x1, z0, z1, thick))
     return joined(*shapes), joined(*panes) if panes else None

@@ -28,7 +28,7 @@ class LitMesh:
     alpha: float = 1.0
     """Opacity; below 1 for glass and sheer curtains."""
     gloss: tuple[float, float] | None = None
-    """Mean roughness and specular (0.5 is F0 = 0.04, 0 reflects nothing) over its area; None: unknown, taken as matte."""
+    """Mean roughness and specular (0.5 is F0 = 0.04, 0 reflects nothing) over its area; None: unknown, so matte."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from embodied import gl
 
@@ -28,6 +29,9 @@ from embodied.scene import collision
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.shell import shell_parts
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
 
 VISUAL, COLLISION = 2, 3
 """Geom groups."""
@@ -63,7 +67,12 @@ class Scene:
 
 
 def compile_scene(
-    house: House, catalogue, *, free: Iterable[str] = (), collisions: bool = True, lit: LitPages | None = None
+    house: House,
+    catalogue: Catalogue,
+    *,
+    free: Iterable[str] = (),
+    collisions: bool = True,
+    lit: LitPages | None = None,
 ) -> Scene:
     """Build and compile `house`.
 
@@ -107,7 +116,7 @@ def owner_of_name(geom: str) -> str:
     return geom.rpartition("#")[0]
 
 
-def loose(house: House, catalogue) -> frozenset[str]:
+def loose(house: House, catalogue: Catalogue) -> frozenset[str]:
     """The placements that physics can move: all that stand or lie, not what is fixed to the house or underfoot."""
     return frozenset(
         p.id
@@ -128,7 +137,7 @@ def is_underfoot(p: Placement) -> bool:
 
 def build_spec(
     house: House,
-    catalogue,
+    catalogue: Catalogue,
     *,
     free: frozenset[str] = frozenset(),
     collisions: bool = True,
@@ -316,7 +325,8 @@ class _Looks:
         alpha = float(finish.color[3])
         if finish.texture:
             return self._materials[key], (1.0, 1.0, 1.0, alpha)
-        return self._materials[key], (*(float(c) for c in finish.color[:3]), alpha)
+        red, green, blue = (float(c) for c in finish.color[:3])
+        return self._materials[key], (red, green, blue, alpha)
 
     def _texture(self, path: str) -> str:
         if path not in self._textures:
@@ -374,7 +384,9 @@ def _add_pages(spec: mujoco.MjSpec, lit: LitPages) -> None:
             )
 
 
-def _add_collisions(spec: mujoco.MjSpec, house: House, catalogue, bodies: Mapping[str, mujoco.MjsBody]) -> None:
+def _add_collisions(
+    spec: mujoco.MjSpec, house: House, catalogue: Catalogue, bodies: Mapping[str, mujoco.MjsBody]
+) -> None:
     for room in house.rooms:
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
         for i in range(len(room.polygon)):
@@ -406,7 +418,7 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
             )
 
 
-def placement_boxes(catalogue, p: Placement) -> tuple[collision.Box, ...]:
+def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.Box, ...]:
     """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
     asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
     cache = getattr(catalogue, "cache", None)

@@ -116,8 +116,7 @@ def _hedges(x0: float, y0: float, x1: float, y1: float, *, rng: np.random.Genera
     """Clipped hedges around the plot, with an uneven face."""
     made = []
     sides = [((x0, y0), (x1, y0)), ((x1, y0), (x1, y1)), ((x1, y1), (x0, y1)), ((x0, y1), (x0, y0))]
-    for a, b in sides:
-        a, b = np.asarray(a), np.asarray(b)
+    for a, b in np.array(sides):
         d = (b - a) / np.linalg.norm(b - a)
         n = np.array([-d[1], d[0]])
         count = int(np.linalg.norm(b - a) / 0.9)
@@ -175,7 +174,7 @@ def _tree(height: float, *, rng: np.random.Generator) -> tuple[Shape, Shape]:
         s = ball(1.0, 14, 9)
         v = s.vertices * (1 + 0.10 * np.sin(5 * s.vertices[:, :1] + i) * np.cos(4 * s.vertices[:, 1:2] - i))
         crown.append(Shape(v * size * [1.1, 1.1, 0.9] + at, s.faces, s.normals, s.uv * size * 1.2))
-        trunk.append(tube([(0, 0.03, height * 0.45), at], [0.05, 0.02], 5))
+        trunk.append(tube([(0, 0.03, height * 0.45), tuple(at)], [0.05, 0.02], 5))
     return joined(*trunk), joined(*crown)
 
 

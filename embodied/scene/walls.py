@@ -81,10 +81,10 @@ def wall_face(
             faces += [[a, a + 1, b + 1], [a, b + 1, b]]
     grid_s, grid_z = (x.reshape(-1) for x in np.meshgrid(s, z, indexing="ij"))
     vertices = np.column_stack([p + grid_s[:, None] * d, grid_z])
-    used, faces = np.unique(np.asarray(faces), return_inverse=True)
+    used, corners = np.unique(np.asarray(faces), return_inverse=True)
     normals = np.tile([-d[1], d[0], 0.0], (len(used), 1))
     uv = np.column_stack([-(along + grid_s), grid_z])[used]
-    return Shape(vertices[used], faces.reshape(-1, 3), normals, uv)
+    return Shape(vertices[used], corners.reshape(-1, 3), normals, uv)
 
 
 def floor_turn(house: House) -> bool:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Situation, Step, Stop
 from embodied.teachers.shortest import nearest, shortest_action
+
+if TYPE_CHECKING:
+    from embodied.navigation.graph import NavGraph
 
 GAMMA = 0.25
 """Uncertainty threshold (Table D.1)."""
@@ -86,7 +90,7 @@ class HannaTeacher:
                 past[_chosen(step)] = None
         return tuple(labels)
 
-    def _lost_in(self, segment: Sequence[Step], graph) -> list[bool]:
+    def _lost_in(self, segment: Sequence[Step], graph: NavGraph) -> list[bool]:
         nodes = [s.pose.node for s in segment]
         if isinstance(segment[-1].action, Move):  # cut short: where it ended counts too
             nodes.append(segment[-1].next_pose.node)

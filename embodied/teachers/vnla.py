@@ -205,7 +205,9 @@ class VnlaTeacher:
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         """Labels of a finished episode; the thought at an Ask step is what its policy was about to do."""
-        labels, trail, time, requests = [], [], 0, 0
+        labels: list[Label] = []
+        trail: list[int] = []
+        time = requests = 0
         for step in episode.steps:
             if len(trail) <= time:
                 trail.append(step.pose.node)
