@@ -167,6 +167,7 @@ def make_current() -> None:
     if owner.context is None:
         owner.context, owner.pid = _create(choose()), os.getpid()
         atexit.register(release)
+    assert owner.context is not None
     owner.context.make_current()
 
 

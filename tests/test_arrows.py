@@ -63,10 +63,10 @@ embodied.gl <-
 embodied.locks <-
 embodied.house <- assets.materials assets.catalogue
 embodied.navigation <- embodied.house
-embodied.scene <- embodied.gl assets.built embodied.house
+embodied.scene <- assets.catalogue embodied.gl assets.built embodied.house
 embodied.generate <- assets.catalogue embodied.house embodied.navigation
 embodied.interface <- assets.catalogue embodied.house embodied.navigation
-embodied.action_spaces <- embodied.interface
+embodied.action_spaces <- embodied.navigation embodied.interface
 embodied.language <- assets.catalogue embodied.interface
 embodied.records <- embodied.interface
 embodied.render <- embodied.gl assets.catalogue embodied.house embodied.scene embodied.interface

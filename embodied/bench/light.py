@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes.util
+import functools
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -137,7 +138,7 @@ def draw(
             with Renderer(house, catalogue, lit=lit, painter=painter) as r:
                 for room, eye, yaw in views:
                     rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
-                    ms = _median_ms(lambda at=eye, to=yaw, by=r: by.rgb(camera_at(at, to), (256, 256)))
+                    ms = _median_ms(functools.partial(r.rgb, camera_at(eye, yaw), (256, 256)))
                     shots.append(Shot(room, house.sky.hour, way, rgb, ms))
         else:
             tracer = Tracer(baked, house, quality=way, rays=16 if way == "glossy" else rays)
@@ -180,7 +181,7 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
         "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
         "disk_mb": float(np.median(pages)),
         "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
-        "shiny": float(np.mean([1 - by[*v, "diffuse"].plain.mean() for v in views])),
+        "shiny": float(np.mean([1 - np.mean(by[*v, "diffuse"].plain) for v in views])),
         "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
     }
 
@@ -239,7 +240,7 @@ def psnr(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float
     """
     a, b = (gaussian_filter(x.astype(float), (1, 1, 0)) for x in (a, b))
     off = np.mean((a - b) ** 2, axis=-1)
-    return float(10 * np.log10(255**2 / max(np.mean(off if where is None else off[where]), 1e-9)))
+    return float(10 * np.log10(255**2 / max(float(np.mean(off if where is None else off[where])), 1e-9)))
 
 
 def ssim(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float:

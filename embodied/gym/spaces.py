@@ -54,7 +54,7 @@ def action_space(layout: Layout) -> spaces.Discrete:
 
 def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
     """Everything an Observation holds, padded with zeros, and what the eyes see."""
-    whole = {
+    whole: dict[str, Any] = {
         **eyes.spaces(),
         "has_target": spaces.Discrete(2),
         "instruction": spaces.Box(0, 255, (layout.text,), np.uint8),

@@ -99,7 +99,9 @@ def build_graph(house: House, catalogue: object | None = None, spacing: float = 
     Raises:
       HouseError: a room that cannot be entered on foot.
     """
-    positions, rooms, edges = [], [], []
+    positions: list[tuple[float, float, float]] = []
+    rooms: list[str] = []
+    edges: list[tuple[int, int]] = []
     for storey in range(len(house.storeys)):
         xy, room, pairs = _storey_graph(house, storey, spacing)
         edges += [(a + len(positions), b + len(positions)) for a, b in pairs]
