@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
-LIGHTS = {"fast": "draft"}
-"""Light settings by the name of a picture's light, where embodied.light calls them otherwise."""
 log = logging.getLogger(__name__)
 
 
@@ -130,7 +128,7 @@ class World:
             from embodied import light  # late: loads the path tracer
 
             name = self.pictures.lit_by or "normal"
-            work = functools.partial(light.bake, self.house, self.catalogue, self.cache, LIGHTS.get(name, name))
+            work = functools.partial(light.bake, self.house, self.catalogue, self.cache, name)
             if progress:
                 with light.progress_bar() as tell:
                     self._bake = work(progress=tell)

@@ -64,7 +64,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         )
         sub.add_argument("--out", type=any_path, required=True, metavar="PATH", help="file to write (mjcf: folder)")
         sub.add_argument(
-            "--light", choices=("none", "draft", "normal"), default="normal",
+            "--light", choices=("none", "fast", "normal", "high"), default="normal",
             help="bake light of this quality into it, or leave its materials as they are (default: %(default)s)",
         )  # fmt: skip
         if name == "glb":

@@ -1,7 +1,8 @@
 """Light a generated house once, so that looking at it is fast and photo-realistic.
 
 Bakes global illumination (sky, sun and lamps, several bounces) into textures, kept in the cache
-under the house's digest. Stopped bakes go on where they were.
+under the house's digest. Stopped bakes go on where they were. With --lights the house is lit at other hours, too, at
+a part of the price: lights.json in its folder lists them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 import dataclasses
 from typing import TYPE_CHECKING
 
+from assets.cache import write_json
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 from embodied.cli.options import any_path
 
@@ -27,7 +29,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--weather", choices=("clear", "hazy", "overcast"), help="written into house.json")
     parser.add_argument("--lamps", choices=("on", "off"), help="switch all lamps; written into house.json")
-    parser.add_argument("--draft", action="store_true", help="coarser and several times faster")
+    parser.add_argument(
+        "--quality", choices=("fast", "normal", "high"), default="normal",
+        help="fast for data sets, normal for looking, high for single pictures (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--lights", type=int, default=1, metavar="K",
+        help="light it K times: as it is, and with hour, weather and lamps drawn from its seed (default: %(default)s)",
+    )  # fmt: skip
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -35,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied.house.validation import load_house
-    from embodied.light import bake, progress_bar
+    from embodied.light import bake_all, lightings_of, progress_bar
 
     path = args.folder / "house.json"
     catalogue = catalogue_of(args)
@@ -43,17 +52,22 @@ def run(args: argparse.Namespace) -> int:
     changed = with_sky(house, args.time, args.weather, args.lamps)
     if changed.digest != house.digest:
         changed.save(path)
+    if args.lights < 1:
+        raise ValueError(f"--lights should be 1 or more, got {args.lights}")
+    lightings = lightings_of(changed, args.lights)
     with progress_bar() as progress:
-        result = bake(changed, catalogue, args.cache, "draft" if args.draft else "normal", progress=progress)
-    facts = {
-        "house": changed.digest,
-        "hour": changed.sky.hour,
-        "weather": changed.sky.weather,
-        "light": result.manifest["key"],
-        "seconds": result.manifest["total_seconds"],
-        "check": result.manifest["check"],
-    }
-    show(args, facts, f"{changed.name} is lit at {changed.sky.hour:g} h, {changed.sky.weather}")
+        bakes = bake_all(lightings, catalogue, args.cache, args.quality, progress=progress)
+    facts = [
+        {"house": h.digest, "hour": h.sky.hour, "weather": h.sky.weather, "lamps": sum(x.on for x in h.lights)}
+        | {"quality": args.quality, "light": b.manifest["key"], "seconds": b.manifest["total_seconds"]}
+        | {"processor_seconds": b.manifest["processor_seconds"], "check": b.manifest["check"]}
+        for h, b in zip(lightings, bakes)
+    ]
+    if args.lights > 1:
+        sky = lambda h: dataclasses.asdict(h.sky) | {"on": [x.id for x in h.lights if x.on]}
+        write_json(args.folder / "lights.json", [sky(h) | f for h, f in zip(lightings, facts)], indent=1)
+    text = "; ".join(f"{h.sky.hour:g} h, {h.sky.weather}" for h in lightings)
+    show(args, facts[0] if args.lights == 1 else {"lights": facts}, f"{changed.name} is lit at {text}")
     return 0
 
 

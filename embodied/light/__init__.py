@@ -4,6 +4,8 @@ from embodied.light.backend import LightError as LightError
 from embodied.light.baking import Bake as Bake
 from embodied.light.baking import StaleBake as StaleBake
 from embodied.light.baking import bake as bake
+from embodied.light.baking import bake_all as bake_all
+from embodied.light.baking import lightings_of as lightings_of
 from embodied.light.baking import open_bake as open_bake
 from embodied.light.baking import progress_bar as progress_bar
 from embodied.light.settings import QUALITIES as QUALITIES

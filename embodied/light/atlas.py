@@ -10,13 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
-from embodied.light.backend import drjit, mitsuba, scene_of
-from embodied.light.unwrap import Unwrapped, areas_of, cached_model, face_normals, pack, unwrap_planes
+from embodied.light.unwrap import Unwrapped, areas_of, cached_model, pack, unwrap_planes
 
 SHELL = ("wall", "floor", "ceiling")
 
@@ -72,25 +70,6 @@ class Atlas:
     kinds: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Texels:
-    """What lies under the covered texels of one page; n of them."""
-
-    index: np.ndarray
-    """(n,) int64, row * width + column."""
-    position: np.ndarray
-    """(n, 3) float32, metres, world."""
-    normal: np.ndarray
-    """(n, 3) float32, unit, shading."""
-    face_normal: np.ndarray
-    face: np.ndarray
-    """(n,) int32, face of the page."""
-    weights: np.ndarray
-    """(n, 3) float32 barycentric."""
-    shape: tuple[int, int]
-    """Height and width of the page in these texels."""
-
-
 def things_of(
     parts: Sequence,
     *,
@@ -98,6 +77,7 @@ def things_of(
     budget: float,
     cache: Path,
     finest: int = 8,
+    sharpness: float = 1.0,
     progress: Callable[[int, int], None] = lambda i, n: None,
 ) -> tuple[Thing, ...]:
     """Group parts by owner and unwrap each; furniture from the cache.
@@ -107,6 +87,7 @@ def things_of(
       density: luxels per metre of walls, floors and ceilings.
       budget: luxels per piece of furniture.
       finest: texels per luxel at most.
+      sharpness: of patterns, 1 to look sharp from nearby.
     """
     groups: dict[tuple, list] = {}
     for p in parts:
@@ -123,7 +104,15 @@ def things_of(
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
             things.append(
-                Thing(owner, room, kind, flat, finishes, min(finest, _fineness(kind, flat, finishes, density)), glass)
+                Thing(
+                    owner,
+                    room,
+                    kind,
+                    flat,
+                    finishes,
+                    min(finest, _fineness(kind, flat, finishes, density, sharpness)),
+                    glass,
+                )
             )
     return tuple(things)
 
@@ -181,118 +170,6 @@ def _sheet(sizes: np.ndarray, places: np.ndarray) -> int:
     return int((places + sizes).max(0).prod())
 
 
-OFFSETS = (
-    (0.0, 0.0),
-    (-0.3, -0.3),
-    (0.3, 0.3),
-    (-0.3, 0.3),
-    (0.3, -0.3),
-    (0.0, 0.47),
-    (0.0, -0.47),
-    (0.47, 0.0),
-    (-0.47, 0.0),
-    (0.45, 0.45),
-    (-0.45, -0.45),
-    (0.45, -0.45),
-    (-0.45, 0.45),
-    (0.15, -0.15),
-    (-0.15, 0.15),
-)
-"""Where in a texel a face is looked for, one after the other: slivers that miss all centres still get texels of their own."""
-
-
-def rasterise(page: Page, fineness: int) -> Texels:
-    """What lies under each texel, found by shooting rays straight down on the layout; centres first."""
-    w, h = page.width * fineness, page.height * fineness
-    flat = np.concatenate([page.luxels * fineness, np.zeros((*page.luxels.shape[:2], 1), np.float32)], axis=-1)
-    scene = scene_of(flat)
-    face, b1, b2 = np.full(w * h, -1, np.int32), np.zeros(w * h, np.float32), np.zeros(w * h, np.float32)
-    left = np.arange(w * h)
-    for dx, dy in OFFSETS:
-        hit, f, u, v = _straight_down(scene, left % w + 0.5 + dx, left // w + 0.5 + dy)
-        face[left[hit]], b1[left[hit]], b2[left[hit]] = f[hit], u[hit], v[hit]
-        left = left[~hit]
-    index = np.nonzero(face >= 0)[0]
-    face = face[index]
-    weights = np.stack([1 - b1[index] - b2[index], b1[index], b2[index]], axis=1)
-    normal = mix(weights, page.normals, face)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
-    flat_normal = face_normals(page.corners).astype(np.float32)[face]
-    return Texels(index, mix(weights, page.corners, face), normal, flat_normal, face, weights, (h, w))
-
-
-def _straight_down(scene, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Whether a face lies under (x, y), which, and where on it."""
-    mi, dr = mitsuba(), drjit()
-    above = mi.Point3f(mi.Float(np.asarray(x, np.float32)), mi.Float(np.asarray(y, np.float32)), 1.0)
-    hit = scene.ray_intersect_preliminary(mi.Ray3f(above, mi.Vector3f(0, 0, -1)), True)
-    u, v, f, ok = hit.prim_uv.x, hit.prim_uv.y, hit.prim_index, hit.is_valid()
-    dr.eval(u, v, f, ok)
-    return np.asarray(ok), np.asarray(f).astype(np.int32), np.asarray(u), np.asarray(v)
-
-
-def nearest(mask: np.ndarray) -> np.ndarray:
-    """(h, w) int64: flat position of the nearest true pixel of a mask that has any."""
-    _, labels = cv2.distanceTransformWithLabels(
-        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    at = np.zeros(int(labels.max()) + 1, np.int64)
-    flat = np.nonzero(mask.ravel())[0]
-    at[labels.ravel()[flat]] = flat
-    return at[labels]
-
-
-def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:
-    """Barycentric mean of per-corner values (m, 3, c) at n points: (n, c) float32."""
-    values = corners[face]
-    return (weights[:, :1] * values[:, 0] + weights[:, 1:2] * values[:, 1] + weights[:, 2:] * values[:, 2]).astype(
-        np.float32
-    )
-
-
-def albedo(page: Page, texels: Texels, read: Callable[[str], np.ndarray]) -> np.ndarray:
-    """(n, 3) float32 linear reflectance under each texel, kept inside [0.02, 0.88].
-
-    Args:
-      read: colour map by path as (h, w, 3) uint8 sRGB.
-    """
-    out = np.zeros((len(texels.face), 3), np.float32)
-    which = page.finish[texels.face]
-    scale = texels.shape[1] / page.width
-    for f, finish in enumerate(page.finishes):
-        mine = np.nonzero(which == f)[0]
-        if not len(mine):
-            continue
-        if finish.texture is None:
-            out[mine] = linear(np.asarray(finish.color[:3], np.float32))
-            continue
-        image = read(finish.texture)
-        uv = mix(texels.weights[mine], page.uv, texels.face[mine])
-        for level, chosen in _by_level(page, f, scale, image.shape, texels.face[mine]):
-            out[mine[chosen]] = _sample(_shrunk(image, level), uv[chosen])
-    return np.clip(out, 0.02, 0.88)
-
-
-def linear(srgb: np.ndarray) -> np.ndarray:
-    """sRGB in [0, 1] to linear (IEC 61966-2-1)."""
-    srgb = np.asarray(srgb)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def gamma(x: np.ndarray) -> np.ndarray:
-    """Linear to sRGB in [0, 1] (IEC 61966-2-1)."""
-    x = np.clip(x, 0.0, 1.0)
-    return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
-def read_colours(path: str) -> np.ndarray:
-    """(h, w, 3) uint8 sRGB of an image file."""
-    image = cv2.imread(path, cv2.IMREAD_COLOR)
-    if image is None:
-        raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
-    return np.ascontiguousarray(image[..., ::-1])
-
-
 def _is_glass(finish: Finish) -> bool:
     return finish.color[3] < 0.9
 
@@ -304,20 +181,28 @@ def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped
     return replace(flat, corners=corners.astype(np.float32), normals=(flat.normals @ turn.T.astype(np.float32)))
 
 
-def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float) -> int:
+def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float, sharpness: float) -> int:
     """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain, 1 where luxels are small.
 
     Floors get 200 texels per metre, patterned walls and ceilings 120 and 80, patterned furniture 180 where
-    its luxels are not too coarse, mirrors 400.
+    its luxels are not too coarse, mirrors 400; all times `sharpness`.
     """
     used = np.bincount(flat.part, weights=areas_of(flat.corners), minlength=len(finishes))
     patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
     if kind in SHELL:
-        return round({"floor": 200, "wall": 120, "ceiling": 80}[kind] / density) if patterned else 2
+        return max(round({"floor": 200, "wall": 120, "ceiling": 80}[kind] * sharpness / density), 2) if patterned else 2
     side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
     if sum(a for a, f in zip(used, finishes) if f.mirror) > 0.15 * used.sum():
-        return int(np.clip(round(400 / side), 2, 8))
-    return int(np.clip(round(180 / side), 2, max(4, round(160 / density)))) if patterned else 1 if side > 80 else 2
+        return int(np.clip(round(400 * sharpness / side), 2, 8))
+    if patterned:
+        return int(
+            np.clip(
+                round(180 * sharpness / side),
+                1 if side > 80 * sharpness else 2,
+                max(4, round(160 * sharpness / density)),
+            )
+        )
+    return 1 if side > 80 * sharpness else 2
 
 
 def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:
@@ -351,32 +236,3 @@ def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: boo
         tuple(finishes),
         np.concatenate(owner),
     )
-
-
-def _by_level(page: Page, finish: int, scale: float, shape: tuple[int, ...], face: np.ndarray):
-    """Texels by how far the colour map must be shrunk first: pairs of level and positions in `face`."""
-    pad = lambda a: np.pad(a, ((0, 0), (0, 0), (0, 1)))
-    source = areas_of(pad(page.uv)) * shape[0] * shape[1]
-    target = areas_of(pad(page.luxels)) * scale**2
-    levels = np.clip(np.round(0.5 * np.log2(np.maximum(source, 1e-9) / np.maximum(target, 1e-9))), 0, 8).astype(int)
-    mine = levels[face]
-    for level in np.unique(mine):
-        yield int(level), np.nonzero(mine == level)[0]
-
-
-def _shrunk(image: np.ndarray, level: int) -> np.ndarray:
-    """(h, w, 3) float32 linear, halved `level` times."""
-    light = linear(np.arange(256, dtype=np.float32) / 255)[image]
-    h, w = max(1, image.shape[0] >> level), max(1, image.shape[1] >> level)
-    return cv2.resize(light, (w, h), interpolation=cv2.INTER_AREA) if level else light
-
-
-def _sample(light: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Bilinear, repeating lookup; v runs up."""
-    h, w = light.shape[:2]
-    x, y = (uv[:, 0] % 1) * w - 0.5, ((1 - uv[:, 1]) % 1) * h - 0.5
-    xi, yi = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = (x - xi)[:, None].astype(np.float32), (y - yi)[:, None].astype(np.float32)
-    at = lambda a, b: light[b % h, a % w]
-    top = at(xi, yi) * (1 - fx) + at(xi + 1, yi) * fx
-    return top * (1 - fy) + (at(xi, yi + 1) * (1 - fx) + at(xi + 1, yi + 1) * fx) * fy

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import functools
-import gc
 import glob
 import os
 import re
@@ -145,16 +144,41 @@ def constant(x: float):
 
 def rest() -> None:
     """Give back the memory that finished stages held: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
-    gc.collect()
     drjit().flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
 
 
-def r2(k: int) -> tuple[float, float]:
-    """Point k of the R2 low-discrepancy sequence in the unit square (M. Roberts, 2018)."""
-    return ((k + 1) * 0.7548776662466927) % 1.0, ((k + 1) * 0.5698402909980532) % 1.0
+def r2(k):
+    """Point k of the R2 low-discrepancy sequence in the unit square (M. Roberts, 2018), both coordinates for any whole
+    part: `k` is a number or a device array of them."""
+    return (k + 1) * 0.7548776662466927, (k + 1) * 0.5698402909980532
+
+
+def fraction(u):
+    """The part of device numbers or points behind the decimal point."""
+    return u - drjit().floor(u)
+
+
+def number(x: int):
+    """A whole number that kernels read as data, so that changing it compiles nothing anew."""
+    return drjit().opaque(mitsuba().UInt32, int(x))
+
+
+def added_up(count: int, one: Callable, *zeros) -> tuple:
+    """Sums of what `one` returns for 0 to `count` - 1, in one kernel.
+
+    Args:
+      one: from a device number k (UInt32) to as many arrays as there are `zeros`.
+      zeros: device arrays to begin with.
+    """
+    dr = drjit()
+    last = number(count)
+    body = lambda k, *totals: (k + 1, *(t + x for t, x in zip(totals, one(k))))
+    totals = dr.while_loop((mitsuba().UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
+    dr.eval(*totals)
+    return totals
 
 
 def warn(message: str) -> None:

@@ -24,22 +24,26 @@ from tqdm import tqdm
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.records import Finish
-from embodied.house.house import House
+from embodied.house.house import WEATHERS, House, Sky
 from embodied.light import tone
-from embodied.light.atlas import Atlas, albedo, atlas_of, coarsened, linear, rasterise, read_colours, things_of  # noqa: F401
-from embodied.light.backend import LightError, device, rest, scene_of, warn
-from embodied.light.compose import Ingredients, Solved, page_of
+from embodied.light.atlas import Atlas, atlas_of, coarsened, things_of
+from embodied.light.backend import LightError, device, rest, warn
+from embodied.light.colours import ColourMaps
+from embodied.light.compose import Composer, Ingredients, Solved, page_of
 from embodied.light.emitters import in_the_open, lamps_of
-from embodied.light.radiosity import space_of
-from embodied.light.settings import VERSION, Settings, settings_of
+from embodied.light.memory import Memory
+from embodied.light.radiosity import space_of, with_env
+from embodied.light.settings import QUALITIES, VERSION, Settings, settings_of
+from embodied.light.sites import sites_of
 from embodied.light.sky import outdoors as outdoors_of
-from embodied.light.solve import Luxels, Radiosity, luxels_of, solve
+from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, with_glow
 from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import Exposure, expose
 from embodied.light.unwrap import areas_of
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.part import Part
+from embodied.seeds import stream
 
 Progress = Callable[[str, float], None]
 
@@ -161,17 +165,76 @@ def bake(
     """Light `house`, or open the bake that is already there.
 
     Args:
-      settings: or the name of a quality: 'draft', 'normal', 'high'.
+      settings: or the name of a quality: 'fast', 'normal', 'high'.
       progress: told the stage's name and how far it is, 0 to 1.
 
     Raises:
       LightError: Mitsuba or LLVM is missing, or the bake disagrees with the path tracer.
     """
+    return bake_all((house,), catalogue, cache, settings, progress=progress)[0]
+
+
+def bake_all(
+    lightings: Sequence[House],
+    catalogue,
+    cache: Path,
+    settings: Settings | str = "normal",
+    *,
+    progress: Progress = lambda stage, done: None,
+) -> tuple[Bake, ...]:
+    """`bake` for the same house at several hours: what does not depend on sky and lamps is computed once.
+
+    Args:
+      lightings: one house that differs in its sky and lamps alone (`lightings_of`).
+
+    Raises:
+      ValueError: they are of different houses.
+    """
     settings = settings_of(settings) if isinstance(settings, str) else settings
-    folder = Path(cache) / "light" / key_of(house, catalogue, settings)
-    if (done := _open(folder, house)) is not None:
-        return done
-    return _make(house, catalogue, Path(cache), folder, settings, progress)
+    if len({_unlit(h).digest for h in lightings}) > 1:
+        raise ValueError("bake_all lights one house at several hours; what came differs in more than sky and lamps")
+    name, shared, out = _name(settings), None, []
+    for house in lightings:
+        folder = Path(cache) / "light" / f"{name}-{key_of(house, catalogue, settings)}"
+        done = _open(folder, house)
+        if done is None:
+            folder.mkdir(parents=True, exist_ok=True)
+            if shared is None:
+                shared = Shared(
+                    house, catalogue, Path(cache) / "light", settings, several=len(lightings) > 1, progress=progress
+                )
+            done = _make(house, shared, folder, settings, progress)
+        out.append(done)
+    return tuple(out)
+
+
+def _unlit(house: House) -> House:
+    lights = tuple(dataclasses.replace(x, on=True) for x in house.lights)
+    return dataclasses.replace(house, sky=Sky(), lights=lights)
+
+
+def _name(settings: Settings) -> str:
+    """The quality of settings, to be seen in the names of folders."""
+    return next((name for name, known in QUALITIES.items() if known == settings), "custom")
+
+
+def lightings_of(house: House, count: int) -> tuple[House, ...]:
+    """The house as it is, and `count` - 1 other lightings of it: hour, weather and lamps drawn from its seed.
+
+    By day a lamp in four is on, from dusk on three in four; every lighting keeps one lamp or the sun.
+    """
+    out = [house]
+    for k in range(1, count):
+        rng = stream(house.seed, "light", "lighting", k)
+        hour = round(float(rng.uniform(6.0, 23.0)), 2)
+        weather = str(rng.choice(WEATHERS))
+        on = rng.random(len(house.lights)) < (0.25 if 7.5 < hour < 17.5 else 0.75)
+        if len(on) and not on.any() and not 7.5 < hour < 17.5:
+            on[int(rng.integers(len(on)))] = True
+        lights = tuple(dataclasses.replace(x, on=bool(o)) for x, o in zip(house.lights, on))
+        sky = dataclasses.replace(house.sky, hour=hour, weather=weather)
+        out.append(dataclasses.replace(house, sky=sky, lights=lights))
+    return tuple(out)
 
 
 def open_bake(folder: Path, house: House) -> Bake:
@@ -228,79 +291,93 @@ def _drop_damaged(folder: Path) -> None:
     path.unlink(missing_ok=True)
 
 
+class Shared:
+    """What all lightings of a house share: surfaces, and what rays meet."""
+
+    def __init__(
+        self,
+        house: House,
+        catalogue,
+        cache: Path,
+        settings: Settings,
+        *,
+        several: bool = False,
+        progress: Progress = lambda stage, done: None,
+    ) -> None:
+        """`cache` holds what belongs to assets alone; `several` keeps what another lighting can use."""
+        self.took: dict[str, float] = {}
+        clock = _Clock(self.took)
+        every = [p for p in house_parts(house, catalogue) if len(p.mesh.faces)]
+        self.outer = [p for p in every if p.kind == "outdoor"]
+        self.maps, self.cache, self.several = ColourMaps(cache), cache, several
+        clock("parts")
+        things = things_of(
+            [p for p in every if p.kind != "outdoor"],
+            density=settings.density,
+            budget=settings.budget,
+            sharpness=settings.sharpness,
+            cache=cache,
+            progress=lambda i, n: progress("unwrapping", i / n),
+        )
+        clock("unwrap")
+        self.atlas = atlas_of(coarsened(things, settings.texels))
+        self.lux = luxels_of(self.atlas, self.maps)
+        self.space = space_of(self.atlas, self.lux.texels)
+        clock("luxels")
+        self.sites = sites_of(self.lux, settings.every)
+        self.memory = Memory() if several else None
+        clock("sites")
+
+
 def solve_house(
     house: House,
-    catalogue,
-    cache: Path,
+    shared: Shared,
     settings: Settings,
     folder: Path | None = None,
     *,
-    read: Callable[[str], np.ndarray] | None = None,
     progress: Progress = lambda s, d: None,
     took: dict[str, float] | None = None,
 ) -> Solved:
-    """Everything up to the light of every luxel; stages are kept in `folder` where one is given."""
-    took = {} if took is None else took
-    read = read or _reader()
-    clock = _Clock(took)
-    parts = tuple(p for p in house_parts(house, catalogue) if p.kind != "outdoor" and len(p.mesh.faces))
-    clock("parts")
-    things = things_of(
-        parts,
-        density=settings.density,
-        budget=settings.budget,
-        cache=Path(cache) / "light",
-        progress=lambda i, n: progress("unwrapping", i / n),
-    )
-    clock("unwrap")
-    atlas = atlas_of(coarsened(things, settings.texels))
+    """Everything up to the light of every luxel, which is kept in `folder` where one is given."""
+    clock = _Clock({} if took is None else took)
+    atlas = shared.atlas
     if folder is not None:
         _same_atlas(folder, atlas)
     outdoors = outdoors_of(house)
     clock("outdoors")
-    lamps = lamps_of(house, atlas)
-    lux = luxels_of(house, atlas, lamps, read)
-    solid = scene_of(np.concatenate([p.corners for p in atlas.pages if not p.glass]))
-    lamps = tuple(in_the_open(x, solid) for x in lamps)
+    space = with_env(shared.space, outdoors.picture)
+    lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
+    lux = with_glow(shared.lux, house, atlas, lamps)
     clock("luxels")
-    stage = lambda name, work: _stage(folder, name, work, clock, len(lux.position))
-    light = solve(house, atlas, lux, outdoors, lamps, settings, stage, progress)
-    clock("smooth")
-    exposure = expose(
-        house, _light_of_rooms(house, atlas, lux, light), np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
-    )
-    return Solved(house, atlas, lux, light, outdoors, lamps, exposure)
+    problem = Problem(house, atlas, lux, shared.sites, space, outdoors, lamps, settings, shared.memory)
+    light = _kept(folder, len(lux.position), lambda: solve(problem, progress, clock))
+    clock("direct")
+    outside = np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
+    exposure = expose(house, _light_of_rooms(house, atlas, lux, light), outside)
+    return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space)
 
 
-def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings, progress: Progress) -> Bake:
+def _make(house: House, shared: Shared, folder: Path, settings: Settings, progress: Progress) -> Bake:
     from embodied.light.check import check
 
-    took: dict[str, float] = {}
-    start = time.perf_counter()
-    folder.mkdir(parents=True, exist_ok=True)
-    read = _reader()
-    s = solve_house(house, catalogue, cache, settings, folder, read=read, progress=progress, took=took)
+    took, shared.took = shared.took, {}
+    start, used = time.perf_counter(), time.process_time()
+    s = solve_house(house, shared, settings, folder, progress=progress, took=took)
     clock = _Clock(took)
     dark = [r.id for r, g in zip(house.rooms, _levels(s)) if g < tone.DARKEST]
     if dark and house.sky.hour > 8 and house.sky.hour < 17:
         warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
-    error = check(s)
+    error = check(s, settings.tolerance)
     clock("check")
-    space = space_of(s.atlas, s.lux.texels, s.outdoors.picture)
+    composer = Composer(s, settings, shared.maps, shared.memory)
     for i in range(len(s.atlas.pages)):
         progress("pages", i / len(s.atlas.pages))
         if not all((folder / n).exists() for n in _page_files(i)):
-            one = page_of(i, s, space, settings, read)
+            one = page_of(i, composer)
             _write_page(folder, i, one, settings.jpeg)
     clock("pages")
     outer, outer_pages, dome = surroundings(
-        house,
-        [p for p in house_parts(house, catalogue) if p.kind == "outdoor" and len(p.mesh.faces)],
-        s.atlas,
-        s.outdoors,
-        s.exposure,
-        cache / "light",
-        read,
+        house, shared.outer, s.atlas, s.outdoors, s.exposure, shared.cache, shared.maps
     )
     first = len(s.atlas.pages)
     for i, picture in enumerate([*outer_pages, dome], first):
@@ -328,8 +405,7 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
             },
         )
     clock("meshes")
-    for name in ("direct", "sun", "bounces"):
-        (folder / f"stage_{name}.npz").unlink(missing_ok=True)
+    (folder / "stage_light.npz").unlink(missing_ok=True)
     files = {
         p.name: _mark(p) for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")
     }
@@ -344,6 +420,7 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
         "owners": list(owners(house)),
         "seconds": {k: round(v, 2) for k, v in took.items()},
         "total_seconds": round(time.perf_counter() - start, 1),
+        "processor_seconds": round(time.process_time() - used, 1),
         "luxels": len(s.lux.position),
         "check": error,
         "exposure": {
@@ -357,17 +434,12 @@ def _make(house: House, catalogue, cache: Path, folder: Path, settings: Settings
             for m in meshes
         ],
         "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
-        "probes": _probes(s, space),
+        "probes": _probes(s),
         "files": files,
     }
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
     return Bake(folder, manifest)
-
-
-def _reader() -> Callable[[str], np.ndarray]:
-    """Colour maps by path; the last few are remembered, all of a house would fill hundreds of megabytes."""
-    return functools.lru_cache(maxsize=16)(read_colours)
 
 
 def _same_atlas(folder: Path, atlas: Atlas) -> None:
@@ -396,22 +468,22 @@ class _Clock:
         self._last = now
 
 
-def _stage(folder: Path | None, name: str, work: Callable[[], dict], clock: _Clock, n: int) -> dict:
-    """What `work` returns, from disk if an earlier run left it there whole."""
-    path = folder / f"stage_{name}.npz" if folder else None
+def _kept(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
+    """What `work` returns, from disk if an interrupted run left it there whole."""
+    path = folder / "stage_light.npz" if folder else None
+    names = [f.name for f in dataclasses.fields(Radiosity)]
     if path is not None and path.exists():
         try:
             with np.load(path, allow_pickle=False) as z:
-                known = {k: z[k] for k in z.files}
-            if known and all(len(v) == n for v in known.values()):
+                known = Radiosity(*(z[name] for name in names))
+            if all(len(getattr(known, name)) == n for name in names):
                 return known
         except Exception as e:  # noqa: BLE001  a damaged stage file, whatever zip or numpy say about it
             warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
     made = work()
     if path is not None:
         with atomic_path(path) as temporary, open(temporary, "wb") as f:
-            np.savez(f, **made)
-    clock(name)
+            np.savez(f, **{name: getattr(made, name) for name in names})
     return made
 
 
@@ -435,10 +507,10 @@ def _levels(s: Solved) -> list[float]:
     return [float(light[r.id] @ [0.2126, 0.7152, 0.0722]) for r in s.house.rooms]
 
 
-def _probes(s: Solved, space) -> dict[str, list]:
-    from embodied.light.probe import ambient_cube
+def _probes(s: Solved) -> dict[str, list]:
+    from embodied.light.probe import ambient_cubes
 
-    return {r.id: ambient_cube(s, space, r).round(4).tolist() for r in s.house.rooms}
+    return {r.id: cube.round(4).tolist() for r, cube in zip(s.house.rooms, ambient_cubes(s))}
 
 
 def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:

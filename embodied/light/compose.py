@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
 from dataclasses import dataclass
 
 import cv2
@@ -11,14 +11,25 @@ import shapely
 
 from embodied.house.house import House
 from embodied.light import radiosity
-from embodied.light.atlas import Atlas, Texels, albedo, gamma, nearest, rasterise
-from embodied.light.backend import array, constant, drjit, mitsuba, r2, vector
+from embodied.light.atlas import Atlas, Page
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, vector
+from embodied.light.colours import ColourMaps, colour_at, linear, paints_of, shown
+from embodied.light.cover import Cover, Texels, cover, nearest, surface
 from embodied.light.emitters import Lamp, portals_of
+from embodied.light.memory import Memory, once
 from embodied.light.radiosity import Space, points_of
 from embodied.light.settings import Settings
 from embodied.light.sky import Outdoors
 from embodied.light.solve import AMBIENT, Luxels, Radiosity, glow_of
-from embodied.light.tone import Exposure, display
+from embodied.light.tone import Exposure, developed
+
+METAL = 0.3
+"""Metallic share from which on a surface shows its surroundings rather than its own colour."""
+DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
+"""Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left; and
+the rays of sharp metals per texel and of dull ones per luxel."""
+AROUND = 0.15
+"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +48,6 @@ class Ingredients:
     """(h luxels, w luxels, 3) float16 radiance of what shines itself; (0, 0, 3) where nothing does."""
 
 
-DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
-"""Roughness from which a metal's picture is blurred so much that few rays leave grain, and the rays of either kind."""
-AROUND = 0.15
-"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
-
-
 @dataclass(frozen=True, eq=False)
 class Solved:
     """A house with its light, in memory: what pages are composed from and checks are made on."""
@@ -54,94 +59,208 @@ class Solved:
     outdoors: Outdoors
     lamps: tuple[Lamp, ...]
     exposure: Exposure
+    space: Space
+    """The house as rays meet it."""
 
 
-def page_of(
-    number: int, solved: Solved, space: Space, settings: Settings, read: Callable[[str], np.ndarray]
-) -> Ingredients:
+class Composer:
+    """Makes the pages of a solved house; owns what all of them share on the device."""
+
+    def __init__(self, solved: Solved, settings: Settings, maps: ColourMaps, memory: Memory | None = None) -> None:
+        self.solved, self.space, self.settings, self.maps = solved, solved.space, settings, maps
+        self.memory = memory
+        counts = [len(t.index) for t in solved.lux.texels]
+        self._starts = np.cumsum([0, *counts])
+        self.soft = solved.light.soft + AMBIENT.astype(np.float32)
+        """(n, 3) all light but the sun's own."""
+        self.sun = (solved.outdoors.sun * radiosity.GLASS).astype(np.float32)
+        """(3,) e of the sun behind the glass."""
+
+    def luxels(self, number: int) -> slice:
+        """Where the luxels of a page lie among all."""
+        return slice(self._starts[number], self._starts[number + 1])
+
+    @functools.cached_property
+    def portals(self):
+        """What sunlight comes in by; None without sun or windows."""
+        portals = portals_of(self.solved.house)
+        return radiosity.portal_scene(portals) if portals and self.solved.outdoors.sun.any() else None
+
+    @functools.cached_property
+    def seen(self) -> tuple[np.ndarray, float]:
+        """(n, 3) radiance of all luxels, and the 95th percentile of its brightness."""
+        lux, light = self.solved.lux, self.solved.light
+        seen = lux.albedo * (light.soft + light.sun[:, None] * self.sun) + lux.glow
+        return seen, float(np.percentile(seen.mean(1), 95))
+
+
+def page_of(number: int, composer: Composer) -> Ingredients:
     """Compose page `number` of the atlas."""
-    lux, light = solved.lux, solved.light
-    page = solved.atlas.pages[number]
-    start = sum(len(t.index) for t in lux.texels[:number])
-    mine = slice(start, start + len(lux.texels[number].index))
-    coarse = lux.texels[number]
-    own = np.concatenate([light.soft[mine] + AMBIENT.astype(np.float32), light.sun[mine, None]], axis=1)
-    known = filled(coarse.index, own, light.good[mine], coarse.shape)
+    solved = composer.solved
+    page, coarse, mine = solved.atlas.pages[number], solved.lux.texels[number], composer.luxels(number)
+    light = np.concatenate([composer.soft[mine], solved.light.sun[mine, None]], axis=1)
+    known = filled(coarse.index, light, solved.light.good[mine], coarse.shape)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
-    t = rasterise(page, page.fineness)
-    colour = albedo(page, t, read)
-    size = (page.width * page.fineness, page.height * page.fineness)
-    e = cv2.resize(soft, size, interpolation=cv2.INTER_LINEAR).reshape(-1, 3)[t.index]
-    sun = _sharp_sun(solved, page, t, share, space, settings)
-    radiance = colour * (e + sun[:, None] * (solved.outdoors.sun * radiosity.GLASS).astype(np.float32))
-    _add_metal(radiance, solved, page, t, colour, space)
-    radiance += glow_of(solved.house, solved.atlas, page, t, solved.lamps)
-    shown_by = sources(t.index, t.shape)
-    page_like = lambda values: (
-        values[shown_by].reshape(*t.shape, -1) if len(t.index) else np.zeros((*t.shape, values.shape[1]), values.dtype)
-    )
-    picture = page_like(display(radiance, solved.exposure.at(t.position)))
-    whole = np.zeros((t.shape[0] * t.shape[1], 1), np.uint8)
-    whole[t.index] = (sun[:, None] * 255 + 0.5).astype(np.uint8)
-    shown = page_like((gamma(colour) * 255 + 0.5).astype(np.uint8))
-    glow = lux.glow[mine]
+    c = once(composer.memory, ("cover", number), lambda: cover(page, page.fineness))
+    sun = _sharp_sun(composer, page, coarse, c, share)
+    gain = spread(coarse.index, solved.exposure.at(coarse.position), coarse.shape)
+    glow = glow_of(solved.house, solved.atlas, page, c.face, solved.lamps)
+    picture, albedo = _painted(composer, number, c, soft, gain, sun, glow, _mirrors(composer, page, coarse, c))
+    whole = np.zeros(c.shape, np.uint8)
+    if sun is not None:
+        whole.ravel()[c.index] = (sun * 255 + 0.5).astype(np.uint8)
+    shown_by = sources(c.index, c.shape)
+    page_like = lambda codes: _unpacked(codes[shown_by] if len(codes) else shown_by.astype(np.uint32), c.shape)
+    glow = solved.lux.glow[mine]
     glow = spread(coarse.index, glow, coarse.shape) if glow.any() else np.zeros((0, 0, 3))
     half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
-    return Ingredients(half(soft), whole.reshape(t.shape), shown, picture, half(glow))
+    return Ingredients(half(soft), whole, page_like(albedo), page_like(picture), half(glow))
 
 
-def _add_metal(radiance: np.ndarray, solved: Solved, page, t: Texels, colour: np.ndarray, space: Space) -> None:
-    """Mirrors and metals in place of their diffuse light: what somebody in the middle of the room sees in them.
+def _painted(
+    composer: Composer, number: int, c: Cover, soft, gain, sun, glow, mirrors
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) uint32 packed sRGB of the covered texels: as shown, and their reflectance.
+
+    Args:
+      soft, gain: (h luxels, w luxels, 3). sun: (n,) share, or None. glow: (n, 3) or None. mirrors: from `_mirrors`.
+    """
+    mi, dr = mitsuba(), drjit()
+    if not len(c.index):
+        return np.zeros(0, np.uint32), np.zeros(0, np.uint32)
+    face, b1, b2 = mi.UInt32(c.face.astype(np.uint32)), mi.Float(c.b1), mi.Float(c.b2)
+    page = composer.solved.atlas.pages[number]
+
+    def colours() -> np.ndarray:
+        codes = _packed(shown(colour_at(paints_of(page, page.fineness, composer.maps), face, b1, b2)))
+        dr.eval(codes)
+        return np.array(codes)
+
+    albedo = once(composer.memory, ("albedo", number), colours)
+    colour = _linear(mi.UInt32(albedo))
+    read = _Bilinear(c, page)
+    e = read(soft)
+    if sun is not None:
+        e += mi.Color3f(*(constant(x) for x in composer.sun)) * mi.Float(sun)
+    radiance = colour * e
+    if mirrors is not None:
+        metal, tint, dull, sharp, blurred = mirrors
+        share = dr.gather(mi.Float, metal, face)
+        seen = dr.select(dr.gather(mi.Bool, dull, face), read(blurred), sharp)
+        radiance = radiance * (1 - share) + seen * dr.maximum(colour, dr.gather(mi.Float, tint, face)) * share
+    if glow is not None:
+        radiance += mi.Color3f(vector(glow))
+    picture = _packed(developed(radiance * read(gain)))
+    dr.eval(picture)
+    return np.array(picture), albedo
+
+
+class _Bilinear:
+    """Reads pictures of a page's luxels at its texels."""
+
+    def __init__(self, c: Cover, page: Page) -> None:
+        mi, dr = mitsuba(), drjit()
+        row, column = np.divmod(c.index.astype(np.int32), np.int32(c.shape[1]))
+        right, bottom, width, step = (number(x) for x in (page.width - 1, page.height - 1, page.width, page.fineness))
+        at = lambda a, last: dr.clip((mi.Float(a) + 0.5) / mi.Float(step) - 0.5, 0.0, mi.Float(last))
+        x, y = at(column.astype(np.float32), right), at(row.astype(np.float32), bottom)
+        x0, y0 = mi.UInt32(x), mi.UInt32(y)
+        x1, y1 = dr.minimum(x0 + 1, right), dr.minimum(y0 + 1, bottom)
+        fx, fy = x - mi.Float(x0), y - mi.Float(y0)
+        spots = y0 * width + x0, y0 * width + x1, y1 * width + x0, y1 * width + x1
+        self._terms = tuple(zip(spots, ((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy)))
+        self._size = page.height, page.width
+
+    def __call__(self, picture: np.ndarray):
+        mi, dr = mitsuba(), drjit()
+        assert picture.shape[:2] == self._size
+        table, out = mi.Float(np.ascontiguousarray(picture, np.float32).ravel()), mi.Color3f(0.0)
+        for spot, weight in self._terms:
+            out += dr.gather(mi.Color3f, table, spot) * weight
+        return out
+
+
+def _packed(colour):
+    """A colour in [0, 1] as red, green and blue bytes of one number, red lowest."""
+    mi, dr = mitsuba(), drjit()
+    r, g, b = (mi.UInt32(dr.clip(x, 0.0, 1.0) * 255 + 0.5) for x in (colour.x, colour.y, colour.z))
+    return r | (g << 8) | (b << 16)
+
+
+def _linear(codes):
+    """The linear colour of packed sRGB."""
+    mi, dr = mitsuba(), drjit()
+    table = mi.Float(linear(np.arange(256, dtype=np.float32) / 255))
+    return mi.Color3f(*(dr.gather(mi.Float, table, (codes >> shift) & 255) for shift in (0, 8, 16)))
+
+
+def _unpacked(codes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(h, w, 3) uint8 from (h * w,) uint32."""
+    return cv2.cvtColor(codes.astype("<u4").view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB)
+
+
+def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover):
+    """What mirrors and metals show in place of their diffuse light: what somebody in the middle of the room sees in them.
 
     A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
+
+    Returns:
+      None for a page without any, else device arrays: metallic share, least tint and whether dull of each face;
+      radiance of sharp metals per texel; and (h luxels, w luxels, 3) radiance of dull ones.
     """
-    metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish[t.face]]
-    i = np.nonzero(metal > 0.3)[0]
-    rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish[t.face[i]]]
-    for dull in (False, True):
-        some = (rough > DULL) == dull
-        mine, share = i[some], metal[i[some], None]
-        if len(mine):
-            tint = np.maximum(colour[mine], np.where(rough[some] < 0.02, 0.85, 0.0)[:, None])
-            radiance[mine] = (
-                radiance[mine] * (1 - share)
-                + _mirrored(solved, page, t, mine, rough[some], space, dull=dull) * tint * share
-            )
+    mi = mitsuba()
+    metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish]
+    rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish]
+    metal = np.where(metal > METAL, metal, 0.0).astype(np.float32)
+    if not metal.any():
+        return None
+    dull = rough > DULL
+    blurred, sharp = np.zeros((*coarse.shape, 3), np.float32), np.zeros((len(c.index), 3), np.float32)
+    if len(i := np.nonzero((dull & (metal > 0))[coarse.face])[0]):
+        around = coarse.position[i], coarse.normal[i], coarse.face_normal[i]
+        seen = _mirrored(composer, page, coarse.face[i], around, rough[coarse.face[i]], dull=True)
+        blurred = spread(coarse.index[i], evened(seen, coarse.index[i], coarse.shape), coarse.shape)
+    if len(i := np.nonzero((~dull & (metal > 0))[c.face])[0]):
+        sharp[i] = _mirrored(composer, page, c.face[i], surface(page, c, i), rough[c.face[i]], dull=False)
+    tint = np.where((metal > 0) & (rough < 0.02), 0.85, 0.0).astype(np.float32)
+    return mi.Float(metal), mi.Float(tint), mi.Bool(dull), mi.Color3f(vector(sharp)), blurred
 
 
 def _mirrored(
-    solved: Solved, page, t: Texels, i: np.ndarray, rough: np.ndarray, space: Space, *, dull: bool
+    composer: Composer, page: Page, face: np.ndarray, surfaces, rough: np.ndarray, *, dull: bool
 ) -> np.ndarray:
-    """(k, 3) radiance that the texels `i` of one roughness each mirror, all of them dull or none."""
+    """(k, 3) radiance that k places of one page mirror, all of them dull or none.
+
+    Args:
+      face: (k,) of the page. surfaces: position, normal and face normal, (k, 3) each. rough: (k,).
+    """
     mi, dr = mitsuba(), drjit()
-    house, atlas, lux, light, sun = solved.house, solved.atlas, solved.lux, solved.light, solved.outdoors.sun
-    room = house.room_by_id.get(atlas.rooms[page.owner[t.face[i[0]]]], house.rooms[0])
+    house, atlas, space = composer.solved.house, composer.solved.atlas, composer.space
+    position, normal, face_normal = surfaces
+    room = house.room_by_id.get(atlas.rooms[page.owner[face[0]]], house.rooms[0])
     eye = [*shapely.Polygon(room.polygon).representative_point().coords[0], house.storey_of(room).elevation + 1.5]
-    to_eye = np.asarray(eye, np.float32) - t.position[i]
+    to_eye = np.asarray(eye, np.float32) - position
     to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True) + 1e-9
-    side = np.where((to_eye * t.face_normal[i]).sum(1, keepdims=True) < 0, -1.0, 1.0).astype(np.float32)
-    normal = t.normal[i] * np.where(page.thin[t.face[i]][:, None], side, 1.0)
+    side = np.where((to_eye * face_normal).sum(1, keepdims=True) < 0, -1.0, 1.0).astype(np.float32)
+    normal = normal * np.where(page.thin[face][:, None], side, 1.0)
     cos = (normal * to_eye).sum(1, keepdims=True)
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
-    p = points_of(t.position[i], normal, normal, np.zeros(len(i), bool))
-    seen = lux.albedo * (light.soft + light.sun[:, None] * (sun * radiosity.GLASS).astype(np.float32)) + lux.glow
+    p = points_of(position, normal, normal, np.zeros(len(face), bool))
+    seen, bright = composer.seen
     rays, width = DULL_RAYS if dull else SHARP_RAYS, np.square(rough) + AROUND * dull
-    limit = (3.0 if dull else 8.0) * np.percentile(seen.mean(1), 95)  # of a lamp's glint: few rays would find it
-    seen = np.minimum(seen, limit).astype(np.float32)
-    table, spread_of = mi.Float(seen.ravel()), mi.Float(width.astype(np.float32))
-    straight, total = vector(bounced), dr.zeros(mi.Color3f, p.n)
-    for k in range(rays):
-        a, b = (constant(x) for x in r2(k))
-        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
-        ball = mi.warp.square_to_uniform_sphere(u - dr.floor(u))
+    limit = (3.0 if dull else 8.0) * bright  # of a lamp's glint: few rays would find it
+    table = mi.Float(np.minimum(seen, limit).astype(np.float32).ravel())
+    spread_of, straight = mi.Float(width.astype(np.float32)), vector(bounced)
+
+    def one(k):
+        a, b = r2(mi.Float(k))
+        ball = mi.warp.square_to_uniform_sphere(fraction(mi.Point2f(p.turn0 + a, p.turn1 + b)))
         d = dr.normalize(straight + ball * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
         near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
-        far = radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS
-        total += dr.select(hit, near, far)
-        dr.eval(total)
-    mirrored = np.minimum(array(total) / rays, limit)
-    return evened(mirrored, t.index[i], t.shape) if dull else mirrored
+        return (dr.select(hit, near, radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS),)
+
+    return np.minimum(array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
 
 
 def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -154,12 +273,12 @@ def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.
 
 
 def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(h * w,) int64: which of the n covered texels at flat positions `index` each texel of a page shows: its own or the nearest."""
+    """(h * w,) int: which of the n covered texels at flat positions `index` each texel of a page shows: its own or the nearest."""
     if not len(index):
         return np.zeros(shape[0] * shape[1], np.int64)
     mask = np.zeros(shape[0] * shape[1], bool)
     mask[index] = True
-    number = np.zeros(len(mask), np.int64)
+    number = np.zeros(len(mask), np.int32)
     number[index] = np.arange(len(index))
     return number[nearest(mask.reshape(shape)).ravel()]
 
@@ -196,22 +315,24 @@ def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.
     return values[sources(index, shape)].reshape(*shape, -1)
 
 
-def _sharp_sun(solved: Solved, page, t: Texels, share: np.ndarray, space: Space, settings: Settings) -> np.ndarray:
-    """(n,) share of the sun per texel: traced where luxels around disagree, else taken from them."""
-    outdoors, portals = solved.outdoors, portals_of(solved.house)
-    if not outdoors.sun.any() or not portals or share.max() <= 0:
-        return np.zeros(len(t.index), np.float32)
-    facing = np.clip(t.normal @ outdoors.sun_direction.astype(np.float32), 0, 1)
+def _sharp_sun(composer: Composer, page: Page, coarse: Texels, c: Cover, share: np.ndarray) -> np.ndarray | None:
+    """(n,) float32 share of the sun per texel: traced where luxels around disagree, else taken from them; None for none."""
+    if composer.portals is None or not len(c.index) or share.max() <= 0:
+        return None
+    towards = composer.solved.outdoors.sun_direction
+    facing = np.clip(coarse.normal @ towards.astype(np.float32), 0, 1)
+    own = share.ravel()[coarse.index]
+    whole = np.where(own > 0.5 * facing, facing, 0.0) * (own > 0.004)
+    whole = spread(coarse.index, np.where(page.thin[coarse.face], own, whole)[:, None].astype(np.float32), coarse.shape)
     box = np.ones((5, 5), np.uint8)
     high, low = cv2.dilate(share, box), cv2.erode(share, box)
     unsure = (high - low > 0.02) & (high > 0.004)
-    at = lambda a: np.kron(a, np.ones((page.fineness, page.fineness), a.dtype)).ravel()[t.index]
-    out = at(share).astype(np.float32)
-    out = np.where(page.thin[t.face], out, np.where(out > 0.5 * facing, facing, 0.0) * (out > 0.004))
-    i = np.nonzero(at(unsure.astype(np.uint8)) > 0)[0]
+    rows, columns = np.divmod(c.index, c.shape[1])
+    at = rows // page.fineness, columns // page.fineness
+    out, i = whole[..., 0][at], np.nonzero(unsure[at])[0]
     if len(i):
-        p = points_of(t.position[i], t.normal[i], t.face_normal[i], page.thin[t.face[i]])
+        p = points_of(*surface(page, c, i), page.thin[c.face[i]])
         out[i] = np.asarray(
-            radiosity.sun_share(space, p, radiosity.portal_scene(portals), outdoors.sun_direction, settings.sun_rays)
+            radiosity.sun_share(composer.space, p, composer.portals, towards, composer.settings.sun_rays)
         )
     return out

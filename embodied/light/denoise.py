@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from embodied.light.atlas import Atlas, Texels
+from embodied.light.atlas import Atlas
 from embodied.light.backend import array, constant, drjit, mitsuba, vector
+from embodied.light.cover import Texels
 
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 """B3 spline, as in Dammertz et al."""
@@ -113,32 +114,6 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[n
     return relative, np.asarray(mean / n) * np.minimum(relative, 1.0)
 
 
-def cap_sparks(
-    e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray, chosen: np.ndarray, *, most: float = 1.4
-) -> np.ndarray:
-    """Luxels brighter than `most` times the geometric mean of the good ones around them, cut to that.
-
-    One ray in a hundred that meets a lampshade makes such a luxel; smoothing would spread it into a blob.
-    """
-    mi, dr = mitsuba(), drjit()
-    grid = _Grid(atlas, luxels, chosen)
-    if not len(grid.mine):
-        return e
-    out = np.array(e, np.float32)
-    values, trust = mi.Float(out.ravel()), mi.Float(good.astype(np.float32))
-    total, weight = mi.Float(0.0), mi.Float(0.0)
-    for i, j, q, inside in grid.around(2):
-        if i or j:
-            w = dr.gather(mi.Float, trust, q, inside)
-            total += w * dr.log(_brightness(dr.gather(mi.Color3f, values, q, inside)) + 1e-5)
-            weight += w
-    own = dr.gather(mi.Color3f, values, grid.own)
-    cap = dr.exp(total / dr.maximum(weight, 1.0)) * most
-    scale = dr.select(weight > 3, dr.minimum(1.0, cap / dr.maximum(_brightness(own), 1e-7)), 1.0)
-    out[grid.mine] = array(own * scale)
-    return out
-
-
 class _Grid:
     """Chosen luxels and, on the device, what lies around them on their page in the same plane."""
 
@@ -184,7 +159,13 @@ LAYER = (0.3, 0.002)
 
 
 def neighbours(
-    position: np.ndarray, normal: np.ndarray, good: np.ndarray, chosen: np.ndarray, k: int = 12
+    position: np.ndarray,
+    normal: np.ndarray,
+    good: np.ndarray,
+    chosen: np.ndarray,
+    k: int = 12,
+    turn: float = 0.15,
+    asked: int = 3,
 ) -> np.ndarray:
     """(m, k) int32, nearest good luxels of the chosen ones by place and facing, those on the same layer first.
 
@@ -193,9 +174,9 @@ def neighbours(
     pool = np.nonzero(good)[0]
     if not len(pool):
         pool = np.arange(len(position))
-    where = np.concatenate([position, normal * 0.02], axis=1).astype(np.float32)
+    where = np.concatenate([position, normal * turn], axis=1)
     tree = cKDTree(where[pool], balanced_tree=False, compact_nodes=False)
-    mine, k, asked = np.nonzero(chosen)[0], min(k, len(pool)), min(3 * k, len(pool))
+    mine, k, asked = np.nonzero(chosen)[0], min(k, len(pool)), min(asked * k, len(pool))
     out = np.empty((len(mine), k), np.int32)
     for start in range(0, len(mine), 200_000):
         part = mine[start : start + 200_000]
@@ -207,70 +188,73 @@ def neighbours(
     return out
 
 
-def smooth_space(
+def smooth_sites(
     e: np.ndarray,
     position: np.ndarray,
     normal: np.ndarray,
     near: np.ndarray,
-    chosen: np.ndarray,
+    good: np.ndarray,
     *,
-    passes: int = 2,
-    likeness: float = 0.6,
+    variance: np.ndarray,
+    passes: int = 3,
+    likeness: float = 0.12,
 ) -> np.ndarray:
     """Smoothing over neighbours in space.
 
     Args:
-      e, position, normal: (n, 3).
-      near: (m, k) from `neighbours` for the m chosen.
-      chosen: (n,) bool.
+      e, position, normal: (k, 3).
+      near: (k, m) from `neighbours`, each itself first.
+      good: (k,) bool, sites whose light counts.
+      variance: (k,) of each one's brightness; likeness is widened by the noise that is left, as in SVGF (Schied et
+        al. 2017, sec. 4.4): noise goes, contact shadows stay.
+      likeness: standard deviation of log brightness that still counts as the same light.
     """
     mi, dr = mitsuba(), drjit()
-    mine = np.nonzero(chosen)[0]
-    if not len(mine):
+    if not len(e):
         return e
     flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
-    places, normals = flat(position), flat(normal)
+    places, normals, trust = flat(position), flat(normal), flat(np.where(good, 1.0, 1e-4))
     ids = [mi.UInt32(np.ascontiguousarray(near[:, j], np.uint32)) for j in range(near.shape[1])]
-    p, n = vector(position[mine]), vector(normal[mine])
+    p, n = vector(position), vector(normal)
     reach = dr.norm(dr.gather(mi.Vector3f, places, ids[min(6, len(ids) - 1)]) - p) * 1.5 + 1e-4
     out = np.array(e, np.float32)
+    bright = np.maximum(out.mean(1)[near].mean(1), 1e-5)
+    noise = np.minimum(np.sqrt(variance[near].mean(1)) / bright, 1.5).astype(np.float32)
+    least = mi.Float((bright * np.minimum(noise, 1.0)).astype(np.float32)) + 1e-4
     for _ in range(passes):
-        values = flat(out)
-        own = dr.gather(mi.Color3f, values, mi.UInt32(np.ascontiguousarray(mine, np.uint32)))
-        shade = dr.log(_brightness(own) + 1e-4)
-        total, weight = mi.Color3f(0.0), mi.Float(0.0)
+        values, noises = flat(out), flat(noise)
+        own = mi.Color3f(vector(out))
+        shade, total, weight, squares = dr.log(_brightness(own) + least), mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
+        tight = 1 / (constant(likeness**2) + dr.square(NOISES * noises))
         for q in ids:
             other = dr.gather(mi.Color3f, values, q)
             d = dr.norm(dr.gather(mi.Vector3f, places, q) - p) / reach
             facing = dr.maximum(dr.dot(dr.gather(mi.Vector3f, normals, q), n), 0.0)
-            far = (dr.log(_brightness(other) + 1e-4) - shade) * (1.0 / likeness)
-            w = dr.exp(-0.5 * (dr.square(d) + dr.square(far))) * facing**4 + 1e-9
+            far = dr.log(_brightness(other) + least) - shade
+            w = dr.exp(-0.5 * (dr.square(d) + dr.square(far) * tight)) * dr.square(dr.square(facing))
+            w = w * dr.gather(mi.Float, trust, q) + 1e-9
             total += other * w
             weight += w
-        out[mine] = array(total / weight)
+            squares += dr.square(w)
+        mean, left = total / weight, noises * dr.sqrt(squares) / weight
+        dr.eval(mean, left)
+        out, noise = array(mean), np.array(left)
     return out
 
 
-def fill(e: np.ndarray, normal: np.ndarray, near: np.ndarray, chosen: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """Bad luxels among the chosen take the mean of their nearest good neighbours that face their way."""
-    out = np.array(e, np.float32)
-    mine = np.nonzero(chosen)[0]
-    which = np.nonzero(bad[mine])[0]
-    n = near[which, :6]
-    w = np.maximum(np.einsum("mkc,mc->mk", normal[n], normal[mine[which]]), 0.0)[..., None] + 1e-3
-    out[mine[which]] = (out[n] * w).sum(1) / w.sum(1)
-    return out
+def cap_sparks(
+    e: np.ndarray, near: np.ndarray, good: np.ndarray, *, variance: np.ndarray | float = 0.0, most: float = 1.5
+) -> np.ndarray:
+    """Sites brighter than `most` times the geometric mean of the good ones around them, cut to that.
 
-
-def lift_specks(e: np.ndarray, near: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Chosen luxels raised to half the median of their neighbours and cut at three times it: creases, fireflies."""
-    out = np.array(e, np.float32)
-    mine = np.nonzero(chosen)[0]
-    for start in range(0, len(mine), 200_000):
-        part = slice(start, start + 200_000)
-        middle = np.median(out[near[part]], axis=1)
-        out[mine[part]] = np.clip(e[mine[part]], 0.5 * middle, 3.0 * middle + 1e-4)
-    return out
+    One ray in a hundred that meets a lampshade makes such a site; smoothing would spread it into a blob. What noise of
+    this `variance` (k,) makes brighter by three standard deviations stays: to cut it would darken the room.
+    """
+    y, others = e.mean(1), near[:, 1:]
+    weight = good[others] + 1e-4
+    mean = np.exp((np.log(y + 1e-5)[others] * weight).sum(1) / weight.sum(1))
+    noise = np.sqrt(np.broadcast_to(variance, y.shape)[near].mean(1))
+    return e * np.minimum(1.0, (most * mean + 3.0 * noise) / np.maximum(y, 1e-7))[:, None].astype(np.float32)
 
 
 def _brightness(c):

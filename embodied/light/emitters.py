@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.house.house import House, Opening
 from embodied.light.atlas import Atlas
-from embodied.light.backend import constant, drjit, mitsuba, r2, vector
+from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, r2, vector
 from embodied.light.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
@@ -139,16 +139,13 @@ def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lam
         return lamp
     mi, dr = mitsuba(), drjit()
     n = vector(lamp.normals)
-    origin, frame, free = (
-        mi.Point3f(vector(lamp.points) + n * 2e-3),
-        mi.Frame3f(n),
-        dr.zeros(mi.Float, len(lamp.points)),
-    )
-    for k in range(rays):
-        d = frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(*(constant(x) for x in r2(k)))))
-        free += dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0)
-        dr.eval(free)
-    share = np.asarray(free) / rays
+    origin, frame = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n)
+
+    def one(k):
+        d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(*r2(mi.Float(k))))))
+        return (dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0),)
+
+    share = np.asarray(added_up(rays, one, dr.zeros(mi.Float, len(lamp.points)))[0]) / rays
     if not share.any():
         return lamp
     chance = np.where(share > 0, np.maximum(share, 0.1), 0.0)

@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from embodied.light.atlas import Atlas, Texels, nearest
-from embodied.light.backend import array, constant, drjit, mitsuba, r2, scene_of, vector
+from embodied.light.atlas import Atlas
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, scene_of, vector
+from embodied.light.cover import Texels, nearest
 from embodied.light.emitters import GLASS, Lamp, Portal
+from embodied.light.memory import Memory
 from embodied.light.unwrap import face_normals
 
 LIFT = 2e-3
@@ -78,12 +80,12 @@ class Space:
     """Outdoor radiance (ENV_ROWS x 2 ENV_ROWS pixels, flat RGB)."""
 
 
-def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray) -> Space:
+def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray | None = None) -> Space:
     """Upload the house.
 
     Args:
       luxels: what lies under each page at fineness 1.
-      env: outdoor radiance picture (h, 2h, 3).
+      env: outdoor radiance picture (h, 2h, 3); black if None.
     """
     mi = mitsuba()
     corners = np.concatenate([p.corners for p in atlas.pages])
@@ -105,8 +107,13 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray) -> Space:
         u32([p.height for p in atlas.pages]),
         u32(np.cumsum(sizes) - sizes),
         u32(nearest_luxel(atlas, luxels)),
-        flat(_small(env)),
+        flat(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3)) if env is None else _small(env)),
     )
+
+
+def with_env(space: Space, env: np.ndarray) -> Space:
+    """The same space below another sky (h, 2h, 3)."""
+    return replace(space, env=mitsuba().Float(np.ascontiguousarray(_small(env), np.float32).ravel()))
 
 
 def without(space: Space, atlas: Atlas, owner: str) -> Space:
@@ -163,15 +170,13 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     a few centimetres from the glass turn into fireflies.
     """
     mi, dr = mitsuba(), drjit()
-    corner, along, up, n = (
-        mi.Vector3f(*(constant(x) for x in a)) for a in (portal.corner, portal.along, portal.up, portal.normal)
-    )
+    sides = portal.corner, portal.along, portal.up, portal.normal
+    corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in sides)
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
-    total, seen = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
-    for k in range(samples):
-        a, b = (constant(x) for x in r2(k))
-        a, b = p.turn0 + a, p.turn1 + b
-        q = corner + along * (a - dr.floor(a)) + up * (b - dr.floor(b))
+
+    def one(k):
+        a, b = r2(mi.Float(k))
+        q = corner + along * fraction(p.turn0 + a) + up * fraction(p.turn1 + b)
         d = q - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-6)
@@ -179,28 +184,26 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
         leaving = -dr.dot(n, d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
-        blocked = space.scene.ray_test(ray, active)
-        g = dr.select(active & ~blocked, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0)
-        g = dr.minimum(g, share)
-        total += env_lookup(space, d, active) * g
-        seen += g
-        dr.eval(total, seen)
+        free = active & ~space.scene.ray_test(ray, active)
+        g = dr.minimum(dr.select(free, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0), share)
+        return env_lookup(space, d, free) * g, g
+
+    total, seen = added_up(samples, one, dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n))
     return total * dr.select(seen > 1, 1 / seen, 1)
 
 
 def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
     """e (a Color3f) from one lamp."""
     mi, dr = mitsuba(), drjit()
-    bare = not lamp.normals.any()
-    count = len(lamp.points)
+    bare, count = not lamp.normals.any(), number(len(lamp.points))
     at = mi.Float(np.ascontiguousarray(lamp.points, np.float32).ravel())
     out = mi.Float(np.ascontiguousarray(lamp.normals, np.float32).ravel())
     weights = mi.Float(np.ascontiguousarray(lamp.weights, np.float32))
-    strength = constant(lamp.area / np.pi / samples)
-    total = dr.zeros(mi.Float, p.n)
-    for k in range(samples):
-        pick = p.turn0 + constant(r2(k)[0])
-        i = dr.minimum(mi.UInt32((pick - dr.floor(pick)) * count), count - 1)
+    strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
+
+    def one(k):
+        pick = fraction(p.turn0 + r2(mi.Float(k))[0])
+        i = dr.minimum(mi.UInt32(pick * mi.Float(count)), count - 1)
         d = dr.gather(mi.Point3f, at, i) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-6)
@@ -212,13 +215,12 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
             active &= leaving > 0
             g = cos * leaving / dr.maximum(dr.square(far), 1e-4)
         g *= dr.gather(mi.Float, weights, i)
-        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - (4 * LIFT if not bare else 0.06), 0.0, [])
-        active &= ray.maxt > 0
-        total += dr.minimum(
-            dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0),
-            constant((4.0 if not bare else 400.0) / samples),
-        )
-        dr.eval(total)
+        reach = far - (0.06 if bare else 4 * LIFT)
+        ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, reach, 0.0, [])
+        active &= reach > 0
+        return (dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), most),)
+
+    (total,) = added_up(samples, one, dr.zeros(mi.Float, p.n))
     return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
@@ -230,60 +232,72 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
       radius: of the disc, radians; a little over the real 0.0047 for soft edges at texel size.
     """
     mi, dr = mitsuba(), drjit()
-    total = dr.zeros(mi.Float, p.n)
-    frame = mi.Frame3f(mi.Vector3f(*(float(x) for x in towards)))
-    for k in range(directions):
-        r, turn = (radius * np.sqrt((k + 0.5) / directions), k * 2.399963) if directions > 1 else (0.0, 0.0)
-        d = dr.normalize(frame.n + frame.s * constant(r * np.cos(turn)) + frame.t * constant(r * np.sin(turn)))
+    frame = mi.Frame3f(mi.Vector3f(*(constant(x) for x in towards)))
+    whole = constant(directions)
+
+    def one(k):
+        r, turn = constant(radius * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
+        d = dr.normalize(frame.n + frame.s * (r * dr.cos(turn)) + frame.t * (r * dr.sin(turn)))
         cos, side, active = facing(p, d)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
         active &= portals_scene.ray_test(ray, active)
-        total += dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0)
-        dr.eval(total)
-    return total / directions
+        return (dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0),)
+
+    (total,) = added_up(directions, one, dr.zeros(mi.Float, p.n))
+    return total / whole
 
 
-def patch_light(
-    space: Space,
-    p: Points,
-    position: np.ndarray,
-    normal: np.ndarray,
-    thin: np.ndarray,
-    flux: np.ndarray,
-    extent: np.ndarray,
-) -> np.ndarray:
-    """(n, 3) e from sunlit patches, each a small disc light, the same for all points and so free of noise.
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Small disc lights that stand for sunlit patches; k of them."""
 
-    Args:
-      position, normal: (k, 3). thin: (k,) bool, shines to both sides. flux: (k, 3) radiosity times area. extent: (k,) area in square metres.
-    """
+    position: np.ndarray
+    normal: np.ndarray
+    """(k, 3) each."""
+    thin: np.ndarray
+    """(k,) bool, shines to both sides."""
+    flux: np.ndarray
+    """(k, 3) radiosity times area."""
+    extent: np.ndarray
+    """(k,) area in square metres."""
+
+
+def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
+    """(n, 3) e from sunlit patches, the same ones for all points and so free of noise."""
     mi, dr = mitsuba(), drjit()
-    total = dr.zeros(mi.Color3f, p.n)
-    for q, n, both, f, a in zip(
-        np.where(thin[:, None], position, position + normal * LIFT), normal, thin, flux, extent
-    ):
-        d = mi.Point3f(*(constant(x) for x in q)) - p.position
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
+    lift = np.where(patches.thin[:, None], 0.0, LIFT)
+    places, normals = flat(patches.position + patches.normal * lift), flat(patches.normal)
+    both, flux, extent = mi.Bool(np.ascontiguousarray(patches.thin)), flat(patches.flux), flat(patches.extent)
+
+    def one(k):
+        d = dr.gather(mi.Point3f, places, k) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-5)
         cos, side, active = facing(p, d)
-        leaving = -dr.dot(mi.Vector3f(*(constant(x) for x in n)), d)
-        leaving = dr.abs(leaving) if both else leaving
+        leaving = -dr.dot(dr.gather(mi.Vector3f, normals, k), d)
+        leaving = dr.select(dr.gather(mi.Bool, both, k), dr.abs(leaving), leaving)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 3 * LIFT, 0.0, [])
-        g = cos * leaving / (dr.pi * dr.square(far) + constant(a))
-        total += mi.Color3f(*(constant(x) for x in f)) * dr.select(active & ~space.scene.ray_test(ray, active), g, 0.0)
-        dr.eval(total)
-    return array(total)
+        g = cos * leaving / (dr.pi * dr.square(far) + dr.gather(mi.Float, extent, k))
+        return (dr.gather(mi.Color3f, flux, k) * dr.select(active & ~space.scene.ray_test(ray, active), g, 0.0),)
+
+    return array(added_up(len(patches.flux), one, dr.zeros(mi.Color3f, p.n))[0])
+
+
+NOTHING = 0xFFFFFFFF
+"""In place of a luxel's number: the ray met nothing that shines."""
 
 
 def gather(
-    space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0
+    space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0, memory: Memory | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean of what cosine-distributed rays meet.
 
     Args:
       radiosity: (n luxels, 3) of the whole house.
       first: index of the first point of the R2 sequence, so that rounds differ.
+      memory: keeps what the rays met, for the same points under another light.
 
     Returns:
       (n, 3) e, (n,) share of rays that met a back face or something nearer than 12 mm, and (n,)
@@ -291,24 +305,64 @@ def gather(
     """
     mi, dr = mitsuba(), drjit()
     b = mi.Float(np.ascontiguousarray(radiosity, np.float32).ravel())
-    total, bad, square = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n), dr.zeros(mi.Float, p.n)
-    for k in range(samples):
-        u0, u1 = (constant(x) for x in r2(k + first))
-        u = mi.Point2f(p.turn0 + u0, p.turn1 + u1)
-        side = dr.select(p.thin & (constant(k % 2) > 0.5), -1.0, 1.0)
-        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+    meet = _rays(space, p, first)
+    none, black = dr.zeros(mi.Float, p.n), dr.zeros(mi.Color3f, p.n)
+    if memory is None:
+
+        def one(k):
+            luxel, seen, wrong = meet(k)
+            colour = dr.gather(mi.Color3f, b, luxel, seen)
+            return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0)), wrong
+
+        total, square, bad = added_up(samples, one, black, none, none)
+    else:
+        hits, bad = memory.once(("hits", first, samples), lambda: _hits(meet, p.n, samples))
+        lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
+
+        def known(k):
+            luxel = dr.gather(mi.UInt32, hits, k * count + lane)
+            colour = dr.gather(mi.Color3f, b, luxel, luxel != NOTHING)
+            return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0))
+
+        total, square = added_up(samples, known, black, none)
+    mean = array(total) / samples
+    variance = np.maximum(np.asarray(square) / samples - mean.mean(1) ** 2, 0.0) / max(samples - 1, 1)
+    return mean, np.asarray(bad) / samples, variance
+
+
+def _rays(space: Space, p: Points, first: int) -> Callable:
+    """From the number of a sample to the luxels that cosine-distributed rays meet, whether they see them, and 1 where
+    they meet a back face or something nearer than 12 mm."""
+    mi, dr = mitsuba(), drjit()
+    start = number(first)
+
+    def meet(k):
+        u0, u1 = r2(mi.Float(k + start))
+        side = dr.select(p.thin & ((k & 1) == 1), -1.0, 1.0)
+        u = fraction(mi.Point2f(p.turn0 + u0, p.turn1 + u1))
+        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u))
         out = p.face_normal * side
         rise = dr.dot(d, out)
         d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
         luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position + out * LIFT, d))
-        seen = dr.gather(mi.Color3f, b, luxel, hit & front)
-        total += seen
-        square += dr.square((seen.x + seen.y + seen.z) * (1.0 / 3.0))
-        bad += dr.select(hit & (~front | near), 1.0, 0.0)
-        dr.eval(total, bad, square)
-    mean = array(total) / samples
-    variance = np.maximum(np.asarray(square) / samples - mean.mean(1) ** 2, 0.0) / max(samples - 1, 1)
-    return mean, np.asarray(bad) / samples, variance
+        return luxel, hit & front, dr.select(hit & (~front | near), 1.0, 0.0)
+
+    return meet
+
+
+def _hits(meet: Callable, n: int, samples: int) -> tuple:
+    """What every ray meets, sample by sample (samples * n luxel numbers), and the sum of what `meet` finds wrong."""
+    mi, dr = mitsuba(), drjit()
+    found, lane, count = dr.zeros(mi.UInt32, samples * n), dr.arange(mi.UInt32, n), number(n)
+
+    def one(k):
+        luxel, seen, wrong = meet(k)
+        dr.scatter(found, dr.select(seen, luxel, NOTHING), k * count + lane)
+        return (wrong,)
+
+    (bad,) = added_up(samples, one, dr.zeros(mi.Float, n))
+    dr.eval(found)
+    return found, bad
 
 
 def hit_luxel(space: Space, ray, active=True):

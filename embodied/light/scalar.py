@@ -75,6 +75,10 @@ def zeros(kind: Type, n: int) -> Values:
     return np.zeros((kind.size, n) if kind.size else n, kind.dtype).view(Values)
 
 
+def arange(kind: Type, n: int) -> Values:
+    return np.arange(n, dtype=kind.dtype).view(Values)
+
+
 def opaque(kind: Type, value: float) -> Values:
     return kind(value)
 
@@ -85,6 +89,18 @@ def eval(*arrays) -> None:
 
 def flush_malloc_cache() -> None:
     """Nothing: NumPy keeps no freed arrays."""
+
+
+def while_loop(state: tuple, cond, body) -> tuple:
+    """`body` from state to state as long as `cond` holds; all entries loop equally long."""
+    while np.all(cond(*state)):
+        state = body(*state)
+    return state
+
+
+def scatter(target: np.ndarray, value, index: np.ndarray) -> None:
+    """Entries of a flat array written."""
+    _bare(target)[_bare(index)] = _bare(value)
 
 
 def select(mask, a, b) -> Values:

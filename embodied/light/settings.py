@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-VERSION = 14
+VERSION = 15
 """Counts up whenever a bake would come out differently; older bakes are then made anew."""
 
 
@@ -16,15 +16,23 @@ class Settings:
     """Luxels per metre on walls, floors and ceilings."""
     budget: float = 6000.0
     """Luxels per piece of furniture."""
+    every: float = 3.0
+    """Luxels from one site to the next (`embodied.light.sites`)."""
+    doubt: float = 0.04
+    """Share of a luxel's light by which the sites around may differ before it is traced itself."""
     sky_rays: int = 24
-    """Rays per luxel and window."""
+    """Rays per site and window, and per luxel where sites disagree."""
     lamp_rays: int = 24
     sun_rays: int = 12
     """Rays over the sun's disc per texel near a shadow's edge."""
     patches: int = 64
     """Small lights that stand for the sun's patches in one room."""
-    bounces: tuple[int, ...] = (6, 6, 8, 12, 64)
-    """Rays per luxel in each round of gathering; the last is what is seen."""
+    bounces: tuple[int, ...] = (6, 6, 8, 12, 96)
+    """Rays per site in each round of gathering; the last is what is seen."""
+    sharpness: float = 1.0
+    """Texels per metre, times those that patterns need to look sharp from nearby (`atlas.fineness`)."""
+    tolerance: float = 0.10
+    """Relative difference from the path tracer that a luxel may have (`embodied.light.check`)."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
     texels: float = 29e6
@@ -32,11 +40,11 @@ class Settings:
 
 
 QUALITIES = {
-    "draft": Settings(24.0, 1800.0, 16, 20, 6, 32, (4, 4, 4, 4, 6, 40), 90),
+    "fast": Settings(20.0, 1200.0, 2.5, 0.12, 8, 8, 4, 20, (4, 4, 4, 4, 48), 0.45, 0.2, 88),
     "normal": Settings(),
-    "high": Settings(56.0, 14000.0, 48, 24, 16, 96, (8, 8, 12, 16, 128), 94, 120e6),
+    "high": Settings(56.0, 14000.0, 3.0, 0.02, 48, 32, 16, 96, (8, 8, 12, 16, 192), 1.0, 0.1, 94, 120e6),
 }
-"""Named settings."""
+"""Named settings: for data sets, for looking, for pictures of single houses."""
 
 
 def settings_of(quality: str) -> Settings:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,11 +10,15 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light import denoise, radiosity
-from embodied.light.atlas import SHELL, Atlas, Texels, albedo, rasterise
-from embodied.light.backend import array, constant, drjit, mitsuba, r2
+from embodied.light.atlas import SHELL, Atlas
+from embodied.light.backend import added_up, array, drjit, fraction, mitsuba, r2
+from embodied.light.colours import ColourMaps, albedo
+from embodied.light.cover import Texels, rasterise
 from embodied.light.emitters import Lamp, Portal, portals_of
-from embodied.light.radiosity import Points, Space, points_of
+from embodied.light.memory import Memory, once
+from embodied.light.radiosity import Patches, Points, Space, points_of
 from embodied.light.settings import Settings
+from embodied.light.sites import Sites, Spread, around_good
 from embodied.light.sky import Outdoors
 from embodied.light.unwrap import areas_of
 
@@ -65,9 +68,7 @@ class Radiosity:
     indirect: np.ndarray
     """All other bounces."""
     good: np.ndarray
-    """(n,) bool; false inside or behind things."""
-    variance: np.ndarray
-    """(n,) of the brightness of `indirect` before it is smoothed."""
+    """(n,) bool; false on walls, floors and ceilings behind things."""
 
     @property
     def soft(self) -> np.ndarray:
@@ -75,43 +76,40 @@ class Radiosity:
         return self.direct + self.patches + self.indirect
 
 
-def luxels_of(house: House, atlas: Atlas, lamps: Sequence[Lamp], read: Callable[[str], np.ndarray]) -> Luxels:
-    """What lies under every luxel."""
+def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
+    """What lies under every luxel; nothing glows yet (`with_glow`)."""
     texels = tuple(rasterise(p, 1) for p in atlas.pages)
-    color, glow, thin, area, owner = [], [], [], [], []
-    for page, t in zip(atlas.pages, texels):
-        color.append(albedo(page, t, read))
-        glow.append(glow_of(house, atlas, page, t, lamps))
-        thin.append(page.thin[t.face])
-        area.append(_share_of_area(page, t))
-        owner.append(page.owner[t.face])
-    owner_of = np.concatenate(owner)
+    pairs = list(zip(atlas.pages, texels))
+    owner = np.concatenate([p.owner[t.face] for p, t in pairs])
     ends = np.cumsum([len(t.index) for t in texels])
     places = {k: np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")}
     mine = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
     texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # views: once in memory, not twice
-    units = {}
-    for o, room, kind in zip(atlas.owners, atlas.rooms, atlas.kinds):
-        units.setdefault(o.split("/")[0] if kind == "opening" else room, len(units))
-    unit_of_owner = np.array(
-        [units[o.split("/")[0] if k == "opening" else r] for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
-    )
-    shell_of_owner = np.array([k in SHELL for k in atlas.kinds])
-    lit = {x.id for x in lamps}
-    sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
-    glow_all = np.concatenate(glow)
+    names = [o.split("/")[0] if k == "opening" else r for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
+    unit = {name: i for i, name in enumerate(dict.fromkeys(names))}
     return Luxels(
         texels,
         *places.values(),
-        np.concatenate(thin),
-        np.concatenate(color),
-        glow_all,
-        sampled[owner_of] & (glow_all.sum(1) > 0),
-        np.concatenate(area),
-        owner_of,
-        unit_of_owner[owner_of].astype(np.int32),
-        shell_of_owner[owner_of],
+        np.concatenate([p.thin[t.face] for p, t in pairs]),
+        np.concatenate([albedo(p, t.cover, maps) for p, t in pairs]),
+        np.zeros((len(owner), 3), np.float32),
+        np.zeros(len(owner), bool),
+        np.concatenate([_share_of_area(p, t) for p, t in pairs]),
+        owner,
+        np.array([unit[name] for name in names], np.int32)[owner],
+        np.array([k in SHELL for k in atlas.kinds])[owner],
     )
+
+
+def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) -> Luxels:
+    """The same luxels with what shines itself: the lamps that are on, screens."""
+    found = [glow_of(house, atlas, p, t.face, lamps) for p, t in zip(atlas.pages, lux.texels)]
+    glow = np.concatenate(
+        [np.zeros((len(t.face), 3), np.float32) if g is None else g for g, t in zip(found, lux.texels)]
+    )
+    lit = {x.id for x in lamps}
+    sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
+    return replace(lux, glow=glow, sampled=sampled[lux.owner] & (glow.sum(1) > 0))
 
 
 def _share_of_area(page, t: Texels) -> np.ndarray:
@@ -125,91 +123,160 @@ def _share_of_area(page, t: Texels) -> np.ndarray:
     return (faces / np.maximum(count, 1) * scale[page.owner]).astype(np.float32)[t.face]
 
 
-def glow_of(house: House, atlas: Atlas, page, texels: Texels, lamps: Sequence[Lamp]) -> np.ndarray:
-    """(n, 3) radiance that texels of `page` give off themselves."""
-    emission = np.array([f.emission or (0.0, 0.0, 0.0) for f in page.finishes], np.float32)[page.finish[texels.face]]
-    out = np.zeros_like(emission)
+def glow_of(house: House, atlas: Atlas, page, face: np.ndarray, lamps: Sequence[Lamp]) -> np.ndarray | None:
+    """(n, 3) radiance that texels on faces (n,) of `page` give off themselves; None where nothing does."""
+    emission = np.array([f.emission or (0.0, 0.0, 0.0) for f in page.finishes], np.float32)[page.finish]
     if not emission.any():
-        return out
+        return None
+    out = np.zeros_like(emission)
     by_light = {x.id: x for x in lamps}
-    for o in np.unique(page.owner):
+    for o in np.unique(page.owner[emission.any(1)]):
         name = atlas.owners[o]
-        mine = (page.owner[texels.face] == o) & (emission.sum(1) > 0)
+        mine = (page.owner == o) & (emission.sum(1) > 0)
         lights = [x for x in house.lights if x.placement == name]
         if not lights:  # screens, stars on a nursery ceiling: they glow by themselves
             out[mine] = emission[mine]
         for x in lights:
             if x.id in by_light:
                 out[mine] = by_light[x.id].radiance
-    return out
+    return out[face]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A house to be lit, at one hour."""
+
+    house: House
+    atlas: Atlas
+    lux: Luxels
+    sites: Sites
+    space: Space
+    outdoors: Outdoors
+    lamps: tuple[Lamp, ...]
+    settings: Settings
+    memory: Memory | None = None
+    """Where the house is lit more than once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A light, as something that shines on luxels."""
+
+    shine: Callable
+    """From luxel numbers (m,) and a number of rays, 0 for the settings', to e (m, 3)."""
+    lamp: Lamp | None = None
+
+
+def sources_of(problem: Problem) -> list[Source]:
+    """Sky and lamps."""
+    atlas, lux, space, settings = problem.atlas, problem.lux, problem.space, problem.settings
+    found = []
+    for x in portals_of(problem.house):
+        sky = lambda i, rays, x=x: radiosity.sky_light(space, subset(lux, i), x, rays or settings.sky_rays)
+        found.append(Source(lambda i, rays, f=sky: array(f(i, rays))))
+    for x in problem.lamps:
+        bare = x.owner is not None and x.owner in atlas.owners
+        own = (
+            once(problem.memory, ("without", x.owner), lambda x=x: radiosity.without(space, atlas, x.owner))
+            if bare
+            else space
+        )
+        lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, subset(lux, i), x, rays or settings.lamp_rays)
+        found.append(Source(lambda i, rays, f=lamp: array(f(i, rays)), x))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Shone:
+    """What one light gives to sites."""
+
+    source: Source
+    units: np.ndarray
+    """Numbers of the units it reaches."""
+    which: np.ndarray
+    """Sites it may reach, in those units."""
+    e: np.ndarray
+    """(len(which), 3) float32."""
+
+
+def shone_on(problem: Problem, source: Source) -> Shone:
+    """The light of a source at the sites; rooms that it reaches nowhere are left out."""
+    lux, sites = problem.lux, problem.sites
+    unit = lux.unit[sites.luxel]
+
+    def shone() -> tuple[np.ndarray, np.ndarray]:
+        which = radiosity.reached(unit, lambda i: source.shine(sites.luxel[i], 4).sum(1) > 0)
+        return which, source.shine(sites.luxel[which], 0) if len(which) else np.zeros((0, 3), np.float32)
+
+    if source.lamp is None or problem.memory is None:
+        which, e = shone()
+    else:  # of the same lamp with another colour or power
+        radiance = np.asarray(source.lamp.radiance, np.float32)
+        which, e = problem.memory.once(("shone", source.lamp.id), lambda: (lambda w, e: (w, e / radiance))(*shone()))
+        e = e * radiance
+    return Shone(source, np.unique(unit[which]), which, e)
 
 
 def direct_light(
-    lux: Luxels,
-    atlas: Atlas,
-    space: Space,
-    portals: Sequence[Portal],
-    lamps: Sequence[Lamp],
-    settings: Settings,
-    tell: Callable[[float], None],
-) -> np.ndarray:
-    """(n, 3) e from sky and lamps."""
-    e = np.zeros((len(lux.position), 3), np.float32)
-    jobs: list[tuple[Space, Callable]] = []
-    for portal in portals:
-        jobs.append((space, lambda s, p, r, x=portal: radiosity.sky_light(s, p, x, r or settings.sky_rays)))
-    for lamp in lamps:
-        own = space
-        if lamp.owner is not None and lamp.owner in atlas.owners:
-            own = radiosity.without(space, atlas, lamp.owner)
-        jobs.append((own, lambda s, p, r, x=lamp: radiosity.lamp_light(s, p, x, r or settings.lamp_rays)))
-    for done, (where, shine) in enumerate(jobs):
-        tell(done / len(jobs))
-        _add_light(e, lux, functools.partial(_shine, lux, where, shine))
-    return e
+    problem: Problem, shone: Sequence[Shone], spread: Spread, good: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) e from sky and lamps, and (n,) bool where rays of its own have found it.
+
+    It is interpolated between sites; good luxels whose sites disagree about a light by more than the settings' `doubt`
+    times all light there are asked with rays.
+    """
+    lux, sites = problem.lux, problem.sites
+    total = np.zeros((len(sites.luxel), 3), np.float32)
+    for x in shone:
+        total[x.which] += x.e
+    e = spread(total)
+    bright, traced = e.mean(1), np.zeros(len(e), bool)
+    for x in shone:
+        mine = np.nonzero(np.isin(lux.unit, x.units) & good)[0]
+        if not len(mine):
+            continue
+        values = np.zeros_like(total)
+        values[x.which] = x.e
+        _, apart = spread.moments(values.mean(1), mine)
+        mine = mine[apart > problem.settings.doubt * (bright[mine] + AMBIENT.mean())]
+        if len(mine):
+            e[mine] += x.source.shine(mine, 0) - spread(values, mine)
+            traced[mine] = True
+    return np.maximum(e, 0.0), traced
 
 
-def _shine(lux: Luxels, where: Space, shine: Callable, i: np.ndarray, rays: int) -> np.ndarray:
-    return array(shine(where, subset(lux, i), rays))
-
-
-def _add_light(e: np.ndarray, lux: Luxels, shine: Callable[[np.ndarray, int], np.ndarray]) -> None:
-    """Add what one light gives to the luxels that it can reach; 0 rays stands for the settings' number."""
-    mine = radiosity.reached(lux.unit, lambda i: shine(i, 4).sum(1) > 0)
-    if len(mine):
-        e[mine] += shine(mine, 0)
-
-
-def outer_light(house: House, lux: Luxels, atlas: Atlas, space: Space, samples: int = 24) -> np.ndarray:
+def outer_light(problem: Problem, spread: Spread, samples: int = 24) -> np.ndarray:
     """(n, 3) e that the outer side of windows and outer doors takes from the open sky.
 
     What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
     every second ray runs up inside the wall.
     """
     mi, dr = mitsuba(), drjit()
+    house, atlas, lux, sites, space = problem.house, problem.atlas, problem.lux, problem.sites, problem.space
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
-    inwards = np.array(
-        [
-            into.get(o.split("/")[0], [np.nan] * 2) if k == "opening" else [np.nan] * 2
-            for o, k in zip(atlas.owners, atlas.kinds)
-        ]
+    outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
+    inwards = np.array([into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]).reshape(
+        -1, 2
     )
-    mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
+    lies = (lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7
+    mine = np.nonzero(lies[sites.luxel])[0]
     if not len(mine):
         return e
-    p = subset(lux, mine)
-    total = dr.zeros(mi.Color3f, p.n)
+    p = subset(lux, sites.luxel[mine])
     portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
-    for k in range(samples):
-        a, b = (constant(x) for x in r2(k))
-        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
-        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+
+    def one(k):
+        a, b = r2(mi.Float(k))
+        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         ray = mi.Ray3f(p.position + p.face_normal * radiosity.LIFT, d)
         free = ~space.scene.ray_test(ray) & ~portals.ray_test(ray)
-        total += dr.select(free, radiosity.env_lookup(space, d, free), mi.Color3f(0.0))
-        dr.eval(total)
-    e[mine] = array(total) / samples
+        return (dr.select(free, radiosity.env_lookup(space, d, free), mi.Color3f(0.0)),)
+
+    at_sites = np.zeros((len(sites.luxel), 3), np.float32)
+    at_sites[mine] = array(added_up(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
+    e[lies] = spread(at_sites, np.nonzero(lies)[0])
     return e
 
 
@@ -217,57 +284,76 @@ def _nowhere() -> Portal:
     return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
 
 
-def sun_light(
-    lux: Luxels, space: Space, portals: Sequence[Portal], outdoors: Outdoors, settings: Settings
-) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) share of the sun, and (n, 3) e of its first bounce."""
-    n = len(lux.position)
+def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) share of the sun at luxels, and (k, 3) e of its first bounce at sites."""
+    lux, sites, space, outdoors = problem.lux, problem.sites, problem.space, problem.outdoors
+    portals = portals_of(problem.house)
+    share, e = np.zeros(len(lux.position), np.float32), np.zeros((len(sites.luxel), 3), np.float32)
     if not portals or not outdoors.sun.any():
-        return np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
-    share = np.asarray(
-        radiosity.sun_share(
-            space, subset(lux, np.arange(n)), radiosity.portal_scene(portals), outdoors.sun_direction, 4
-        )
-    )
+        return share, e
+    through, towards = radiosity.portal_scene(portals), outdoors.sun_direction
+    seen = lambda i, rays: np.asarray(radiosity.sun_share(space, subset(lux, i), through, towards, rays))
+    mine = radiosity.reached(lux.unit, lambda i: seen(i, 1) > 0, tries=1000)
+    mine = mine[lux.thin[mine] | (lux.face_normal[mine] @ towards.astype(np.float32) > 0)]
+    if len(mine):
+        share[mine] = seen(mine, 4)
     flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
-    power = flux.mean(1)
-    e = np.zeros((n, 3), np.float32)
-    for unit in np.unique(lux.unit[power > 0]):
-        mine = np.nonzero((lux.unit == unit) & (power > 0))[0]
-        at = np.round(lux.position[mine] * 4)
-        mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
-        cut = np.cumsum(power[mine])
-        if cut[-1] < 1e-4:
-            continue
-        k = int(np.clip(settings.patches * min(1.0, len(mine) / 2000 + 0.1), 4, settings.patches))
-        pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
-        strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
-        extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
-        _add_light(e, lux, functools.partial(_patches, lux, space, pick, strength, extent))
+    unit = lux.unit[sites.luxel]
+    for u in np.unique(lux.unit[share > 0]):
+        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], problem.settings.patches)
+        if patches is not None:
+            lit = lambda i, x=patches: radiosity.patch_light(space, subset(lux, sites.luxel[i]), x)
+            which = radiosity.reached(unit, lambda i, lit=lit: lit(i).sum(1) > 0)
+            e[which] += lit(which)
     return share, e
 
 
-def _patches(
-    lux: Luxels, space: Space, pick: np.ndarray, strength: np.ndarray, extent: np.ndarray, i: np.ndarray, rays: int
-) -> np.ndarray:
-    return radiosity.patch_light(
-        space, subset(lux, i), lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent
+def _patches(lux: Luxels, flux: np.ndarray, mine: np.ndarray, most: int) -> Patches | None:
+    """At most so many small lights for the sunlit luxels `mine` of one room; None for a glint."""
+    power = flux.mean(1)
+    at = np.round(lux.position[mine] * 4)
+    mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
+    cut = np.cumsum(power[mine])
+    if cut[-1] < 1e-4:
+        return None
+    k = int(np.clip(most * min(1.0, len(mine) / 2000 + 0.1), 4, most))
+    pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
+    strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
+    extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
+    return Patches(lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounced:
+    """Indirect light at sites."""
+
+    e: np.ndarray
+    """(k, 3)."""
+    good: np.ndarray
+    """(k,) bool; false inside or behind things."""
+    variance: np.ndarray
+    """(k,) of brightness, before it is smoothed."""
+
+
+def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
+    """All further bounces, by Jacobi rounds of gathering.
+
+    Args:
+      soft: (n, 3) first light, without the sun's own.
+    """
+    lux, sites, settings = problem.lux, problem.sites, problem.settings
+    here = subset(lux, sites.luxel)
+    first, total, e = 0, sum(settings.bounces), np.zeros((len(sites.luxel), 3), np.float32)
+    seen = lux.albedo * (soft + AMBIENT.astype(np.float32)) + np.where(lux.sampled[:, None], 0.0, lux.glow).astype(
+        np.float32
     )
-
-
-def bounce(lux: Luxels, space: Space, light: Radiosity, settings: Settings, tell: Callable[[float], None]) -> Radiosity:
-    """All further bounces, by Jacobi rounds of gathering."""
-    everywhere = subset(lux, np.arange(len(lux.position)))
-    glow = np.where(lux.sampled[:, None], 0.0, lux.glow)
-    first, total = 0, sum(settings.bounces)
     for samples in settings.bounces:
         tell(first / total)
-        seen = _tamed(lux, lux.albedo * (light.soft + AMBIENT) + glow)
-        e, bad, variance = radiosity.gather(space, everywhere, seen, samples, first)
-        e = e if first else e + _endless(lux, e, bad < 0.5)
-        light = replace(light, indirect=e, good=bad < 0.5, variance=variance)
+        table = _tamed(lux, seen + lux.albedo * e[sites.own])
+        more, bad, variance = radiosity.gather(problem.space, here, table, samples, first, problem.memory)
+        e = more if first else more + _endless(lux, sites, more, bad < 0.5)
         first += samples
-    return light
+    return Bounced(e, bad < 0.5, variance)
 
 
 def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
@@ -289,43 +375,48 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     return out
 
 
-def _endless(lux: Luxels, once: np.ndarray, good: np.ndarray) -> np.ndarray:
+def _endless(lux: Luxels, sites: Sites, once: np.ndarray, good: np.ndarray) -> np.ndarray:
     """First guess (n, 3) of all bounces after the first one `once`: each room as a sphere, e * rho / (1 - rho).
 
     Jacobi rounds from nothing would miss a fifth of a white room's light after four of them. The
     brightest luxels count at most three times the middle one: what lies between window and closed
     curtain does not light the room.
     """
-    out = np.zeros_like(once)
+    out, unit, shell = np.zeros_like(once), lux.unit[sites.luxel], lux.shell[sites.luxel]
     openings = 0.03  # share of a room's walls that lets light out
-    for unit in np.unique(lux.unit):
-        mine = np.nonzero((lux.unit == unit) & lux.shell & good)[0]
+    for u in np.unique(unit):
+        mine = np.nonzero((unit == u) & shell & good)[0]
         if len(mine):
-            weight = lux.area[mine, None] / lux.area[mine].sum()
-            rho = (lux.albedo[mine] * weight).sum(0) * (1 - openings)
+            which = sites.luxel[mine]
+            weight = lux.area[which, None] / lux.area[which].sum()
+            rho = (lux.albedo[which] * weight).sum(0) * (1 - openings)
             arrived = np.minimum(once[mine], 3 * np.median(once[mine], axis=0))
-            out[lux.unit == unit] = (arrived * weight).sum(0) * rho / (1 - rho)
+            out[unit == u] = (arrived * weight).sum(0) * rho / (1 - rho)
     return out
 
 
-def smooth(lux: Luxels, atlas: Atlas, light: Radiosity) -> Radiosity:
-    """Noise taken out of all but the sun; luxels that are not good take their neighbours' light."""
-    soft = ~lux.shell
-    near = denoise.neighbours(lux.position, lux.normal, light.good, soft)
-    on_page = (atlas, lux.texels, light.good, lux.shell)
-    space = lambda e, n, like: denoise.smooth_space(e, lux.position, lux.normal, near, soft, passes=n, likeness=like)
-    mend = lambda e: denoise.fill(e, lux.normal, near, soft, ~light.good) if soft.any() else e
-    indirect = denoise.cap_sparks(mend(light.indirect), *on_page)
-    indirect = space(denoise.smooth_pages(indirect, *on_page, variance=light.variance), 3, 0.9)
-    direct = mend(light.direct)
-    grain = denoise.spatial_variance(direct, atlas, lux.texels, lux.shell) * 0.8
-    direct = denoise.smooth_pages(direct, *on_page, steps=(1, 2, 4, 8), likeness=(0.3, 0.2, 0.12, 0.1), variance=grain)
-    direct = space(direct, 2, 0.6)
-    patches = mend(light.patches)
-    total = direct + indirect + patches
-    if soft.any():
-        indirect = indirect + denoise.lift_specks(total, near, soft) - total
-    return replace(light, direct=direct, patches=patches, indirect=np.maximum(indirect, 0.0), good=light.good | soft)
+def smooth(sites: Sites, bounced: Bounced) -> np.ndarray:
+    """(k, 3) indirect light without its noise."""
+    capped = denoise.cap_sparks(bounced.e, sites.around, bounced.good, variance=bounced.variance)
+    return denoise.smooth_sites(
+        capped, sites.position, sites.normal, sites.around, bounced.good, variance=bounced.variance
+    )
+
+
+def visible(problem: Problem, spread: Spread, good: np.ndarray) -> np.ndarray:
+    """(n,) bool: luxels that are neither inside nor behind things; asked with rays where the sites around disagree.
+
+    Args:
+      good: (k,) bool, of sites.
+    """
+    lux = problem.lux
+    share, _ = spread.moments(good)
+    out = share > 0.5
+    unsure = np.nonzero((share > 0.03) & (share < 0.97))[0]
+    if len(unsure):
+        _, bad, _ = radiosity.gather(problem.space, subset(lux, unsure), np.zeros_like(lux.position), 12)
+        out[unsure] = bad < 0.5
+    return out
 
 
 def subset(lux: Luxels, i: np.ndarray) -> Points:
@@ -334,40 +425,35 @@ def subset(lux: Luxels, i: np.ndarray) -> Points:
 
 
 def solve(
-    house: House,
-    atlas: Atlas,
-    lux: Luxels,
-    outdoors: Outdoors,
-    lamps: Sequence[Lamp],
-    settings: Settings,
-    stage: Callable[[str, Callable[[], dict]], dict],
-    tell: Callable[[str, float], None],
+    problem: Problem,
+    tell: Callable[[str, float], None] = lambda stage, done: None,
+    clock: Callable[[str], None] = lambda name: None,
 ) -> Radiosity:
-    """The light of a house.
-
-    Args:
-      stage: runs a named step that returns arrays, or gives back what it returned in an earlier, interrupted run.
-    """
-    portals = portals_of(house)
-    space = radiosity.space_of(atlas, lux.texels, outdoors.picture)
-    n = len(lux.position)
-    zero = np.zeros((n, 3), np.float32)
-    direct = stage(
-        "direct",
-        lambda: {
-            "e": direct_light(lux, atlas, space, portals, lamps, settings, lambda x: tell("direct light", x)),
-            "outer": outer_light(house, lux, atlas, space),
-        },
-    )
-    sun = stage("sun", lambda: dict(zip(("share", "bounce"), sun_light(lux, space, portals, outdoors, settings))))
-    light = Radiosity(direct["e"], sun["share"], sun["bounce"], zero, np.ones(n, bool), np.zeros(n, np.float32))
-
-    def gathered() -> dict:
-        done = bounce(lux, space, light, settings, lambda x: tell("bounces", x))
-        return {"e": done.indirect, "good": done.good, "variance": done.variance}
-
-    bounced = stage("bounces", gathered)
-    light = replace(light, indirect=bounced["e"], good=bounced["good"], variance=bounced["variance"])
+    """The light of a house."""
+    atlas, lux, sites, memory = problem.atlas, problem.lux, problem.sites, problem.memory
+    k, sources = len(sites.luxel), sources_of(problem)
+    anywhere = Spread(sites, lux.position, lux.normal, np.ones(k, bool))
+    shone, first = [], np.zeros((k, 3), np.float32)
+    for source in sources:
+        tell("direct light", len(shone) / len(sources))
+        shone.append(shone_on(problem, source))
+        first[shone[-1].which] += shone[-1].e
+    clock("direct")
+    share, patches = sun_light(problem)
+    clock("sun")
+    bounced = bounce(problem, anywhere(first + patches), lambda x: tell("bounces", x))
+    clock("bounces")
     tell("smoothing", 0.0)
-    light = smooth(lux, atlas, light)
-    return replace(light, indirect=light.indirect + direct["outer"])
+    around = once(memory, "around", lambda: around_good(sites, bounced.good))
+    spread = Spread(around, lux.position, lux.normal, bounced.good)
+    indirect = spread(smooth(sites, bounced))
+    good = once(memory, "visible", lambda: visible(problem, anywhere, bounced.good))
+    clock("smooth")
+    direct, traced = direct_light(problem, shone, spread, good)
+    grain = denoise.spatial_variance(direct, atlas, lux.texels, traced) * 0.8
+    direct = denoise.smooth_pages(
+        direct, atlas, lux.texels, good, traced, steps=(1, 2), likeness=(0.3, 0.2), variance=grain
+    )
+    clock("direct")
+    indirect += outer_light(problem, anywhere)
+    return Radiosity(direct, share, spread(patches), indirect, good | ~lux.shell)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from embodied.house.house import House
 from embodied.light import radiosity
-from embodied.light.atlas import Atlas, albedo, atlas_of, rasterise, things_of
-from embodied.light.backend import array, constant, drjit, mitsuba, r2, scene_of, vector
+from embodied.light.atlas import Atlas, atlas_of, things_of
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, r2, scene_of, vector
+from embodied.light.colours import ColourMaps, albedo
 from embodied.light.compose import spread
+from embodied.light.cover import cover, rasterise
 from embodied.light.radiosity import ENV_ROWS, LIFT, Space, points_of
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
@@ -27,13 +29,7 @@ LUXELS = 110_000
 
 
 def surroundings(
-    house: House,
-    parts: Sequence,
-    indoors: Atlas,
-    outdoors: Outdoors,
-    exposure: Exposure,
-    cache: Path,
-    read: Callable[[str], np.ndarray],
+    house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoors, exposure: Exposure, cache: Path, maps: ColourMaps
 ) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
     """Outer parts in the light of sun and sky, and the picture on the dome.
 
@@ -57,13 +53,12 @@ def surroundings(
     blockers = scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass]))
     pages = []
     for page in atlas.pages:
-        t = rasterise(page, page.fineness)
-        coarse = rasterise(page, 1)
+        c, coarse = cover(page, page.fineness), rasterise(page, 1)
         e = _daylight(blockers, outdoors, coarse, page.thin[coarse.face])
         field = spread(coarse.index, e, coarse.shape)
-        rows, columns = np.divmod(t.index, t.shape[1])
+        rows, columns = np.divmod(c.index, c.shape[1])
         light = field[rows // page.fineness, columns // page.fineness]
-        pages.append(spread(t.index, display(albedo(page, t, read) * light, gain), t.shape))
+        pages.append(spread(c.index, display(albedo(page, c, maps) * light, gain), c.shape))
     return atlas, pages, dome
 
 
@@ -82,16 +77,16 @@ def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 2
     rows = outdoors.picture.shape[0] // ENV_ROWS
     small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)
     space = Space(scene, *([None] * 9), mi.Float(small.ravel()))
-    hidden = mi.Color3f(*(float(x) / 3 for x in small.mean((0, 1))))
-    total = dr.zeros(mi.Color3f, p.n)
-    for k in range(rays):
-        a, b = (constant(x) for x in r2(k))
-        u = mi.Point2f(p.turn0 + a, p.turn1 + b)
-        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
+    hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
+
+    def one(k):
+        a, b = r2(mi.Float(k))
+        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
-        total += dr.select(free, radiosity.env_lookup(space, d, free), hidden)
-        dr.eval(total)
-    e = array(total) / rays
+        return (dr.select(free, radiosity.env_lookup(space, d, free), hidden),)
+
+    e = array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays
     if outdoors.sun.any():
         cos, side, active = radiosity.facing(p, vector(np.tile(outdoors.sun_direction, (1, 1))))
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, vector(np.tile(outdoors.sun_direction, (p.n, 1))))

@@ -15,7 +15,8 @@ import shapely
 from scipy.ndimage import map_coordinates
 
 from embodied.house.house import House
-from embodied.light.atlas import gamma
+from embodied.light.backend import array, drjit, mitsuba, vector
+from embodied.light.colours import shown
 
 TARGET = 1.05
 """Linear value (before the curve) that a white sheet in a room's fuller light (85th percentile) is brought to."""
@@ -104,18 +105,23 @@ def _gain(light: np.ndarray, level: float) -> np.ndarray:
 
 
 def develop(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """Radiance times gain as sRGB in [0, 1]: extended Reinhard, half on luminance and half per channel.
+    """Radiance times gain, (..., 3), as sRGB in [0, 1] float32: `developed`."""
+    x = np.asarray(radiance, np.float32) * np.asarray(gain, np.float32)
+    return array(developed(mitsuba().Color3f(vector(x.reshape(-1, 3))))).reshape(x.shape)
+
+
+def developed(x):
+    """Exposed radiance, a device colour, as sRGB in [0, 1]: extended Reinhard, half on luminance and half per channel.
 
     Then lifted a little, with a shoulder that keeps sunlit walls short of plain white.
 
     Source: Reinhard et al. 2002, eq. 4, with white at `WHITE`.
     """
-    x = np.asarray(radiance, np.float32) * np.asarray(gain, np.float32)
-    y = np.maximum(x @ np.array([0.2126, 0.7152, 0.0722], np.float32), 1e-9)[..., None]
+    dr = drjit()
+    y = dr.maximum(x.x * 0.2126 + x.y * 0.7152 + x.z * 0.0722, 1e-9)
     by_luminance = x * (_curve(y) / y)
-    shown = gamma(0.5 * (np.minimum(by_luminance, 1.0) + _curve(x))) * np.float32(LIFT)
-    over = np.maximum(shown - np.float32(SHOULDER), 0.0)
-    return shown - over**2 * np.float32((LIFT - 1) / (LIFT - SHOULDER) ** 2)
+    lifted = shown(0.5 * (dr.minimum(by_luminance, 1.0) + _curve(x))) * LIFT
+    return lifted - dr.square(dr.maximum(lifted - SHOULDER, 0.0)) * ((LIFT - 1) / (LIFT - SHOULDER) ** 2)
 
 
 def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
@@ -123,5 +129,5 @@ def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
     return (develop(radiance, gain) * 255 + 0.5).astype(np.uint8)
 
 
-def _curve(x: np.ndarray) -> np.ndarray:
-    return x * (1 + x / np.float32(WHITE**2)) / (1 + x)
+def _curve(x):
+    return x * (1 + x / WHITE**2) / (1 + x)

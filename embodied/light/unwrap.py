@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from assets.cache import atomic_path, digest
 from assets.records import MeshPart
-from embodied.light.backend import constant, drjit, mitsuba, r2, scene_of, vector
+from embodied.light.backend import added_up, drjit, fraction, mitsuba, r2, scene_of, vector
 
 VERSION = 6
 """Counts up whenever an unwrapping would come out differently."""
@@ -277,14 +277,14 @@ def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarr
     reach = max(1e-5, 1e-4 * float(np.ptp(corners.reshape(-1, 3), axis=0).max()))
     shares = []
     for side in (1.0, -1.0):
-        frame, free = mi.Frame3f(n * side), dr.zeros(mi.Float, len(corners))
-        for k in range(rays):
-            a, b = (constant(x) for x in r2(k))
-            u = mi.Point2f(r0 + a, r1 + b)
-            d = frame.to_world(mi.warp.square_to_cosine_hemisphere(u - dr.floor(u)))
-            free += dr.select(scene.ray_test(mi.Ray3f(mi.Point3f(centre + n * (side * reach)), d)), 0.0, 1.0)
-            dr.eval(free)
-        shares.append(np.asarray(free) / rays)
+        frame, origin = mi.Frame3f(n * side), mi.Point3f(centre + n * (side * reach))
+
+        def one(k, frame=frame, origin=origin):
+            a, b = r2(mi.Float(k))
+            d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(r0 + a, r1 + b))))
+            return (dr.select(scene.ray_test(mi.Ray3f(origin, d)), 0.0, 1.0),)
+
+        shares.append(np.asarray(added_up(rays, one, dr.zeros(mi.Float, len(corners)))[0]) / rays)
     return shares[0], shares[1]
 
 

@@ -1,0 +1,189 @@
+"""Colours: sRGB and linear light, and the reflectance under the texels of a page, looked up on the device."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from assets.cache import atomic_path, digest
+from embodied.light.atlas import Page
+from embodied.light.backend import array, drjit, mitsuba
+from embodied.light.cover import Cover
+from embodied.light.unwrap import areas_of
+
+DARKEST, LIGHTEST = 0.02, 0.88
+"""Reflectances are kept between these."""
+MAPS = 1
+"""Counts up whenever halved maps would come out differently."""
+CODE = 1023
+"""Colour maps lie on the device as three 10-bit square roots of linear light per pixel."""
+
+
+class ColourMaps:
+    """Reads colour maps and remembers the last ones; all of a house would fill hundreds of megabytes."""
+
+    def __init__(self, cache: Path | None = None, kept: int = 96) -> None:
+        """`kept` halved maps are remembered; halved ones are also kept under `cache`, to be decoded once and not per house."""
+        self._cache = Path(cache) / "maps" if cache else None
+        self._whole = functools.lru_cache(maxsize=4)(read_colours)
+        self.shape = functools.cache(self._shape)
+        """Height and width of the map at a path."""
+        self.halved = functools.lru_cache(maxsize=kept)(self._halved)
+        """The map at a path, halved so many times: (h, w) uint32 codes of linear colour."""
+
+    def _shape(self, path: str) -> tuple[int, int]:
+        h, w = self._kept(path, "shape", lambda: np.array(self._whole(path).shape[:2]))
+        return int(h), int(w)
+
+    def _halved(self, path: str, level: int) -> np.ndarray:
+        if level == 0:
+            return _coded(self._whole(path), 0)
+        return self._kept(path, str(level), lambda: _coded(self._whole(path), level))
+
+    def _kept(self, path: str, name: str, make: Callable[[], np.ndarray]) -> np.ndarray:
+        """What `make` returns, from disk where it is there and younger than the map."""
+        if self._cache is None:
+            return make()
+        source = Path(path)
+        if not source.is_file():
+            return make()
+        stat = source.stat()
+        file = self._cache / f"{digest(MAPS, str(source), stat.st_size, stat.st_mtime_ns)[:32]}_{name}.npy"
+        with contextlib.suppress(OSError, ValueError, EOFError):
+            return np.load(file, allow_pickle=False)
+        made = make()
+        with atomic_path(file) as temporary, open(temporary, "wb") as f:
+            np.save(f, made)
+        return made
+
+
+def read_colours(path: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of an image file."""
+    image = cv2.imread(path, cv2.IMREAD_COLOR)
+    if image is None:
+        raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def linear(srgb: np.ndarray) -> np.ndarray:
+    """sRGB in [0, 1] to linear (IEC 61966-2-1)."""
+    srgb = np.asarray(srgb)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def gamma(x: np.ndarray) -> np.ndarray:
+    """Linear to sRGB in [0, 1] (IEC 61966-2-1)."""
+    x = np.clip(x, 0.0, 1.0)
+    return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def shown(x):
+    """`gamma` of a device colour or number."""
+    dr = drjit()
+    x = dr.clip(x, 0.0, 1.0)
+    return dr.select(x <= 0.0031308, x * 12.92, 1.055 * dr.power(dr.maximum(x, 1e-6), 1 / 2.4) - 0.055)
+
+
+@dataclass(frozen=True, eq=False)
+class Paints:
+    """What colours the faces of one page, on the device; m faces."""
+
+    plain: object
+    """(m * 3) linear colour of faces without a map."""
+    uv: object
+    """(m * 3 * 2)."""
+    first: object
+    """(m,) where a face's map begins in `maps`, then its size; 0 wide for none."""
+    width: object
+    height: object
+    maps: object
+    """Codes of all maps."""
+
+
+def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
+    """Upload the colours of a page.
+
+    Args:
+      scale: texels per luxel; maps are halved until they are no finer.
+    """
+    mi = mitsuba()
+    plain = linear(np.array([f.color[:3] for f in page.finishes], np.float32).reshape(-1, 3))[page.finish]
+    first, width, height = (np.zeros(len(page.finish), np.uint32) for _ in range(3))
+    maps, end = [np.zeros(1, np.uint32)], 1
+    for f, finish in enumerate(page.finishes):
+        mine = np.nonzero(page.finish == f)[0]
+        if finish.texture is None or not len(mine):
+            continue
+        full = read.shape(finish.texture)
+        levels = _levels(page, mine, full, scale)
+        for level in np.unique(levels):
+            image = read.halved(finish.texture, int(level))
+            which = mine[levels == level]
+            first[which], height[which], width[which] = end, *image.shape
+            maps.append(image.ravel())
+            end += image.size
+    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
+    return Paints(flat(plain), flat(page.uv), *(mi.UInt32(a) for a in (first, width, height, np.concatenate(maps))))
+
+
+def colour_at(paints: Paints, face, b1, b2):
+    """Reflectance (a Color3f) at places on faces: bilinear, repeating; v runs up."""
+    mi, dr = mitsuba(), drjit()
+    at = lambda c: dr.gather(mi.Point2f, paints.uv, face * 3 + c)
+    uv = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
+    first, w, h = (dr.gather(mi.UInt32, a, face) for a in (paints.first, paints.width, paints.height))
+    mapped = w > 0
+    x = (uv.x - dr.floor(uv.x)) * mi.Float(w) - 0.5
+    y = (1 - uv.y - dr.floor(1 - uv.y)) * mi.Float(h) - 0.5
+    x0, y0 = dr.floor(x), dr.floor(y)
+    fx, fy = x - x0, y - y0
+    column, row = mi.UInt32(x0 + mi.Float(w)), mi.UInt32(y0 + mi.Float(h))
+    safe_w, safe_h = dr.maximum(w, 1), dr.maximum(h, 1)
+    out = mi.Color3f(0.0)
+    for dx, wx in ((0, 1 - fx), (1, fx)):
+        for dy, wy in ((0, 1 - fy), (1, fy)):
+            spot = first + (row + dy) % safe_h * w + (column + dx) % safe_w
+            out += _decoded(dr.gather(mi.UInt32, paints.maps, spot, mapped)) * (wx * wy)
+    out = dr.select(mapped, out, dr.gather(mi.Color3f, paints.plain, face))
+    return dr.clip(out, DARKEST, LIGHTEST)
+
+
+def albedo(page: Page, c: Cover, read: ColourMaps) -> np.ndarray:
+    """(n, 3) float32 linear reflectance under each texel, kept inside [DARKEST, LIGHTEST]."""
+    mi = mitsuba()
+    if not len(c.face):
+        return np.zeros((0, 3), np.float32)
+    paints = paints_of(page, c.shape[1] / page.width, read)
+    return array(colour_at(paints, mi.UInt32(c.face.astype(np.uint32)), mi.Float(c.b1), mi.Float(c.b2)))
+
+
+def _levels(page: Page, faces: np.ndarray, shape: tuple[int, ...], scale: float) -> np.ndarray:
+    """(k,) int: how often a map of `shape` must be halved before faces read it."""
+    pad = lambda a: np.pad(a[faces], ((0, 0), (0, 0), (0, 1)))
+    source, target = areas_of(pad(page.uv)) * shape[0] * shape[1], areas_of(pad(page.luxels)) * scale**2
+    ratio = np.maximum(source, 1e-9) / np.maximum(target, 1e-9)
+    return np.clip(np.round(0.5 * np.log2(ratio)), 0, 8).astype(int)
+
+
+def _coded(image: np.ndarray, level: int) -> np.ndarray:
+    """(h, w) uint32 codes of an (h, w, 3) uint8 sRGB image halved `level` times in linear light."""
+    light = linear(np.arange(256, dtype=np.float32) / 255)
+    if not level:
+        code = np.round(np.sqrt(light) * CODE).astype(np.uint32)[image]
+    else:
+        size = max(1, image.shape[1] >> level), max(1, image.shape[0] >> level)
+        code = np.round(np.sqrt(cv2.resize(light[image], size, interpolation=cv2.INTER_AREA)) * CODE).astype(np.uint32)
+    code = code.reshape(*code.shape[:2], 3)
+    return np.ascontiguousarray(code[..., 0] | code[..., 1] << 10 | code[..., 2] << 20)
+
+
+def _decoded(code):
+    mi, dr = mitsuba(), drjit()
+    part = lambda shift: dr.square(mi.Float((code >> shift) & CODE) * (1.0 / CODE))
+    return mi.Color3f(part(0), part(10), part(20))

@@ -1,0 +1,152 @@
+"""What lies under every texel of a page: which face, where on it, and the surface there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from embodied.light.atlas import Page
+from embodied.light.backend import drjit, mitsuba, scene_of
+from embodied.light.unwrap import face_normals
+
+OFFSETS = (
+    *((-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0)),
+    *((0.45, 0.45), (-0.45, -0.45), (0.45, -0.45), (-0.45, 0.45), (0.15, -0.15), (-0.15, 0.15)),
+)
+"""Where in a texel a face is looked for when its centre shows none, one after the other: slivers that miss all centres
+still get texels of their own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """The covered texels of one page; n of them."""
+
+    index: np.ndarray
+    """(n,) int64, row * width + column."""
+    face: np.ndarray
+    """(n,) int32, face of the page."""
+    b1: np.ndarray
+    b2: np.ndarray
+    """(n,) float32, barycentric weights of the face's second and third corner."""
+    shape: tuple[int, int]
+    """Height and width of the page in these texels."""
+
+    def weights(self, i: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(k, 3) float32 barycentric weights of texels `i`."""
+        b1, b2 = self.b1[i], self.b2[i]
+        return np.stack([1 - b1 - b2, b1, b2], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """The surface under the covered texels of one page; n of them."""
+
+    cover: Cover
+    position: np.ndarray
+    """(n, 3) float32, metres, world."""
+    normal: np.ndarray
+    """(n, 3) float32, unit, shading."""
+    face_normal: np.ndarray
+
+    @property
+    def index(self) -> np.ndarray:
+        return self.cover.index
+
+    @property
+    def face(self) -> np.ndarray:
+        return self.cover.face
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.cover.shape
+
+
+def cover(page: Page, fineness: int) -> Cover:
+    """Faces under texels, found by shooting rays straight down on the layout: at centres, and beside what these find
+    and along the slivers that they miss at `OFFSETS`.
+
+    Args:
+      fineness: texels per luxel along each axis.
+    """
+    w, h = page.width * fineness, page.height * fineness
+    at = page.luxels * fineness
+    scene = scene_of(np.concatenate([at, np.zeros((*at.shape[:2], 1), np.float32)], axis=-1))
+    face, b1, b2 = _straight_down(scene, np.arange(w * h), w, (0.0, 0.0))
+    left = _doubtful(face.reshape(h, w) >= 0, at, face)
+    for offset in OFFSETS:
+        found, *where = _straight_down(scene, left, w, offset)
+        hit = found >= 0
+        for all_, new in zip((face, b1, b2), (found, *where)):
+            all_[left[hit]] = new[hit]
+        left = left[~hit]
+    index = np.nonzero(face >= 0)[0]
+    return Cover(index, face[index], b1[index], b2[index], (h, w))
+
+
+def rasterise(page: Page, fineness: int) -> Texels:
+    """The surface under every covered texel."""
+    c = cover(page, fineness)
+    return Texels(c, *surface(page, c))
+
+
+def surface(page: Page, c: Cover, i: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, shading normals and face normals, (k, 3) float32 each, under the texels `i` of a cover."""
+    face, weights = c.face[i], c.weights(i)
+    normal = mix(weights, page.normals, face)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
+    return mix(weights, page.corners, face), normal, face_normals(page.corners).astype(np.float32)[face]
+
+
+def mix(weights: np.ndarray, corners: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """Barycentric mean of per-corner values (m, 3, c) at n points: (n, c) float32."""
+    out = corners[face, 0] * weights[:, :1]
+    out += corners[face, 1] * weights[:, 1:2]
+    out += corners[face, 2] * weights[:, 2:]
+    return out.astype(np.float32, copy=False)
+
+
+def nearest(mask: np.ndarray) -> np.ndarray:
+    """(h, w) int32: flat position of the nearest true pixel of a mask that has any."""
+    _, labels = cv2.distanceTransformWithLabels(
+        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    flat = np.flatnonzero(mask).astype(np.int32)
+    at = np.zeros(len(flat) + 1, np.int32)
+    at[labels.ravel()[flat]] = flat
+    return at[labels]
+
+
+def _straight_down(scene, spot: np.ndarray, width: int, offset: tuple[float, float]) -> tuple[np.ndarray, ...]:
+    """Face under each texel `spot` (-1 for none), and where on it."""
+    mi, dr = mitsuba(), drjit()
+    if not len(spot):
+        return np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)
+    row, column = np.divmod(spot.astype(np.int32), np.int32(width))
+    x, y = (mi.Float((a + np.float32(0.5 + o)).astype(np.float32)) for a, o in zip((column, row), offset))
+    hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(x, y, 1.0), mi.Vector3f(0, 0, -1)), True)
+    face = dr.select(hit.is_valid(), mi.Int32(hit.prim_index), -1)
+    u, v = hit.prim_uv.x, hit.prim_uv.y
+    dr.eval(face, u, v)
+    return np.array(face), np.array(u), np.array(v)
+
+
+def _doubtful(covered: np.ndarray, at: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """Flat positions of texels without a face that may yet touch one: beside covered ones, and along faces without any.
+
+    Args:
+      covered: (h, w) bool. at: (m, 3, 2) corners in texels. face: (h * w,) int.
+    """
+    h, w = covered.shape
+    open_ = cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8))
+    missed = np.ones(len(at), bool)
+    missed[face[face >= 0]] = False
+    corners = at[missed]
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        count = np.ceil(np.linalg.norm(corners[:, b] - corners[:, a], axis=1)).astype(int) * 2 + 1
+        which = np.repeat(np.arange(len(corners)), count)
+        along = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / np.repeat(count, count)
+        x, y = (corners[which, a] + (corners[which, b] - corners[which, a]) * along[:, None]).T
+        open_[np.clip(y.astype(int), 0, h - 1), np.clip(x.astype(int), 0, w - 1)] = 1
+    return np.flatnonzero(open_.astype(bool) & ~covered)
