@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import pickle
+import re
 import struct
 import subprocess
 import time
@@ -22,9 +23,10 @@ from assets.catalogue import load_catalogue
 from assets.importing import importer
 from assets.importing.meshing import crease_normals
 from assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
+from assets.importing.own import import_own, read_own
 from assets.importing.sh3f import PackError
 from assets.records import bounds
-from assets.rows import CatalogueError
+from assets.rows import DATA, CatalogueError, read_json
 from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world
@@ -181,6 +183,7 @@ def test_a_model_that_is_gone_since_the_catalogue_was_read_is_named(tmp_path):
         catalogue.mesh("mine/box")
 
 
+@pytest.mark.gl
 def test_a_world_does_not_believe_what_was_seen_before_a_model_changed(tmp_path):
     own = painted(tmp_path / "own")
     thing = Placement("mug_1", "mine/box", "mug", "living_room_1", (2.5, 2.5, 0.0), 0.0, MUG["size"])
@@ -355,6 +358,65 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
     assert part.finish.color[:3] == (0.8, 0.8, 0.8)
 
 
+def everything(folder: Path) -> Path:
+    """A folder with a model of every kind, and as much said about them as can be."""
+    own = painted(folder)
+    body = json.loads((own / "catalogue.json").read_text())
+    body["classes"] = {"gnome": {"support": "floor", "rooms": {"hall": 1}, "tags": ["garden"]}}
+    body["models"] |= {
+        "g": {"file": "g.glb", "class": "gnome", "size": [0.1, 0.1, 0.2], "looks": {"m": "wood #ff0000"}}
+        | {"surfaces": [["top", 0.2, -0.05, -0.05, 0.05, 0.05, 9]], "emits": [1, 1, 1], "lamp": [0, 0, 0.1], "yaw": 90},
+        "s": {"file": "s.sh3f", "model": "mine/box", "class": "gnome"},
+        "v": {"of": "g", "size": [0.2, 0.1, 0.2]},
+    }
+    (own / "catalogue.json").write_text(json.dumps(body))
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    uv = np.random.default_rng(0).random((len(ball.vertices), 2))
+    ball.visual = trimesh.visual.TextureVisuals(uv=uv, image=Image.new("RGB", (8, 8), "red"))
+    ball.export(own / "g.glb")
+    write_pack(own / "s.sh3f", {"mine/box/box.obj": CUBE})
+    return own
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """`data` with bytes changed, cut off, taken out or put in, or a number replaced by what does not belong there."""
+    kind, at = int(rng.integers(5)), int(rng.integers(len(data)))
+    noise = rng.integers(0, 256, int(rng.integers(1, 30)), dtype=np.uint8).tobytes()
+    numbers = list(re.finditer(rb"-?\d+(\.\d+)?", data))
+    if kind == 0 and numbers:
+        found = numbers[int(rng.integers(len(numbers)))]
+        odd = (b"-1", b"0", b"1e308", b"NaN", b"9" * 30, b"null", b"[]", b'"x"', b"1e-300", b"99999999")
+        return data[: found.start()] + odd[int(rng.integers(len(odd)))] + data[found.end() :]
+    if kind == 1:
+        return data[:at]
+    if kind == 2:
+        return data[:at] + data[at + len(noise) :]
+    return data[:at] + noise + data[at + (len(noise) if kind == 3 else 0) :]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["catalogue.json", "a.obj", "a.mtl", "a.png", "g.glb", "s.sh3f"])
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_no_mutation_of_a_file_ends_in_a_traceback_or_in_a_mesh_that_is_none(tmp_path, name):
+    """300 of each kind; what is accepted has finite numbers in it."""
+    own, classes = everything(tmp_path / "own"), read_json(DATA / "classes.json")
+    whole, refused = (own / name).read_bytes(), 0
+    for i in range(300):
+        (own / name).write_bytes(mutated(whole, np.random.default_rng([7, i])))
+        try:
+            assets, recipes, models = read_own(own, classes)
+            touched = [key for key in assets if name[0] in ("c", models[key].file.name[0])]
+            meshes = [part for key in touched for part in import_own(models[key], recipes[key], tmp_path / str(i))]
+        except (CatalogueError, MeshError, PackError) as e:
+            refused += 1
+            assert len(str(e)) < 2000
+            continue
+        for part in meshes:
+            assert all(np.isfinite(a).all() for a in (part.vertices, part.normals, part.uv))
+            assert part.faces.min() >= 0 and part.faces.max() < len(part.vertices)
+    assert refused > 30 or name == "a.mtl", "lines of an .mtl that mean nothing are passed over"
+
+
 # large polygons
 
 
@@ -431,6 +493,7 @@ class Models:
         return extent(self.catalogue, ("mine/box", "built/vase_white")[i])
 
 
+@pytest.mark.slow
 def test_a_catalogue_goes_to_the_spawned_workers_of_a_data_loader(tmp_path):
     from torch.utils.data import DataLoader
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart
 from assets.importing.meshing import face_normals
-from assets.importing.obj import MAX_FACES, MeshError
+from assets.importing.obj import FARTHEST, MAX_FACES, MeshError
 from assets.importing.sh3f import MAX_ENTRY
 from assets.records import Finish
 
@@ -86,7 +86,7 @@ def _picture(image: dict[str, Any], header: dict[str, Any], body: bytes) -> byte
 
 def _part(i: int, mesh: trimesh.Trimesh) -> RawPart:
     vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    if not np.isfinite(vertices).all() or not np.abs(face_normals(vertices, faces)).max() > 0:
+    if not (np.abs(vertices) <= FARTHEST).all() or not np.abs(face_normals(vertices, faces)).max() > 0:
         raise ValueError(f"mesh {i} has vertices that are not finite, or no area")
     material = getattr(mesh.visual, "material", None)
     name = str(getattr(material, "name", None) or f"mesh_{i}")
@@ -102,7 +102,10 @@ def _part(i: int, mesh: trimesh.Trimesh) -> RawPart:
     picture, uv = getattr(material, "baseColorTexture", None), getattr(mesh.visual, "uv", None)
     if picture is None or uv is None or len(uv) != len(vertices):
         return RawPart(name, vertices, faces, None, finish)
-    return RawPart(name, vertices, faces, np.asarray(uv, dtype=np.float64)[faces], finish, _shrunk(picture))
+    coords = np.asarray(uv, dtype=np.float64)
+    if not (np.abs(coords) <= FARTHEST).all():
+        raise ValueError(f"mesh {i} has texture coordinates that are not finite")
+    return RawPart(name, vertices, faces, coords[faces], finish, _shrunk(picture))
 
 
 def _shrunk(picture: Image.Image) -> Image.Image:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 MAX_FACES = 2_000_000
+FARTHEST = 1e9
+"""Largest coordinate, of vertices in a file's own unit and of textures; beyond it numbers of 32 bits mean nothing."""
 MAX_CORNERS = 20_000
 """Of one polygon."""
 
@@ -119,7 +121,7 @@ def _material_field(head: str, rest: list[str], line: str) -> dict:
     try:
         if head in colors:
             values = [min(1.0, max(0.0, float(x))) for x in rest[:3]]
-            return {colors[head]: tuple(values if len(values) == 3 else values[:1] * 3)}
+            return {colors[head]: tuple(values) if len(values) == 3 else (values[0],) * 3}
         if head == "Ns":
             return {"shininess": float(rest[0])}
         if head == "d":
@@ -146,8 +148,8 @@ def _numbers(lines: list[str], width: int, where: str) -> np.ndarray:
             raise ValueError(f"{out.shape[1]} numbers")
     except ValueError as e:
         raise MeshError(f"{where} has a vertex that is not {width} numbers; the model is damaged") from e
-    if not np.isfinite(out).all():
-        raise MeshError(f"{where} has a vertex that is not finite; the model is damaged")
+    if not (np.abs(out) <= FARTHEST).all():
+        raise MeshError(f"{where} has a vertex that is not finite, or beyond {FARTHEST:g}; the model is damaged")
     return out
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -76,12 +77,13 @@ class Pack:
         Raises:
           PackError: no such entry, damaged, encrypted, or larger than it claims.
         """
+        entry = _safe_name(self.path, name)
         try:
-            with zipfile.ZipFile(self.path) as z, z.open(_safe_name(self.path, name)) as f:
+            with zipfile.ZipFile(self.path) as z, z.open(entry) as f:
                 data = f.read(MAX_ENTRY + 1)
         except KeyError as e:
             raise PackError(f"{self.path.name} has no entry {name!r}; install the pack again") from e
-        except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError, EOFError) as e:
+        except (zipfile.BadZipFile, zlib.error, RuntimeError, OSError, EOFError, ValueError) as e:
             raise PackError(f"{self.path.name}: entry {name!r} cannot be read ({e}); install the pack again") from e
         if len(data) > MAX_ENTRY:
             raise PackError(f"{self.path.name}: entry {name!r} unpacks to over {MAX_ENTRY} bytes; do not use this pack")
@@ -104,7 +106,7 @@ def open_pack(path: Path) -> Pack:
             infos = z.infolist()
     except FileNotFoundError as e:
         raise PackError(f"furniture library {path} does not exist; apt-get install sweethome3d-furniture") from e
-    except (zipfile.BadZipFile, OSError) as e:
+    except (zipfile.BadZipFile, RuntimeError, OSError, EOFError, ValueError) as e:
         raise PackError(f"{path} is not a .sh3f library ({e}); install it again or name another file") from e
     _check_contents(path, infos)
     toc = digest([[i.filename, i.file_size, i.CRC] for i in infos])
