@@ -36,6 +36,7 @@ def test_every_example_is_run_here_and_shown_in_the_readme_of_examples():
         assert f'run("{script.name}"' in here and script.name in listed, script.name
 
 
+@pytest.mark.gl
 @pytest.mark.slow
 def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
     said = run("generate_and_look.py", tmp_path, "--out", "look")
@@ -45,18 +46,21 @@ def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
     assert {p.name for p in (tmp_path / "look").iterdir()} >= {"house.json", "plan.png"}
 
 
+@pytest.mark.gl
 @pytest.mark.slow
 def test_own_policy_stands_in_the_table_beside_the_baselines(tmp_path, flats):
     said = run("own_policy.py", tmp_path, "--data", str(flats))
     assert re.search(r"\| least tried \|.*\n.*random walk", said) and "| shortest | test_unseen | 100.0" in said
 
 
+@pytest.mark.gl
 @pytest.mark.slow
 def test_the_gymnasium_loop_hears_help(tmp_path):
     said = run("gymnasium_loop.py", tmp_path, "--episodes", "2")
     assert said.count("“find ") >= 2 and said.count("reward") == 2
 
 
+@pytest.mark.gl
 @pytest.mark.slow
 def test_own_furniture_stands_in_a_house_and_is_seen(tmp_path):
     run("own_furniture.py", tmp_path, "--out", "out")
@@ -64,6 +68,7 @@ def test_own_furniture_stands_in_a_house_and_is_seen(tmp_path):
     assert ((red > 100) & (green < 60) & (blue < 60)).mean() > 0.01, "the red table is in the picture"
 
 
+@pytest.mark.gl
 @pytest.mark.slow
 def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
     said = run("dataset_to_torch.py", tmp_path, "--data", str(flats))

@@ -107,6 +107,7 @@ def wheel(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {
@@ -118,6 +119,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     assert {n.split("/")[0] for n in names if ".dist-info" not in n} == set(PACKAGES)
 
 
+@pytest.mark.slow
 def test_the_wheel_is_named_after_the_distribution(wheel):
     assert Path(wheel.filename).name.startswith(DISTRIBUTION.replace("-", "_") + "-")
 
