@@ -45,7 +45,7 @@ class DatasetConfig:
     kind: str
     """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
     scale: str = "mini"
-    """'paper', 'mini' or 'tiny'."""
+    """One of embodied.datasets.scale.SCALES, or a size of one's own, '40x4000' (houses x tasks)."""
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
