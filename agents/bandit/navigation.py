@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
-from agents.bandit.runs import Note, Run
+from agents.bandit.runs import Run
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
@@ -28,7 +28,7 @@ from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
 from agents.hanna.training import Split
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
-from agents.imitation.loop import seed_of, tasks_of_update
+from agents.imitation.loop import Note, seed_of, tasks_of_update
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

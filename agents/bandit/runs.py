@@ -1,20 +1,16 @@
-"""Resumable runs: weights, optimizers and numbers of a training stage in one checkpoint, pass after pass."""
+"""Resumable runs: weights, optimizers and numbers of a training stage in one checkpoint."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import nn
 
-from agents.bandit.translate import batches
 from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
 from agents.imitation.loop import Note, Progress, Session
 from assets.cache import write_json
-from embodied.locks import locked
-from embodied.seeds import stream
 
 FORMAT = "embodied-bandit-run-1"
 
@@ -86,41 +82,3 @@ class Run:
         """Go on until `total` updates are done, saving every so many `minutes`."""
         say = lambda line: note(f"{self.folder}: {line}")
         return Session(self.progress, total, self.save, checkpoint_minutes=minutes, note=say)
-
-
-def run_passes(
-    run: Run,
-    passes: int,
-    lengths: Sequence[int],
-    batch: int,
-    *,
-    seed: int,
-    purpose: str,
-    minutes: float,
-    note: Note,
-    step: Callable[[np.ndarray, int, int], Mapping[str, float]],
-    finish: Callable[[int, Mapping[str, float]], Mapping[str, float]],
-) -> list[dict[str, float]]:
-    """Go on with `run` until it has had so many passes; returns what `finish` said of each.
-
-    Args:
-      lengths: of the sentences, which are put into batches of similar length, anew in every pass.
-      minutes: between checkpoints.
-      step: is given sentences, the pass and the number of the update, does it, and returns numbers to add up.
-      finish: is given a pass and the sums of its numbers; returns what is kept of it.
-
-    Raises:
-      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
-    """
-    each, order = -(-len(lengths) // batch), None
-    with locked(run.folder), run.session(passes * each, minutes, note) as session:
-        for update in session:
-            turn, place = divmod(update, each)
-            if order is None or place == 0:
-                order = batches(lengths, batch, stream(seed, purpose, "order", turn))
-            run.add(step(order[place], turn, update))
-            if place + 1 == each:
-                run.history.append({"pass": turn + 1, **finish(turn, run.sums)})
-                run.sums = {}
-                note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
-    return run.history[:passes]

@@ -25,13 +25,17 @@ from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import corpus_digest, load
 from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import CLEAN, Rater
-from agents.bandit.runs import Note, Run, run_passes
+from agents.bandit.runs import Run
 from agents.bandit.store import load_weights, save_weights
-from agents.bandit.translate import Numbered, decode, drawn_with, greedy, numbered, padded, perplexity
+from agents.bandit.translate import Numbered, batches, decode, drawn_with, greedy, numbered, padded, perplexity
 from agents.bandit.words import BUILDERS, Lexicon
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.imitation.loop import Note
+from embodied.locks import locked
 from embodied.seeds import stream
 
+Step = Callable[[np.ndarray, int, int], Mapping[str, float]]
+Finish = Callable[[int, Mapping[str, float]], Mapping[str, float]]
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
 REFERENCES = ("full", "weak")
@@ -193,21 +197,16 @@ def bandit(
     config, data = m.config, m.splits[m.config.bandit_set]
     translator, critic = m.translator(), m.critic()
     load_weights(translator, reference)
-    modules: dict[str, torch.nn.Module] = {"translator": translator}
     optimizers = {"translator": adam(translator, config.bandit_rate)}
     if learner == "a2c":
         load_weights(critic, critic_file)
-        modules["critic"], optimizers["critic"] = critic, adam(critic, config.bandit_rate)
-    about = m.identity(
-        "critic_passes",
-        "bandit_rate",
-        "bandit_set",
-        ratings=m.bandit_digest,
-        reference=reference.stem,
-        learner=learner,
-        rater=dataclasses.asdict(rater),
-    )
-    run = Run(folder, about, modules, optimizers)
+        optimizers["critic"] = adam(critic, config.bandit_rate)
+    modules = {
+        name: network for name, network in (("translator", translator), ("critic", critic)) if name in optimizers
+    }
+    about = {"reference": reference.stem, "learner": learner, "rater": dataclasses.asdict(rater)}
+    fields = ("critic_passes", "bandit_rate", "bandit_set")
+    run = Run(folder, m.identity(*fields, ratings=m.bandit_digest, **about), modules, optimizers)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said = sampled(translator, m, data, chosen, "bandit", turn)
@@ -218,13 +217,10 @@ def bandit(
             loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
             descend(loss, optimizers["translator"], config.clip, where)
         if learner == "a2c":
-            ratings = [
-                rater.rate(s, rng=stream(config.seed, "rating", turn, int(i)))
-                for s, i in zip(scores, chosen, strict=True)
-            ]
-            learn_from_ratings(
-                translator, critic, optimizers, rows(data.source, chosen), padded(said), ratings, config.clip, where
-            )
+            rngs = [stream(config.seed, "rating", turn, int(i)) for i in chosen]
+            ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs)]
+            source = rows(data.source, chosen)
+            learn_from_ratings(translator, critic, optimizers, source, padded(said), ratings, config.clip, where)
             numbers["rating"] = float(sum(ratings))
         return numbers
 
@@ -291,18 +287,28 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
 
 
 def _passes(
-    run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Callable, finish: Callable, note: Note
+    run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Step, finish: Finish, note: Note
 ) -> list[dict[str, float]]:
-    config = m.config
-    return run_passes(
-        run,
-        passes,
-        [len(s) for s in data.source],
-        config.batch,
-        seed=config.seed,
-        purpose=purpose,
-        minutes=config.checkpoint_minutes,
-        note=note,
-        step=step,
-        finish=finish,
-    )
+    """Go on with `run` until it has had so many passes over `data`; returns what `finish` said of each.
+
+    Args:
+      purpose: names the random order of the sentences, anew in every pass.
+      step: is given sentences, the pass and the number of the update, does it, and returns numbers to add up.
+      finish: is given a pass and the sums of its numbers; returns what is kept of it.
+
+    Raises:
+      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+    """
+    config, lengths = m.config, [len(s) for s in data.source]
+    each, order = -(-len(lengths) // config.batch), None
+    with locked(run.folder), run.session(passes * each, config.checkpoint_minutes, note) as session:
+        for update in session:
+            turn, place = divmod(update, each)
+            if order is None or place == 0:
+                order = batches(lengths, config.batch, stream(config.seed, purpose, "order", turn))
+            run.add(step(order[place], turn, update))
+            if place + 1 == each:
+                run.history.append({"pass": turn + 1, **finish(turn, run.sums)})
+                run.sums = {}
+                note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
+    return run.history[:passes]
