@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 MAX_FACES = 2_000_000
-FARTHEST = 1e9
-"""Largest coordinate, of vertices in a file's own unit and of textures; beyond it numbers of 32 bits mean nothing."""
+FARTHEST = 1e12
+"""Largest coordinate, of vertices in a file's own unit and of textures (the packs have some of 3e9)."""
 MAX_CORNERS = 20_000
 """Of one polygon."""
 
