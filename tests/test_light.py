@@ -34,7 +34,7 @@ from embodied.light import (
     settings_of,
     solve,
 )
-from embodied.light.atlas import Thing, atlas_of, coarsened, things_of
+from embodied.light.atlas import Page, Thing, atlas_of, coarsened, things_of
 from embodied.light.backend import array, drjit, find_llvm, mitsuba, variant_of
 from embodied.light.colours import ColourMaps
 from embodied.light.cover import rasterise
@@ -302,7 +302,7 @@ def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
     assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
     monkeypatch.setattr(cover, "OFFSETS", ())
     width, height = (int(x) for x in flat.size)
-    page = atlas.Page(
+    page = Page(
         width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part
     )
     assert len(rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
