@@ -80,6 +80,35 @@ class Cap:
 
 
 @dataclass(frozen=True)
+class Run:
+    """A stretch along the spine: the axis it runs along, where on it it starts, in which sense, and how long it is."""
+
+    axis: str
+    start: int
+    way: int
+    length: int
+
+    def strip(self, base: int, out: int, depth: int, *, rank: float, band: int, u_band: int) -> Strip:
+        """A row of rooms along it; see the fields of Strip."""
+        return Strip(
+            axis=self.axis,
+            start=self.start,
+            way=self.way,
+            length=self.length,
+            base=base,
+            out=out,
+            depth=depth,
+            rank=rank,
+            band=band,
+            u_band=u_band,
+        )
+
+    def corridor(self, low: int, high: int, free: tuple[bool, bool]) -> Band:
+        """A corridor along it; see the fields of Band."""
+        return Band(axis=self.axis, start=self.start, way=self.way, length=self.length, low=low, high=high, free=free)
+
+
+@dataclass(frozen=True)
 class Footprint:
     shape: str
     strips: tuple[Strip, ...]
@@ -87,6 +116,38 @@ class Footprint:
     caps: tuple[Cap, ...]
     corridor: int
     """Corridor width between wall centre lines; 0 for flats whose hall reaches every room."""
+
+
+@dataclass(frozen=True)
+class Wing:
+    """The cross-section of a wing: two rows of rooms with a corridor between them, decimetres."""
+
+    first: int
+    """Depth of the row above its corridor, or left of it."""
+    second: int
+    """Depth of the row below its corridor, or right of it."""
+    corridor: int
+
+    @property
+    def depth(self) -> int:
+        return self.first + self.corridor + self.second
+
+
+@dataclass(frozen=True)
+class Cross:
+    """A bar along x with a wing below it and one above, decimetres."""
+
+    bar: Wing
+    long: int
+    """Length of the bar."""
+    south: Wing
+    x_below: int
+    """Where on the bar the wing below begins."""
+    below: int
+    """Length of the wing below."""
+    north: Wing
+    x_above: int
+    above: int
 
 
 def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) -> str:
@@ -113,21 +174,6 @@ def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Foot
     return _winged(area, shape, rng)
 
 
-@dataclass(frozen=True)
-class Wing:
-    """The cross-section of a wing: two rows of rooms with a corridor between them, decimetres."""
-
-    first: int
-    """Depth of the row above its corridor, or left of it."""
-    second: int
-    """Depth of the row below its corridor, or right of it."""
-    corridor: int
-
-    @property
-    def depth(self) -> int:
-        return self.first + self.corridor + self.second
-
-
 def _draw_wing(corridor: int, low: int, high: int, rng: np.random.Generator) -> Wing:
     """A wing whose rows are low..high deep; often one serves and is shallower."""
     a = int(rng.integers(low, high + 1))
@@ -152,10 +198,10 @@ def _flat(area: float, rng: np.random.Generator) -> Footprint:
     top, bottom = int(rng.integers(35, 44)), int(rng.integers(20, 29))
     length = round(area * 100 / (top + bottom))
     strips = (
-        Strip("x", 0, 1, length, bottom, 1, top, 0.0, 0, 0),
-        Strip("x", 0, 1, length, bottom, -1, bottom, 0.0, 0, 0),
+        Run("x", 0, 1, length).strip(bottom, 1, top, rank=0.0, band=0, u_band=0),
+        Run("x", 0, 1, length).strip(bottom, -1, bottom, rank=0.0, band=0, u_band=0),
     )
-    return Footprint("rectangle", strips, (), (), 0)
+    return Footprint(shape="rectangle", strips=strips, bands=(), caps=(), corridor=0)
 
 
 def _bar(area: float, rng: np.random.Generator) -> Footprint:
@@ -179,21 +225,29 @@ def _one_wing(
     if length - left - right < 35:
         right = 0
     left, right = (0 if w and w < 30 else w for w in (left, right))
-    strips = [Strip("x", left, 1, length - left - right, bottom + corridor, 1, top, left, 0, 0)]
+    strips = [Run("x", left, 1, length - left - right).strip(bottom + corridor, 1, top, rank=left, band=0, u_band=0)]
     edges = [left]
     for x0, x1, _ in bumps:
         edges += [x0, x1]
     edges = sorted({*(min(max(e, left), length - right) for e in edges), length - right})
     for x0, x1 in itertools.pairwise(edges):
         extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
-        strips.append(Strip("x", x0, 1, x1 - x0, bottom, -1, bottom + extra, x0, 0, x0 - left))
-    band = Band("x", left, 1, length - left - right, bottom, bottom + corridor, (left == 0, right == 0))
+        strips.append(Run("x", x0, 1, x1 - x0).strip(bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
+    band = Run("x", left, 1, length - left - right).corridor(bottom, bottom + corridor, (left == 0, right == 0))
     caps = []
     if left:
-        caps.append(Cap(0, True, "y", (0, 0, left, depth), (bottom, bottom + corridor)))
+        caps.append(Cap(band=0, at_start=True, axis="y", rect=(0, 0, left, depth), passage=(bottom, bottom + corridor)))
     if right:
-        caps.append(Cap(0, False, "y", (length - right, 0, length, depth), (bottom, bottom + corridor)))
-    return Footprint(shape, tuple(strips), (band,), tuple(caps), corridor)
+        caps.append(
+            Cap(
+                band=0,
+                at_start=False,
+                axis="y",
+                rect=(length - right, 0, length, depth),
+                passage=(bottom, bottom + corridor),
+            )
+        )
+    return Footprint(shape=shape, strips=tuple(strips), bands=(band,), caps=tuple(caps), corridor=corridor)
 
 
 def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
@@ -248,26 +302,40 @@ def _l_or_t(
     cap = _cap_length(rng.uniform(0.18, 0.26), area, (24, 60), bar.depth, xb) if rng.random() < 0.6 else 0
     foot = _cap_length(rng.uniform(0.08, 0.14), area, (18, 34), wing.depth, drop) if rng.random() < 0.4 else 0
     end = xb + corridor if shape == "L" else long
-    band_a = Band("x", cap, 1, end - cap, bottom, bottom + corridor, (cap == 0, shape == "T"))
-    band_b = Band("y", bottom, -1, drop + bottom - foot, xb, xb + corridor, (False, foot == 0))
-    a_top = Strip("x", cap, 1, long - cap, bottom + corridor, 1, top, cap, 0, 0)
-    a_left = Strip("x", cap, 1, xb - cap, bottom, -1, bottom, cap, 0, 0)
-    b_left = Strip("y", 0, -1, drop - foot, xb, -1, left, xb + bottom, 1, bottom)
+    band_a = Run("x", cap, 1, end - cap).corridor(bottom, bottom + corridor, (cap == 0, shape == "T"))
+    band_b = Run("y", bottom, -1, drop + bottom - foot).corridor(xb, xb + corridor, (False, foot == 0))
+    a_top = Run("x", cap, 1, long - cap).strip(bottom + corridor, 1, top, rank=cap, band=0, u_band=0)
+    a_left = Run("x", cap, 1, xb - cap).strip(bottom, -1, bottom, rank=cap, band=0, u_band=0)
+    b_left = Run("y", 0, -1, drop - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom)
     strips: tuple[Strip, ...]
     if shape == "L":
         length = drop + bottom + corridor - foot
-        b_right = Strip("y", bottom + corridor, -1, length, xb + corridor, 1, right, xb, 1, -corridor)
+        b_right = Run("y", bottom + corridor, -1, length).strip(
+            xb + corridor, 1, right, rank=xb, band=1, u_band=-corridor
+        )
         strips = (a_top, a_left, b_left, b_right)
     else:
-        a_right = Strip("x", xb + corridor, 1, long - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - cap)
-        b_right = Strip("y", 0, -1, drop - foot, xb + corridor, 1, right, xb + bottom, 1, bottom)
+        a_right = Run("x", xb + corridor, 1, long - xb - corridor).strip(
+            bottom, -1, bottom, rank=xb, band=0, u_band=xb + corridor - cap
+        )
+        b_right = Run("y", 0, -1, drop - foot).strip(xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom)
         strips = (a_top, a_left, a_right, b_left, b_right)
     caps = []
     if cap:
-        caps.append(Cap(0, True, "y", (0, 0, cap, bar.depth), (bottom, bottom + corridor)))
+        caps.append(
+            Cap(band=0, at_start=True, axis="y", rect=(0, 0, cap, bar.depth), passage=(bottom, bottom + corridor))
+        )
     if foot:
-        caps.append(Cap(1, False, "x", (x0, -drop, x0 + wing.depth, foot - drop), (xb, xb + corridor)))
-    return Footprint(shape, strips, (band_a, band_b), tuple(caps), corridor)
+        caps.append(
+            Cap(
+                band=1,
+                at_start=False,
+                axis="x",
+                rect=(x0, -drop, x0 + wing.depth, foot - drop),
+                passage=(xb, xb + corridor),
+            )
+        )
+    return Footprint(shape=shape, strips=strips, bands=(band_a, band_b), caps=tuple(caps), corridor=corridor)
 
 
 def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]) -> Footprint:
@@ -277,21 +345,21 @@ def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]
     (left, right), fall = (private[0].first, private[0].second), private[1]
     xa = out
     xb = long - right - corridor
-    band_p = Band("y", -drop, 1, drop + bottom, xa, xa + corridor, (True, False))
-    band_a = Band("x", xa, 1, xb + corridor - xa, bottom, bottom + corridor, (False, False))
-    band_q = Band("y", bottom, -1, fall + bottom, xb, xb + corridor, (False, True))
+    band_p = Run("y", -drop, 1, drop + bottom).corridor(xa, xa + corridor, (True, False))
+    band_a = Run("x", xa, 1, xb + corridor - xa).corridor(bottom, bottom + corridor, (False, False))
+    band_q = Run("y", bottom, -1, fall + bottom).corridor(xb, xb + corridor, (False, True))
     far = drop + bottom
     strips = (
-        Strip("y", -drop, 1, drop + bottom + corridor, xa, -1, out, 0.0, 0, 0),
-        Strip("y", -drop, 1, drop, xa + corridor, 1, inner, 0.0, 0, 0),
-        Strip("x", 0, 1, long, bottom + corridor, 1, top, far - xa, 1, -xa),
-        Strip("x", xa + corridor, 1, xb - xa - corridor, bottom, -1, bottom, far, 1, corridor),
-        Strip("y", 0, -1, fall, xb, -1, left, far + xb - xa + bottom, 2, bottom),
-        Strip(
-            "y", bottom + corridor, -1, fall + bottom + corridor, xb + corridor, 1, right, far + xb - xa, 2, -corridor
+        Run("y", -drop, 1, drop + bottom + corridor).strip(xa, -1, out, rank=0.0, band=0, u_band=0),
+        Run("y", -drop, 1, drop).strip(xa + corridor, 1, inner, rank=0.0, band=0, u_band=0),
+        Run("x", 0, 1, long).strip(bottom + corridor, 1, top, rank=far - xa, band=1, u_band=-xa),
+        Run("x", xa + corridor, 1, xb - xa - corridor).strip(bottom, -1, bottom, rank=far, band=1, u_band=corridor),
+        Run("y", 0, -1, fall).strip(xb, -1, left, rank=far + xb - xa + bottom, band=2, u_band=bottom),
+        Run("y", bottom + corridor, -1, fall + bottom + corridor).strip(
+            xb + corridor, 1, right, rank=far + xb - xa, band=2, u_band=-corridor
         ),
     )
-    return Footprint("U", strips, (band_p, band_a, band_q), (), corridor)
+    return Footprint(shape="U", strips=strips, bands=(band_p, band_a, band_q), caps=(), corridor=corridor)
 
 
 def _crossed(area: float, rng: np.random.Generator) -> Footprint:
@@ -303,7 +371,6 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     scale = float(np.interp(area, (200, 300, 450, 700), (0.3, 0.8, 1.4, 2.0)))
     low, high = int(30 + 9 * scale), int(36 + 11 * scale)
     bar, south, north = (_draw_wing(corridor, low, high, rng) for _ in range(3))
-    top, bottom, left, right, west, east = bar.first, bar.second, south.first, south.second, north.first, north.second
     deep, wing, rise = bar.depth, south.depth, north.depth
     arm = area * 100 / ((deep + wing) / 2)  # total length of bar and wings
     long = round(arm * rng.uniform(0.5, 0.6))
@@ -315,39 +382,51 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     x_below = round(slack * rng.uniform(0.42, 0.66))
     x_above = round(slack * rng.uniform(0.34, 0.58))
     x_below, x_above = (min(max(x, 28), slack - 28) for x in (x_below, x_above))
-    xb, xc = x_below + left, x_above + west
-
+    xb, xc = x_below + south.first, x_above + north.first
     inner, usual = long - max(xb, xc) - corridor, (20, 58)
     day = _cap_length(rng.uniform(0.1, 0.15), area, usual, deep, min(xb, xc)) if rng.random() < 0.8 else 0
     night = _cap_length(rng.uniform(0.06, 0.1), area, usual, deep, inner) if rng.random() < 0.5 else 0
     foot = _cap_length(rng.uniform(0.06, 0.1), area, usual, wing, below) if rng.random() < 0.5 else 0
     head = _cap_length(rng.uniform(0.08, 0.12), area, usual, rise, above) if rng.random() < 0.8 else 0
-    roof = bottom + corridor
-    stop = long - night
+    return _cross(
+        Cross(bar=bar, long=long, south=south, x_below=x_below, below=below, north=north, x_above=x_above, above=above),
+        day,
+        night,
+        foot,
+        head,
+    )
+
+
+def _cross(c: Cross, day: int, night: int, foot: int, head: int) -> Footprint:
+    """The footprint of a cross with rooms of these lengths, 0 for none, across its left, right, lower and upper end."""
+    corridor, deep, left, west = c.bar.corridor, c.bar.depth, c.south.first, c.north.first
+    top, bottom = c.bar.first, c.bar.second
+    roof, stop, xb, xc = bottom + corridor, c.long - night, c.x_below + left, c.x_above + west
+    beyond_b, beyond_c = xb + corridor, xc + corridor
     strips = (
-        Strip("x", day, 1, xc - day, roof, 1, top, day, 0, 0),
-        Strip("x", xc + corridor, 1, stop - xc - corridor, roof, 1, top, xc, 0, xc + corridor - day),
-        Strip("x", day, 1, xb - day, bottom, -1, bottom, day, 0, 0),
-        Strip("x", xb + corridor, 1, stop - xb - corridor, bottom, -1, bottom, xb, 0, xb + corridor - day),
-        Strip("y", 0, -1, below - foot, xb, -1, left, xb + bottom, 1, bottom),
-        Strip("y", 0, -1, below - foot, xb + corridor, 1, right, xb + bottom, 1, bottom),
-        Strip("y", deep, 1, above - head, xc, -1, west, 0.4 * xc, 2, top),
-        Strip("y", deep, 1, above - head, xc + corridor, 1, east, 0.4 * xc, 2, top),
+        Run("x", day, 1, xc - day).strip(roof, 1, top, rank=day, band=0, u_band=0),
+        Run("x", beyond_c, 1, stop - beyond_c).strip(roof, 1, top, rank=xc, band=0, u_band=beyond_c - day),
+        Run("x", day, 1, xb - day).strip(bottom, -1, bottom, rank=day, band=0, u_band=0),
+        Run("x", beyond_b, 1, stop - beyond_b).strip(bottom, -1, bottom, rank=xb, band=0, u_band=beyond_b - day),
+        Run("y", 0, -1, c.below - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom),
+        Run("y", 0, -1, c.below - foot).strip(beyond_b, 1, c.south.second, rank=xb + bottom, band=1, u_band=bottom),
+        Run("y", deep, 1, c.above - head).strip(xc, -1, west, rank=0.4 * xc, band=2, u_band=top),
+        Run("y", deep, 1, c.above - head).strip(beyond_c, 1, c.north.second, rank=0.4 * xc, band=2, u_band=top),
     )
     bands = (
-        Band("x", day, 1, stop - day, bottom, roof, (day == 0, night == 0)),
-        Band("y", bottom, -1, bottom + below - foot, xb, xb + corridor, (False, foot == 0)),
-        Band("y", roof, 1, top + above - head, xc, xc + corridor, (False, head == 0)),
+        Run("x", day, 1, stop - day).corridor(bottom, roof, (day == 0, night == 0)),
+        Run("y", bottom, -1, bottom + c.below - foot).corridor(xb, beyond_b, (False, foot == 0)),
+        Run("y", roof, 1, top + c.above - head).corridor(xc, beyond_c, (False, head == 0)),
     )
     caps = []
     if day:
-        caps.append(Cap(0, True, "y", (0, 0, day, deep), (bottom, roof)))
+        caps.append(Cap(band=0, at_start=True, axis="y", rect=(0, 0, day, deep), passage=(bottom, roof)))
     if head:
-        caps.append(
-            Cap(2, True, "x", (x_above, deep + above - head, x_above + rise, deep + above), (xc, xc + corridor))
-        )
+        rect = (c.x_above, deep + c.above - head, c.x_above + c.north.depth, deep + c.above)
+        caps.append(Cap(band=2, at_start=True, axis="x", rect=rect, passage=(xc, beyond_c)))
     if night:
-        caps.append(Cap(0, False, "y", (stop, 0, long, deep), (bottom, roof)))
+        caps.append(Cap(band=0, at_start=False, axis="y", rect=(stop, 0, c.long, deep), passage=(bottom, roof)))
     if foot:
-        caps.append(Cap(1, False, "x", (x_below, -below, x_below + wing, foot - below), (xb, xb + corridor)))
-    return Footprint("cross", strips, bands, tuple(caps), corridor)
+        rect = (c.x_below, -c.below, c.x_below + c.south.depth, foot - c.below)
+        caps.append(Cap(band=1, at_start=False, axis="x", rect=rect, passage=(xb, beyond_b)))
+    return Footprint(shape="cross", strips=strips, bands=bands, caps=tuple(caps), corridor=corridor)

@@ -69,6 +69,17 @@ class Genome:
     """What is added to the privacy of each space's kind."""
 
 
+@dataclass(frozen=True)
+class Ends:
+    """What is settled of the rows when the rooms at the ends of corridors are chosen."""
+
+    footprint: Footprint
+    rows: Rows
+    cuts: list[list[tuple[int, int]]]
+    reach: dict[tuple[int, int], int]
+    """(strip, place in its row) to how far that room reaches into the corridor, decimetres; filled in."""
+
+
 def draw_plan(
     footprints: Sequence[Footprint], spaces: tuple[WantedRoom, ...], tries: int, *, rng: np.random.Generator
 ) -> Plan | None:
@@ -362,17 +373,6 @@ def _corridors(footprint: Footprint, limits: list[list[int]], halls: list[tuple[
                 return None
             cells.append(Cell("corridor", band.rect(s, e), (e - s) * footprint.corridor / 100))
     return cells
-
-
-@dataclass(frozen=True)
-class Ends:
-    """What is settled of the rows when the rooms at the ends of corridors are chosen."""
-
-    footprint: Footprint
-    rows: Rows
-    cuts: list[list[tuple[int, int]]]
-    reach: dict[tuple[int, int], int]
-    """(strip, place in its row) to how far that room reaches into the corridor, decimetres; filled in."""
 
 
 def _take_end(ends: Ends, b: int, end: int, limits: list[int]) -> None:

@@ -41,6 +41,26 @@ class Module:
         return self.main.area + sum(s.area for s in self.owned) + (self.guest.area if self.guest else 0.0)
 
 
+@dataclass(frozen=True)
+class Slot:
+    """The place of a module in its row, decimetres."""
+
+    strip: Strip
+    start: int
+    end: int
+    corridor: int
+    """Width of the corridor before it."""
+    mirrored: bool
+    inner: int = 0
+    """How far the main room reaches into the corridor."""
+
+    def cell(self, space: WantedRoom, a: int, b: int, v0: int, v1: int, owner: int | None = None) -> Cell:
+        """The cell from a to b along the row and from v0 to v1 away from the corridor."""
+        if self.mirrored:
+            a, b = self.start + self.end - b, self.start + self.end - a
+        return Cell(space.kind, self.strip.rect(a, b, v0, v1), space.area, owner)
+
+
 def draw_modules(spaces: tuple[WantedRoom, ...], *, rng: np.random.Generator) -> list[Module]:
     """Group `spaces`: owned rooms with their owners, some wet rooms into the columns between rooms."""
     owned: dict[int, list[WantedRoom]] = {}
@@ -82,26 +102,6 @@ def _column(items: tuple[WantedRoom, ...], depth: int) -> int:
     if depth >= 34:
         return max(max(_least(s.kind) for s in items), round(sum(s.area for s in items) * 100 / depth))
     return sum(max(_least(s.kind), round(s.area * 100 / depth)) for s in items)
-
-
-@dataclass(frozen=True)
-class Slot:
-    """The place of a module in its row, decimetres."""
-
-    strip: Strip
-    start: int
-    end: int
-    corridor: int
-    """Width of the corridor before it."""
-    mirrored: bool
-    inner: int = 0
-    """How far the main room reaches into the corridor."""
-
-    def cell(self, space: WantedRoom, a: int, b: int, v0: int, v1: int, owner: int | None = None) -> Cell:
-        """The cell from a to b along the row and from v0 to v1 away from the corridor."""
-        if self.mirrored:
-            a, b = self.start + self.end - b, self.start + self.end - a
-        return Cell(space.kind, self.strip.rect(a, b, v0, v1), space.area, owner)
 
 
 def arrange(module: Module, slot: Slot, wanted: int, *, first: int = 0) -> list[Cell] | None:

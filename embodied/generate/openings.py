@@ -47,17 +47,6 @@ class OuterWall:
         return self.high - self.low
 
 
-def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall]) -> list[list[OuterWall]]:
-    """For each cell its stretches of outer wall, longest first."""
-    return [
-        [
-            OuterWall(cell=i, index=k, axis=w.axis, across=w.across / 10, low=w.low / 10, high=w.high / 10, side=side)
-            for k, (w, side) in enumerate(outer_stretches(list(cells), walls, i))
-        ]
-        for i in range(len(cells))
-    ]
-
-
 @dataclass(frozen=True)
 class Leaves:
     """Material keys of what closes openings."""
@@ -138,6 +127,27 @@ class _Openings:
         self.add(kind, (self.names[w.cell], None), jambs, sill, head, hinge)
         if kind in ("front_door", "back_door"):
             self.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
+
+
+@dataclass(frozen=True)
+class _LeafPlace:
+    """One way to hang a leaf."""
+
+    cost: float
+    start: float
+    at_low: bool
+    """Whether it hangs at the lower end of its hole."""
+
+
+def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall]) -> list[list[OuterWall]]:
+    """For each cell its stretches of outer wall, longest first."""
+    return [
+        [
+            OuterWall(cell=i, index=k, axis=w.axis, across=w.across / 10, low=w.low / 10, high=w.high / 10, side=side)
+            for k, (w, side) in enumerate(outer_stretches(list(cells), walls, i))
+        ]
+        for i in range(len(cells))
+    ]
 
 
 def draw_openings(
@@ -253,16 +263,6 @@ def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_
 
 def _overlap(a: Rectangle, b: Rectangle) -> float:
     return max(0.0, min(a[2], b[2]) - max(a[0], b[0])) * max(0.0, min(a[3], b[3]) - max(a[1], b[1]))
-
-
-@dataclass(frozen=True)
-class _LeafPlace:
-    """One way to hang a leaf."""
-
-    cost: float
-    start: float
-    at_low: bool
-    """Whether it hangs at the lower end of its hole."""
 
 
 def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:

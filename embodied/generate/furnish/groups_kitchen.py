@@ -32,6 +32,34 @@ class KitchenSet:
         return max(1, round(asset.size[0] / self.unit))
 
 
+@dataclass(frozen=True)
+class UnitSlot:
+    """One module of a run of units."""
+
+    kind: str
+    """'sink', 'cooker' or 'base'."""
+    units: int
+    s: float
+    """Of its middle along the wall, metres."""
+
+
+@dataclass(frozen=True)
+class UnitLine:
+    """A run of units along a wall, before it is known what stands in it."""
+
+    kit: KitchenSet
+    wall: Wall
+    width: float
+    """Of one unit, metres."""
+    free: float
+    """Depth that stays free before the units, metres."""
+
+    @property
+    def windows(self) -> list[tuple[float, float]]:
+        """(from, to) along the wall, metres."""
+        return [(s0, s1) for s0, s1, o in self.wall.openings if o.kind == "window"]
+
+
 def kitchen_sets(ctx: Context) -> list[KitchenSet]:
     """The matching sets of kitchen units in the catalogue, in random order."""
     tags = [t for a in ctx.stock.of_role("kitchen sink") for t in a.tags if t.startswith("line_")]
@@ -161,34 +189,6 @@ def lone_fridge(ctx: Context) -> list[Thing] | None:
         if found:
             return found
     return None
-
-
-@dataclass(frozen=True)
-class UnitSlot:
-    """One module of a run of units."""
-
-    kind: str
-    """'sink', 'cooker' or 'base'."""
-    units: int
-    s: float
-    """Of its middle along the wall, metres."""
-
-
-@dataclass(frozen=True)
-class UnitLine:
-    """A run of units along a wall, before it is known what stands in it."""
-
-    kit: KitchenSet
-    wall: Wall
-    width: float
-    """Of one unit, metres."""
-    free: float
-    """Depth that stays free before the units, metres."""
-
-    @property
-    def windows(self) -> list[tuple[float, float]]:
-        """(from, to) along the wall, metres."""
-        return [(s0, s1) for s0, s1, o in self.wall.openings if o.kind == "window"]
 
 
 def _run(
