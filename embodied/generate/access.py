@@ -22,6 +22,7 @@ class SharedWall(NamedTuple):
 
     @property
     def length(self) -> int:
+        """Decimetres."""
         return self.high - self.low
 
 

@@ -130,6 +130,7 @@ class Wing:
 
     @property
     def depth(self) -> int:
+        """Of both rows and the corridor."""
         return self.first + self.corridor + self.second
 
 

@@ -38,6 +38,7 @@ class Module:
 
     @property
     def area(self) -> float:
+        """Wanted area of all its rooms, square metres."""
         return self.main.area + sum(s.area for s in self.owned) + (self.guest.area if self.guest else 0.0)
 
 

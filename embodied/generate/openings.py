@@ -44,6 +44,7 @@ class OuterWall:
 
     @property
     def length(self) -> float:
+        """Metres."""
         return self.high - self.low
 
 

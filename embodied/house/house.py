@@ -184,13 +184,16 @@ class House:
 
     @functools.cached_property
     def room_by_id(self) -> dict[str, Room]:
+        """The rooms by their ids."""
         return {r.id: r for r in self.rooms}
 
     @functools.cached_property
     def placement_by_id(self) -> dict[str, Placement]:
+        """The placements by their ids."""
         return {p.id: p for p in self.placements}
 
     def storey_of(self, room: Room) -> Storey:
+        """The storey that a room is on."""
         return self.storeys[room.storey]
 
     def floor(self, room: Room) -> shapely.Polygon:

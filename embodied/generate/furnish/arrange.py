@@ -56,6 +56,7 @@ class Item:
 
     @property
     def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height, metres."""
         return self.size or self.asset.size
 
 
@@ -89,6 +90,7 @@ class Thing:
 
     @property
     def box(self) -> Box:
+        """The upright box that it fills."""
         w, d, h = self.size
         return box(self.x, self.y, w, d, self.yaw, self.z, self.z + h)
 

@@ -47,9 +47,11 @@ class Context:
 
     @property
     def kind(self) -> str:
+        """Of the room."""
         return self.space.kind
 
     def chance(self, probability: float) -> bool:
+        """True with this probability; draws one number."""
         return bool(self.rng.random() < probability)
 
     def pick(self, role: str, **limits: Unpack[Limits]) -> Asset | None:
@@ -143,10 +145,12 @@ def free_stretch(wall: Wall, s: float, windows: bool = False) -> tuple[float, fl
 
 
 def has_door(wall: Wall) -> bool:
+    """Whether one can walk through it somewhere."""
     return any(o.kind != "window" for _, _, o in wall.openings)
 
 
 def has_window(wall: Wall) -> bool:
+    """Whether light falls in through it."""
     return any(o.kind in ("window", "french_window") for _, _, o in wall.openings)
 
 

@@ -139,10 +139,12 @@ class RoomSpace:
 
     @property
     def kind(self) -> str:
+        """Of the room."""
         return self.room.kind
 
     @property
     def area(self) -> float:
+        """Of the floor between the walls, square metres."""
         return self.polygon.area
 
     def inside(self, b: Box) -> bool:
