@@ -16,8 +16,8 @@ from agents.hanna.asking import RULES
 from agents.hanna.policy import PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
+from embodied.navigation.graph import nearest
 from embodied.teachers.hanna import HannaTeacher, segments
-from embodied.teachers.shortest import nearest
 
 REASONS = ("lost", "uncertain_wrong", "never_asked")
 

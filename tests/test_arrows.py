@@ -69,17 +69,17 @@ embodied.interface <- assets.catalogue embodied.house embodied.navigation
 embodied.action_spaces <- embodied.navigation embodied.interface
 embodied.language <- assets.catalogue embodied.interface
 embodied.records <- embodied.interface
-embodied.render <- embodied.gl assets.catalogue embodied.house embodied.scene embodied.interface
+embodied.render <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
 embodied.light <- embodied.house embodied.scene embodied.render
 embodied.mattersim <- embodied.render
 embodied.teachers <- embodied.navigation embodied.interface embodied.action_spaces
 embodied.policies <- embodied.interface embodied.action_spaces embodied.language embodied.teachers
-embodied.tasks <- embodied.house embodied.interface embodied.teachers
+embodied.tasks <- embodied.house embodied.navigation embodied.interface embodied.teachers
 embodied.world <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
     embodied.render embodied.light
 embodied.assistants <- embodied.navigation embodied.interface embodied.teachers embodied.tasks
-embodied.envs <- assets.catalogue embodied.house embodied.scene embodied.interface embodied.action_spaces
-    embodied.language embodied.teachers embodied.tasks embodied.assistants
+embodied.envs <- assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
+    embodied.action_spaces embodied.language embodied.teachers embodied.assistants
 embodied.datasets <- embodied.locks assets.catalogue embodied.house embodied.navigation embodied.generate
     embodied.interface embodied.action_spaces embodied.language embodied.records embodied.render embodied.mattersim
     embodied.teachers embodied.tasks embodied.world embodied.assistants embodied.envs
@@ -107,11 +107,11 @@ agents.vision <- agents.shipped agents.device assets.catalogue embodied.house em
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.locks embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
-    embodied.tasks embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
+    embodied.navigation embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
     embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
-agents.failures <- embodied.interface embodied.teachers agents.vision agents.hanna
+agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.vision agents.hanna
 agents.judging <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna
     agents.failures embodied.locks
 agents.study <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.figures agents.vision

@@ -14,9 +14,10 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.tasks.find import find_pool, find_task
-from embodied.tasks.goals import count_hops, find_instances
+from embodied.tasks.goals import find_instances
 
 
 def find_tasks(world, n: int = 30):

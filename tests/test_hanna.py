@@ -26,6 +26,7 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Sight, Step, Stop, Thought
 from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
     PerfectInterpreter,
     PrivilegedAsking,
@@ -36,7 +37,6 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.seeds import stream
-from embodied.tasks.goals import count_hops
 from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, lost_as_written, segments
 
 # ANNA

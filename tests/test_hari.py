@@ -16,8 +16,8 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import HalfwaySkyline, Shortest
-from embodied.tasks.goals import count_hops
 from embodied.tasks.hari import hari_pool, hari_task
 
 CUR, GOAL, SUB = Intention.CUR, Intention.GOAL, Intention.SUB

@@ -29,7 +29,7 @@ from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
 from embodied.interface import Ask, Feature, FindObject, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
-from embodied.tasks.goals import count_hops
+from embodied.navigation.graph import count_hops
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 
 SMALL = ExecutionConfig(

@@ -34,7 +34,7 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, Move, Place, Task
 from embodied.locks import locked
-from embodied.tasks.goals import count_hops
+from embodied.navigation.graph import count_hops
 
 FORMAT = "embodied-hari-intention-1"
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")

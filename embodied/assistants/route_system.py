@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.interface import TURNS, Language, PlaceT, Route
+from embodied.navigation.graph import count_hops
 from embodied.seeds import stream
-from embodied.tasks.goals import count_hops
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph

@@ -36,9 +36,9 @@ from embodied.datasets.matterport import (
 )
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
-from embodied.navigation.graph import to_matterport
+from embodied.navigation.graph import count_hops, to_matterport
 from embodied.seeds import stream
-from embodied.tasks.goals import count_hops, find_instances, goal_classes
+from embodied.tasks.goals import find_instances, goal_classes
 from embodied.tasks.vnla import VnlaConfig
 from embodied.teachers.vnla import MonocularPlan, VnlaTeacher, state_of
 

@@ -24,6 +24,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.geometry import wrap
 from embodied.interface import Assistant, Place, Reply
+from embodied.navigation.free_space import EYE
 from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class RollingBody(composer.Entity):
         body.add(
             "geom", name="mast", type="cylinder", size=[RADIUS * 0.8, half], pos=[0, 0, 0.2 + half], mass=2, **SLIPPERY
         )
-        body.add("camera", name="eye", pos=[0, 0, 1.5 - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
+        body.add("camera", name="eye", pos=[0, 0, EYE - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
         for side, y in (("left", TRACK / 2), ("right", -TRACK / 2)):
             wheel = body.add("body", name=f"{side}_wheel", pos=[0, y, 0])
             wheel.add("joint", name=f"{side}_axle", type="hinge", axis=[0, 1, 0], damping=0.02)

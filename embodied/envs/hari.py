@@ -14,7 +14,7 @@ from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
-from embodied.tasks.goals import count_hops
+from embodied.navigation.graph import count_hops
 
 if TYPE_CHECKING:
     import numpy as np
@@ -166,7 +166,7 @@ def shaped_costs(episode: Episode, hops: np.ndarray) -> list[float]:
     """c-tilde_t = c_t + Phi(s_{t+1}, g_{t+1}) - Phi(s_t, g_t), with Phi = 0 after the end (4.20).
 
     Args:
-      hops: (n, n) edges on the shortest paths (tasks.goals.count_hops).
+      hops: (n, n) edges on the shortest paths (navigation.graph.count_hops).
 
     They sum to the costs minus Phi(s_1, g_1) (4.21), whatever was done.
     """

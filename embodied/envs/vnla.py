@@ -10,7 +10,7 @@ from embodied.action_spaces import WORDS, Reach, directions
 from embodied.envs.base import HelpEnv, required
 from embodied.geometry import wrap
 from embodied.interface import STEP, Action, Ask, Intention, Mode, Move, Observation, Pose, Reply, Situation, Stop
-from embodied.teachers.shortest import nearest
+from embodied.navigation.graph import nearest
 
 
 class VnlaEnv(HelpEnv):

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from embodied.house.house import House, HouseError
 from embodied.house.shapes import footprint
-from embodied.navigation.free_space import HEAD, STEP
+from embodied.navigation.free_space import HEAD, LOW
 from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
@@ -69,7 +69,7 @@ def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarr
     things = [
         p
         for p in house.placements
-        if p.room in ids and p.position[2] - floor < HEAD and p.position[2] + p.size[2] - floor > STEP
+        if p.room in ids and p.position[2] - floor < HEAD and p.position[2] + p.size[2] - floor > LOW
     ]
     toll = np.zeros(len(grid.xy))
     covered = []

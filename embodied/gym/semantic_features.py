@@ -15,7 +15,7 @@ HALF_WIDTH, HALF_HEIGHT = math.radians(37.6), math.radians(30)
 
 
 class FeatureTable:
-    """A FeatureSource over arrays that are already there; the only one allowed to look inside a Sight."""
+    """A FeatureSource over arrays that are already there; feature sources may look inside a Sight."""
 
     def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
         """`arrays`: (nodes, 36, D) float32 by world name, one D for all.

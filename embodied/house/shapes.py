@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 
@@ -23,3 +25,13 @@ def inward(house: House, opening: Opening) -> np.ndarray:
     normal = np.array([-along[1], along[0]])
     room = shapely.Polygon(house.room_by_id[opening.rooms[0]].polygon)
     return normal if room.contains(shapely.Point((a + b) / 2 + 0.05 * normal)) else -normal
+
+
+def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
+    """The room that the point (x, y, z) is in, the floors between storeys included; None outdoors."""
+    for room in house.rooms:
+        storey = house.storey_of(room)
+        level = storey.elevation - 0.3 <= position[2] < storey.elevation + storey.height + 0.3
+        if level and shapely.Polygon(room.polygon).intersects(shapely.Point(position[:2])):
+            return room.id
+    return None

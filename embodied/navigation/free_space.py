@@ -14,10 +14,10 @@ EYE = 1.5
 """Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""
 HEAD = 1.8
 """Things whose base is higher than this do not stop a person."""
-STEP = 0.04
+LOW = 0.04
 """Things lower than this (rugs, mats, thresholds) are walked over."""
-LINING = 0.03
-"""What a door's lining takes from its hole on each side, metres."""
+JAMB = 0.03
+"""What a door's lining and the play of its leaf take from its hole on each side, metres."""
 LEAF = 0.05
 """Thickness of an open leaf with its handle, metres."""
 
@@ -25,7 +25,7 @@ LEAF = 0.05
 def free_floor(house: House, storey: int) -> shapely.Geometry:
     """The floor that is neither wall, furniture nor door leaf; doorways included."""
     open_floor = _floors_and_doorways(house, storey)
-    things = obstacles(house, storey, STEP, HEAD)
+    things = obstacles(house, storey, LOW, HEAD)
     return open_floor.difference(shapely.union_all(things)) if things else open_floor
 
 
@@ -60,8 +60,8 @@ def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
     found = []
     for hinge, other in pairs:
         across = (other - hinge) / width
-        long = (width - 2 * LINING) / len(pairs)
-        start = hinge + LINING * across + face
+        long = (width - 2 * JAMB) / len(pairs)
+        start = hinge + JAMB * across + face
         tip = start + long * (math.cos(opening.angle) * across + math.sin(opening.angle) * normal)
         found.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
     return found
@@ -71,7 +71,7 @@ def doorway(house: House, opening: Opening) -> shapely.Polygon:
     """The floor inside the wall that a door or passage between two rooms opens up."""
     a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
     along = (b - a) / np.linalg.norm(b - a)
-    lining = LINING if opening.kind != "passage" or opening.leaf_finish is not None else 0.0
+    lining = JAMB if opening.kind != "passage" or opening.leaf_finish is not None else 0.0
     a, b = a + lining * along, b - lining * along
     half = (house.inner_wall / 2 + 1e-3) * inward(house, opening)
     return shapely.Polygon([a - half, b - half, b + half, a + half])

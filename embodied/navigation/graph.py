@@ -89,6 +89,28 @@ def graph_of(positions: np.ndarray, edges: np.ndarray, ids: tuple[str, ...], roo
     return NavGraph(positions, tuple(ids), tuple(rooms), edges, lengths, distance, next_hop)
 
 
+def nearest(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
+    """The target nearest to `node` along the graph; the lowest index of equals."""
+    distance = graph.distance
+    return min(targets, key=lambda g: (distance[node, g], g))
+
+
+def count_hops(next_hop: np.ndarray) -> np.ndarray:
+    """(n, n) number of edges on the shortest (by metres) path from i to j, from the next-hop table."""
+    next_hop = np.asarray(next_hop)
+    n = len(next_hop)
+    hops = np.zeros((n, n), dtype=np.int64)
+    here = np.tile(np.arange(n)[:, None], (1, n))
+    goal = np.arange(n)[None, :]
+    for _ in range(n):
+        moving = here != goal
+        if not moving.any():
+            return hops
+        hops += moving
+        here = np.where(moving, next_hop[here, goal], here)
+    raise ValueError("next_hop does not lead everywhere in n steps; rebuild the graph")
+
+
 def build_graph(house: House, catalogue: object | None = None, spacing: float = 2.25) -> NavGraph:
     """The house's viewpoints, about `spacing` metres apart, joined where one walks straight.
 

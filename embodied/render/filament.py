@@ -12,7 +12,6 @@ import ctypes
 import ctypes.util
 import functools
 import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from embodied import gl
@@ -25,6 +24,8 @@ import shapely
 
 from embodied.errors import UnableError
 from embodied.house.house import House
+from embodied.house.shapes import room_at
+from embodied.navigation.free_space import EYE
 from embodied.render.camera import Camera
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec
@@ -36,8 +37,6 @@ EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""
 PROBE = 64
 """Side of a cube face of a room's surroundings, pixels."""
-EYE = 1.5
-"""Height above the floor that they are seen from, metres."""
 MIRROR = 11_700.0
 """Intensity of an image light at which a mirror shows its texels as they are (measured: sRGB 188 comes out as 188)."""
 DULL = 0.05
@@ -195,16 +194,6 @@ def _add_coats(spec: mujoco.MjSpec, lit: LitPages) -> None:
             coat = spec.add_material(name=known[key], rgba=[0, 0, 0, 1], emission=1, roughness=key[1], metallic=0)
             coat.textures[mujoco.mjtTextureRole.mjTEXROLE_EMISSIVE] = key[0]
         geom.material = known[key]
-
-
-def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
-    """The room that `position` (x, y, z) is in; None outdoors."""
-    at = shapely.Point(position[:2])
-    for room in house.rooms:
-        floor = house.storey_of(room).elevation
-        if floor <= position[2] <= floor + house.storey_of(room).height and shapely.Polygon(room.polygon).covers(at):
-            return room.id
-    return None
 
 
 def middle_of(house: House, room: str) -> tuple[float, float, float]:

@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from embodied.geometry import TWO_PI
-from embodied.house.house import House, Opening
+from embodied.house.house import House
+from embodied.house.shapes import inward, room_at
 
 OUTDOORS = ""
 FULL = (-math.pi, math.pi)
@@ -54,7 +54,7 @@ def portals_of(house: House) -> Portals:
     """All openings of `house`, each once per side."""
     of_room: dict[str, list[Portal]] = {name: [] for name in (*(r.id for r in house.rooms), OUTDOORS)}
     for o in house.openings:
-        a, b, out = np.array(o.a), np.array(o.b), _outward(house, o)
+        a, b, out = np.array(o.a), np.array(o.b), -inward(house, o)
         first, second = o.rooms[0], o.rooms[1] or OUTDOORS
         of_room[first].append(Portal(o.id, first, second, a, b, out))
         of_room[second].append(Portal(o.id, second, first, a, b, -out))
@@ -63,24 +63,6 @@ def portals_of(house: House) -> Portals:
         stairs[s.rooms[0]].append(s.rooms[1])
         stairs[s.rooms[1]].append(s.rooms[0])
     return Portals({k: tuple(v) for k, v in of_room.items()}, {k: tuple(v) for k, v in stairs.items()})
-
-
-def _outward(house: House, o: Opening) -> np.ndarray:
-    """(2,) unit normal of opening `o`, out of its first room."""
-    along = np.subtract(o.b, o.a) / math.dist(o.a, o.b)
-    normal = np.array([along[1], -along[0]])
-    probe = np.add(o.a, o.b) / 2 + 0.05 * normal
-    return -normal if shapely.Polygon(house.room_by_id[o.rooms[0]].polygon).contains(shapely.Point(probe)) else normal
-
-
-def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
-    """The room that the point (x, y, z) is in; None outdoors."""
-    for room in house.rooms:
-        storey = house.storey_of(room)
-        level = storey.elevation - 0.3 <= position[2] < storey.elevation + storey.height + 0.3
-        if level and shapely.Polygon(room.polygon).intersects(shapely.Point(position[:2])):
-            return room.id
-    return None
 
 
 def visible_rooms(

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from assets.built.primitives import Shape, box, cylinder, joined, moved, part, quads, scaled, tube, turned, two_sided
 from assets.records import Finish
 from embodied.house.house import House, Opening
+from embodied.house.shapes import inward
 from embodied.scene.outdoors import facade_finish
 from embodied.scene.part import Part
 from embodied.scene.walls import floor_turn, turned_uv
@@ -70,8 +70,7 @@ def hole_frame(house: House, opening: Opening) -> _Hole:
     room = house.room_by_id[opening.rooms[0]]
     p, q = np.asarray(opening.a, float), np.asarray(opening.b, float)
     d = (q - p) / np.linalg.norm(q - p)
-    probe = (p + q) / 2 + 0.03 * np.array([-d[1], d[0]])
-    flipped = not shapely.Polygon(room.polygon).contains(shapely.Point(probe))
+    flipped = float(inward(house, opening) @ [-d[1], d[0]]) < 0
     if flipped:
         p, q, d = q, p, -d
     half = house.inner_wall / 2

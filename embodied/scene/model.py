@@ -454,20 +454,6 @@ def _add_boxes(
             geom.set_frame(frame)
 
 
-def penetrations(scene: Scene, deeper: float = 0.004) -> dict[tuple[str, str], float]:
-    """Pairs of owners whose boxes interpenetrate by more than `deeper` metres at the start, and how deep.
-
-    Static things do not collide with each other: compile with `free` to test them.
-    """
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
-    depths: dict[tuple[str, str], float] = {}
-    for contact in data.contact:
-        pair = tuple(sorted(scene.owners[scene.owner_of_geom[g] - 1] for g in contact.geom))
-        depths[pair] = max(depths.get(pair, 0.0), -contact.dist)
-    return {pair: depth for pair, depth in sorted(depths.items()) if depth > deeper}
-
-
 def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:
     """How far each free object moves in `seconds` of physics, metres.
 

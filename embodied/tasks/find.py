@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.interface import TURNS, FindObject, Language, Place, Pose, Task
+from embodied.navigation.graph import count_hops
 from embodied.seeds import stream
-from embodied.tasks.goals import GoalClass, count_hops, find_instances, goal_classes
+from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 
 
 @dataclass(frozen=True)

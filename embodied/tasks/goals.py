@@ -85,19 +85,3 @@ def goal_classes(instances: tuple[Instance, ...], *, by_room: bool, nearest_only
         nodes = sorted({v for x in members for v in (x.nodes[:1] if nearest_only else x.nodes)})
         classes.append(GoalClass(name, kind or None, tuple(x.placement for x in members), tuple(nodes)))
     return tuple(classes)
-
-
-def count_hops(next_hop: np.ndarray) -> np.ndarray:
-    """(n, n) number of edges on the shortest (by metres) path from i to j, from the next-hop table."""
-    next_hop = np.asarray(next_hop)
-    n = len(next_hop)
-    hops = np.zeros((n, n), dtype=np.int64)
-    here = np.tile(np.arange(n)[:, None], (1, n))
-    goal = np.arange(n)[None, :]
-    for _ in range(n):
-        moving = here != goal
-        if not moving.any():
-            return hops
-        hops += moving
-        here = np.where(moving, next_hop[here, goal], here)
-    raise ValueError("next_hop does not lead everywhere in n steps; rebuild the graph")

@@ -9,7 +9,8 @@ import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Situation, Step, Stop
-from embodied.teachers.shortest import nearest, shortest_action
+from embodied.navigation.graph import nearest
+from embodied.teachers.shortest import shortest_action
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph

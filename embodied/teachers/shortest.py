@@ -6,15 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from embodied.interface import Episode, Label, Move, Place, Pose, Situation, Stop
+from embodied.navigation.graph import nearest
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-
-
-def nearest(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
-    """The target nearest to `node` along the graph; the lowest index of equals."""
-    distance = graph.distance
-    return min(targets, key=lambda g: (distance[node, g], g))
 
 
 def next_node(graph: NavGraph, node: int, targets: Sequence[int]) -> int:

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.geometry import wrap
 from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Place, Pose, Situation, Stop, Thought
-from embodied.teachers.shortest import nearest
+from embodied.navigation.graph import nearest
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
