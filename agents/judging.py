@@ -59,9 +59,7 @@ def run_eval(
                 if name == "learned":
                     extra[split] = about(episodes, worlds)
 
-            rows += evaluate(
-                whole, judged, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep, watch=watch
-            )
+            rows += evaluate(whole, judged, seed=args.seed, limit=args.tasks, batch=args.batch, keep=keep, watch=watch)
         facts = {"rows": json.loads(as_json(rows)), "behaviour": extra}
         if args.out:
             save(rows, args.out, "table")
