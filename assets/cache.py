@@ -12,11 +12,18 @@ import shutil
 import socket
 import tempfile
 import time
+import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 _MACHINE = re.sub(r"[^\w]", "", socket.gethostname()) or "here"
 _DRAFT = re.compile(r"\..+\.(?P<machine>\w+)-(?P<pid>\d+)\.")
+
+
+DAMAGED = (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What reading a damaged .npz archive may raise, besides errors of the operating system: cut short, flipped in its
+directory (another compression, encrypted, another name) or in its content."""
 
 
 def default_cache() -> Path:

@@ -278,6 +278,21 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
         kind.path.write_bytes(before)
 
 
+@pytest.mark.parametrize("offset", [8, 10])
+def test_strips_in_an_archive_that_says_it_is_packed_otherwise_are_refused(offset, kinds):
+    """A flip in the directory of a .npz: another way of packing, or 'encrypted'."""
+    kind = kinds["strips"]
+    before = kind.path.read_bytes()
+    body = bytearray(before)
+    body[body.rindex(b"PK\x01\x02") + offset] ^= 1
+    try:
+        kind.path.write_bytes(body)
+        with pytest.raises(ValueError, match="delete it and render again"):
+            kind.read(kind.path)
+    finally:
+        kind.path.write_bytes(before)
+
+
 def test_the_mutations_are_what_they_say():
     body = b'{"a": 1, "b": [1, 2, {"c": null}]}'
     changed = [mutated(body, True, stream(1, k)) for k in range(60)]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 
 from agents.vision.features import EQUIRECT, margin, strip_of
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
-from assets.cache import atomic_path
+from assets.cache import DAMAGED, atomic_path
 from assets.records import ROOM_KINDS
 from embodied.house.house import OPENING_KINDS, House
 from embodied.scene.house_meshes import owners
@@ -73,7 +71,7 @@ class HouseStrips:
             with np.load(path, allow_pickle=False) as f:
                 classes = tuple(str(c) for c in f["classes"])
                 arrays = {name: f[name] for name in ("rgb", "share", "rooms", "log_depth", "room")}
-        except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as e:
+        except DAMAGED as e:
             raise ValueError(f"{path}: not a file of strips, or damaged ({e}); delete it and render again") from e
         n, shapes = len(arrays["room"]), {name: a.shape for name, a in arrays.items()}
         cells = (n, ROWS, COLUMNS)

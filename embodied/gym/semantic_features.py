@@ -14,32 +14,61 @@ HALF_WIDTH, HALF_HEIGHT = math.radians(37.6), math.radians(30)
 """Half the field of one of the 36 views: 60 degrees high, 4 : 3."""
 
 
-class FeatureTable:
-    """A FeatureSource over arrays that are already there; feature sources may look inside a Sight."""
+class SightRows:
+    """Which row of a table of many worlds' features belongs to a Sight."""
 
-    def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """`arrays`: (nodes, 36, D) float32 by world name, one D for all.
+    def __init__(self, worlds: Mapping[str, np.ndarray]) -> None:
+        """`worlds`: (nodes, 36, D) features by world name, one D for all; their rows follow in the order of the names.
 
         Raises:
-          ValueError: another shape.
+          ValueError: another shape, or no world.
         """
-        shapes = {name: a.shape for name, a in arrays.items()}
-        sizes = {s[2] for s in shapes.values() if len(s) == 3 and s[1] == VIEWS}
-        if len(sizes) != 1 or any(len(s) != 3 for s in shapes.values()):
-            raise ValueError(f"features should be (nodes, {VIEWS}, D) arrays with one D, got {shapes}")
-        self._arrays = {name: np.asarray(a, dtype=np.float32) for name, a in arrays.items()}
-        self.size = sizes.pop()
+        shapes = {name: worlds[name].shape for name in sorted(worlds)}
+        sizes = {s[1:] for s in shapes.values()}
+        if len(sizes) != 1 or any(len(s) != 3 or s[1] != VIEWS for s in shapes.values()):
+            raise ValueError(f"features must all be (nodes, {VIEWS}, D) with one D, got {shapes}")
+        self.size: int = sizes.pop()[1]
+        """D."""
+        self.spans: dict[str, tuple[int, int]] = {}
+        """World to its first row and the one after its last."""
+        self.count = 0
+        for name, shape in shapes.items():
+            self.spans[name] = (self.count, self.count + shape[0])
+            self.count += shape[0]
 
-    def features(self, sight: Sight) -> np.ndarray:
-        """(36, D) float32, read-only by convention.
+    def row(self, sight: Sight) -> int:
+        """The row of a sight.
 
         Raises:
           KeyError: a place of another world.
         """
-        array = self._arrays.get(sight._world)
-        if array is None or not 0 <= sight._node < len(array):
-            raise KeyError(f"no features of this sight; the table knows the worlds {sorted(self._arrays)[:8]}")
-        return array[sight._node]
+        first, end = self.spans.get(sight._world, (0, 0))
+        if not 0 <= sight._node < end - first:
+            raise KeyError(
+                f"no features of node {sight._node} of world {sight._world!r}; make them with `embodied features`"
+            )
+        return first + sight._node
+
+    def filled(self, worlds: Mapping[str, np.ndarray]) -> np.ndarray:
+        """(count, 36, D) float32 of all worlds below each other."""
+        table = np.zeros((self.count, VIEWS, self.size), dtype=np.float32)
+        for name, (first, end) in self.spans.items():
+            table[first:end] = worlds[name]
+        return table
+
+
+class FeatureTable:
+    """A FeatureSource over arrays that are already there."""
+
+    def __init__(self, worlds: Mapping[str, np.ndarray]) -> None:
+        """`worlds`: (nodes, 36, D) features by world name; raises ValueError for another shape."""
+        self._rows = SightRows(worlds)
+        self._table = self._rows.filled(worlds)
+        self.size = self._rows.size
+
+    def features(self, sight: Sight) -> np.ndarray:
+        """(36, D) float32, read-only by convention; raises KeyError for a place of another world."""
+        return self._table[self._rows.row(sight)]
 
 
 def semantic_features(world: SeenPlace, classes: Sequence[str], room_kinds: Sequence[str]) -> np.ndarray:

@@ -7,7 +7,6 @@ unfolded plane by plane, so that one wall is one chart however many holes it has
 from __future__ import annotations
 
 import itertools
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from assets.cache import atomic_path, digest
+from assets.cache import DAMAGED, atomic_path, digest
 from assets.records import MeshPart
 from embodied.light.backend import added_up, drjit, fraction, mitsuba, r2, scene_of, vector
 
@@ -191,7 +190,7 @@ def load_record(kind, path: Path):
     try:
         with np.load(path, allow_pickle=False) as z:
             return kind(**{x.name: z[x.name] for x in fields(kind)})
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error):
+    except (OSError, *DAMAGED):
         return None
 
 

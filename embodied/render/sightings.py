@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from assets.cache import atomic_path
+from assets.cache import DAMAGED, atomic_path
 from embodied.house.house import House
 from embodied.interface import Sighting
 from embodied.render.panorama import face_rays, ray_stretch
@@ -88,7 +87,7 @@ def load_table(path: Path) -> SightingTable | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             columns = [file[name] for name in COLUMNS]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, *DAMAGED):
         return None
     if len({len(c) for c in columns}) != 1:
         return None
