@@ -181,7 +181,7 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
         "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
         "disk_mb": float(np.median(pages)),
         "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
-        "shiny": float(np.mean([1 - np.mean(by[*v, "diffuse"].plain) for v in views])),
+        "shiny": float(np.mean([1 - p.mean() for v in views if (p := by[*v, "diffuse"].plain) is not None])),
         "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
     }
 
@@ -202,7 +202,8 @@ def table(facts: dict) -> str:
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
     lines.append(
         f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or "
-        f"metal; {facts['renderer']}. Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
+        f"metal; {facts['renderer']}. "
+        f"Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
         f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
     )
     return "\n".join(lines)

@@ -52,7 +52,7 @@ VIEW_ANGLE = np.radians(78.0)
 """Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees; people need it."""
 
 
-class HelpGymEnv(gym.Env[dict[str, Any], int]):
+class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     """A HelpEnv as a Gymnasium environment: numbers in, numbers out, text as text.
 
     Reward: 1 on success at the end, minus 0.01 per step; HARI: minus the cost of the step. With

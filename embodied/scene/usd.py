@@ -1,6 +1,7 @@
 """A lit house as USDZ: its baked pages as what each surface gives off, with names, classes and rooms.
 
-Needs OpenUSD (`pip install embodied-houses[usd]`). There is no maintained converter from glTF to USD for Python, so the stage
+Needs OpenUSD (`pip install embodied-houses[usd]`). There is no maintained converter from glTF to USD for Python, so
+the stage
 is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh says
 what it is, as the extras of the glTF do (embodied.scene.web).
 """
