@@ -31,6 +31,7 @@ SOME = (
     "blendswap-cc-by/beer_bottle",
     "scopia/saloon_lamp",
     "scopia/table4+console",
+    "scopia/vase1",
 )
 """A handful of models to import; every one would take minutes."""
 
