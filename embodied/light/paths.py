@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.light import radiosity
+from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import constant, drjit, mitsuba
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
@@ -30,27 +31,27 @@ class Lights:
     """(k, 3) metres."""
     power: np.ndarray
     """(k,) rough brightness, for choosing."""
-    corner: object
-    along: object
-    up: object
-    normal: object
+    corner: Array
+    along: Array
+    up: Array
+    normal: Array
     """Flat (k * 3) arrays; zero for lamps."""
-    strength: object
+    strength: Array
     """(k,) area / pi of portals, glowing area / pi of lamps."""
-    radiance: object
+    radiance: Array
     """(k * 3); zero for portals, which take it from the sky."""
-    points: object
-    normals: object
+    points: Array
+    normals: Array
     """(k * POINTS * 3) of lamps."""
-    weights: object
+    weights: Array
     """(k * POINTS)."""
-    bare: object
-    lamp: object
+    bare: Array
+    lamp: Array
     """(k,) bool: a bare bulb; any lamp."""
     spaces: tuple[Space, ...]
     """Worlds to ask for shadows: the house, and for each bare bulb's lamp the house without it."""
-    space_of_light: object
-    portal_scene: object | None
+    space_of_light: RayScene
+    portal_scene: RayScene | None
     towards_sun: np.ndarray
     sun: np.ndarray
     """(3,) e of the sun behind the glass."""
@@ -63,9 +64,9 @@ POINTS = 256
 class Surfaces:
     """Luxel properties on the device."""
 
-    albedo: object
-    glow: object
-    normal: object
+    albedo: Array
+    glow: Array
+    normal: Array
 
 
 def surfaces_of(lux: Luxels) -> Surfaces:
@@ -76,7 +77,11 @@ def surfaces_of(lux: Luxels) -> Surfaces:
 
 
 def lights_of(
-    space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors
+    space: Space,
+    without: Callable[[str], Space],
+    portals: Sequence[Portal],
+    lamps: Sequence[Lamp],
+    outdoors: Outdoors,
 ) -> Lights:
     """Pool what shines.
 
@@ -128,8 +133,8 @@ def lights_of(
     )
 
 
-def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator, picks: int = 2):
-    """e (a Color3f) at points straight from the lights: the sun, and `picks` others drawn by power over distance squared."""
+def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator, picks: int = 2) -> Array:
+    """e (a Color3f) at points straight from the lights: the sun, and `picks` others, by power over distance squared."""
     mi = mitsuba()
 
     total = mi.Color3f(*(float(x) for x in AMBIENT))
@@ -141,7 +146,7 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
     return total
 
 
-def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator):
+def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator) -> Array:
     mi, dr = mitsuba(), drjit()
     u = rng.random((3, p.n), np.float32)
     weights, whole = [], mi.Float(0.0)
@@ -196,7 +201,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
 
 def irradiance(
     space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST
-):
+) -> Array:
     """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each."""
     mi, dr = mitsuba(), drjit()
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
@@ -230,7 +235,7 @@ def irradiance(
     return total
 
 
-def hit_points(space: Space, surfaces: Surfaces, ray, active, p: Points):
+def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:
     """Where rays meet the house from the front: luxel, whether they do, and the points there."""
     mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)

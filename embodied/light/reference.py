@@ -10,6 +10,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light import paths, radiosity
+from embodied.light.arrays import Array, Ray, Triple
 from embodied.light.backend import array, drjit, mitsuba
 from embodied.light.baking import Bake
 from embodied.light.radiosity import Points
@@ -26,7 +27,7 @@ would take sunlit floors' and beds' colour off the walls."""
 SHINY = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
 QUALITIES = ("glossy", "reference", "diffuse")
-"""'diffuse' is the reference without gloss but for mirrors and metals; the classic renderer's pages should equal it on all else."""
+"""'diffuse' is the reference without gloss but for mirrors and metals; pages should equal it on all else."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
 
@@ -52,7 +53,7 @@ class Tracer:
         self.quality, self.size, self.rays = quality, size, rays or RAYS[quality]
         self._world, self._seed = world_of(bake, house), house.seed
 
-    def panorama(self, position, size: int | None = None) -> Panorama:
+    def panorama(self, position: Triple, size: int | None = None) -> Panorama:
         """Six cube faces around `position` (x, y, z)."""
         s = size or self.size
         rgb = np.empty((6, s, s, 3), np.uint8)
@@ -61,7 +62,9 @@ class Tracer:
             rgb[k], depth[k], ids[k] = self.picture(position, forward, up, np.pi / 2, (s, s), name=k)
         return Panorama(rgb, depth, ids)
 
-    def picture(self, position, forward, up, vfov: float, size: tuple[int, int], *, name: int = 0):
+    def picture(
+        self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int], *, name: int = 0
+    ) -> Array:
         """(h, w, 3) uint8, (h, w) float32 depth along the axis, (h, w) int32 ids of a pinhole camera."""
         rng = stream(self._seed, "light", "trace", self.quality, name)
         h, w = size
@@ -74,11 +77,12 @@ class Tracer:
             _, _, first, face = through(self._world.panes, centre, hit.distance)
             pane = np.isfinite(np.asarray(first))
             ids = np.where(pane, self._world.panes.owner[np.asarray(face)], ids)
-        inside, light, other, albedo, square = (np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3, 1))
+        sums: list[np.ndarray] = [np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3, 1)]
+        inside, light, other, albedo, square = sums
         rounds = range(0, self.rays, 4)
         for start in rounds:
             ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
-            for total, part in zip((inside, light, other, albedo, square), self._samples(ray, rng)):
+            for total, part in zip(sums, self._samples(ray, rng)):
                 total += part.reshape(-1, h * w, part.shape[1]).sum(0)
         share = np.maximum(inside, 1e-6)
         light, albedo, square = light / share, albedo / share, square / share
@@ -87,20 +91,21 @@ class Tracer:
             guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(h, w, 4)
             white = np.maximum(albedo, 0.02)
             light = _smoothed((light / white).reshape(h, w, 3), guide, noise.reshape(h, w)).reshape(-1, 3) * white
-        rgb = (develop(light, np.ones(3)) * inside + other) / self.rays
-        rgb = (np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
+        shown = (develop(light, np.ones(3)) * inside + other) / self.rays
+        rgb = (np.clip(shown, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
         if self._world.panes is not None:
             ok, t = ok | pane, np.where(pane, np.asarray(first), t)
         return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
 
-    def plain(self, position, forward, up, vfov: float, size: tuple[int, int]) -> np.ndarray:
+    def plain(self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int]) -> np.ndarray:
         """(h, w) bool: pixels with no mirror or metal within two pixels."""
         hit = look(self._world, _camera_rays(position, forward, up, vfov, size, 1, 0, None))
         shiny = np.asarray(hit.ok & ~hit.outdoor & (hit.gloss.z > SHINY)).reshape(size)
         return ~cv2.dilate(shiny.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
 
-    def _samples(self, ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-        """Per ray: how much of it ends indoors (n, 1), exposed radiance there, shown colour elsewhere, albedo (n, 3), brightness squared (n, 1).
+    def _samples(self, ray: Ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+        """Per ray: how much of it ends indoors (n, 1); exposed radiance there, shown colour elsewhere, albedo (n, 3
+        each); brightness squared (n, 1).
 
         Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
         curved noise is too dark.
@@ -131,7 +136,7 @@ class Tracer:
         t = np.broadcast_to(np.asarray(left).reshape(-1, 1), share.shape).astype(np.float32)
         return share * t, x * t, elsewhere * t + array(colour), np.where(keep, array(hit.albedo), 0.0) * t, square * t
 
-    def _traced(self, hit: Hit, ray, rng: np.random.Generator):
+    def _traced(self, hit: Hit, ray: Ray, rng: np.random.Generator) -> Array:
         """e at first hits by path tracing."""
         mi, world = mitsuba(), self._world
         n = len(np.asarray(hit.distance))
@@ -139,7 +144,7 @@ class Tracer:
         points = Points(n, hit.position, hit.normal, hit.normal, hit.thin, zero, zero)
         return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng)
 
-    def _with_gloss(self, hit: Hit, ray, diffuse, inside, rng: np.random.Generator):
+    def _with_gloss(self, hit: Hit, ray: Ray, diffuse: Array, inside: Array, rng: np.random.Generator) -> Array:
         """One GGX lobe above the diffuse light, seen by one reflected ray.
 
         Source: Walter et al. 2007 eq. 35 for the half vector, Schlick 1994 for F; F0 = 0.08 specular.
@@ -207,8 +212,15 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
 
 
 def _camera_rays(
-    position, forward, up, vfov: float, size: tuple[int, int], each: int, start: int, rng: np.random.Generator | None
-):
+    position: Triple,
+    forward: Triple,
+    up: Triple,
+    vfov: float,
+    size: tuple[int, int],
+    each: int,
+    start: int,
+    rng: np.random.Generator | None,
+) -> Ray:
     """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
     mi, dr = mitsuba(), drjit()
     h, w = size

@@ -13,20 +13,23 @@ import types
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, pi
+from typing import Any
 
 import numpy as np
+
+from embodied.light.arrays import Array, RayScene
 
 two_pi = 2 * pi
 
 
 class Values(np.ndarray):
-    """(n,) numbers, or (c, n) vectors of c components; single precision, no warnings about entries that nobody reads."""
+    """(n,) numbers, or (c, n) vectors of c components; single precision, silent about entries that nobody reads."""
 
     x = property(lambda self: self[0])
     y = property(lambda self: self[1])
     z = property(lambda self: self[2])
 
-    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Values:
         with np.errstate(all="ignore"):
             return _values(getattr(ufunc, method)(*(_bare(a) for a in inputs), **options))
 
@@ -38,11 +41,11 @@ class Values(np.ndarray):
     __ior__ = lambda self, other: self | other
 
 
-def _bare(a):
+def _bare(a: Array) -> Any:
     return a.view(np.ndarray) if isinstance(a, Values) else a
 
 
-def _values(a, dtype=None) -> Values:
+def _values(a: Array, dtype: Any = None) -> Values:
     if dtype is None:
         dtype = np.float32 if a.dtype == np.float64 else a.dtype
     return np.asarray(a).astype(dtype, copy=False).view(Values)
@@ -56,14 +59,15 @@ class Type:
     size: int = 0
     """Components of a vector; 0 for numbers."""
 
-    def __call__(self, *parts) -> Values:
+    def __call__(self, *parts: Array) -> Values:
         with np.errstate(all="ignore"):
-            parts = [np.atleast_1d(_bare(p)).astype(self.dtype) for p in parts]
-        if len(parts) > 1:
-            parts = [np.stack(np.broadcast_arrays(*parts))]
-        elif self.size and parts[0].ndim == 1:
-            parts = [np.broadcast_to(parts[0], (self.size, len(parts[0])))]
-        return parts[0].view(Values)
+            arrays: list[np.ndarray] = [np.atleast_1d(_bare(p)).astype(self.dtype) for p in parts]
+        if len(arrays) > 1:
+            return np.stack(np.broadcast_arrays(*arrays)).view(Values)
+        only = arrays[0]
+        if self.size and only.ndim == 1:
+            only = np.broadcast_to(only, (self.size, len(only)))
+        return only.view(Values)
 
 
 Float, UInt32, Int32, Bool = Type(np.float32), Type(np.uint32), Type(np.int32), Type(np.bool_)
@@ -83,7 +87,7 @@ def opaque(kind: Type, value: float) -> Values:
     return kind(value)
 
 
-def eval(*arrays) -> None:
+def eval(*arrays: Array) -> None:
     """Nothing: these arrays are always computed."""
 
 
@@ -103,12 +107,12 @@ def scatter(target: np.ndarray, value, index: np.ndarray) -> None:
     _bare(target)[_bare(index)] = _bare(value)
 
 
-def select(mask, a, b) -> Values:
+def select(mask: Array, a: Array, b: Array) -> Values:
     dtype = next((x.dtype for x in (a, b) if isinstance(x, np.ndarray)), np.float32)
     return _values(np.where(_bare(mask), _bare(a), _bare(b)), dtype)
 
 
-def gather(kind: Type, source: np.ndarray, index: np.ndarray, active=True) -> Values:
+def gather(kind: Type, source: np.ndarray, index: np.ndarray, active: Array = True) -> Values:
     """Entries of a flat array, or vectors of entries that follow each other; zero where not active."""
     source, index, active = _bare(source), _bare(index), _bare(active)
     if active is not True:
@@ -135,15 +139,15 @@ minimum, maximum, square, floor, exp, log, sqrt, abs, sin, cos, acos, atan2, isi
 )
 
 
-def clip(a, low, high):
+def clip(a: Array, low: Array, high: Array) -> Array:
     return np.minimum(np.maximum(a, low), high)
 
 
-def sign(a):
+def sign(a: Array) -> Array:
     return np.copysign(np.float32(1), a)
 
 
-def any(mask) -> bool:
+def any(mask: Array) -> bool:
     return bool(np.any(mask))
 
 
@@ -160,11 +164,11 @@ def squared_norm(a: Values) -> Values:
     return dot(a, a)
 
 
-def norm(a: Values) -> Values:
+def norm(a: Values) -> Array:
     return np.sqrt(dot(a, a))
 
 
-def normalize(a: Values) -> Values:
+def normalize(a: Values) -> Array:
     return a / norm(a)
 
 
@@ -183,7 +187,7 @@ class Frame3f:
         return self.s * v.x + self.t * v.y + self.n * v.z
 
 
-def _disk(u: Values) -> tuple[Values, Values]:
+def _disk(u: Values) -> tuple[Array, Array]:
     """The unit square on the unit disk. Source: Shirley and Chiu 1997, without branches as in Mitsuba."""
     x, y = 2 * u.x - 1, 2 * u.y - 1
     wide = np.abs(x) >= np.abs(y)
@@ -210,7 +214,9 @@ warp = types.SimpleNamespace(square_to_cosine_hemisphere=_cosine_hemisphere, squ
 class Ray3f:
     """Origins and directions (3, n), and how far to look."""
 
-    def __init__(self, o: Values, d: Values, maxt=inf, time: float = 0.0, wavelengths=()) -> None:
+    def __init__(
+        self, o: Values, d: Values, maxt: Array = inf, time: float = 0.0, wavelengths: Sequence[float] = ()
+    ) -> None:
         self.o, self.d, self.maxt = o, d, Float(maxt)
 
 
@@ -222,33 +228,33 @@ class Found:
     prim_index: Values
     prim_uv: Values
 
-    def is_valid(self) -> Values:
+    def is_valid(self) -> Array:
         return self.t < inf
 
 
 class Scene:
     """A scene of Mitsuba's scalar variant that is asked about arrays of rays."""
 
-    def __init__(self, scene, variant: types.ModuleType) -> None:
+    def __init__(self, scene: RayScene, variant: types.ModuleType) -> None:
         """Wrap `scene`; `variant` is the module of its variant."""
         self._scene, self._point, self._vector, self._ray = scene, variant.Point3f, variant.Vector3f, variant.Ray3f
 
-    def ray_test(self, ray: Ray3f, active=True) -> Values:
+    def ray_test(self, ray: Ray3f, active: Array = True) -> Values:
         n, which, rays = self._listed(ray, active)
         out = np.zeros(n, bool)
         out[which] = np.fromiter(map(self._scene.ray_test, rays), bool, len(which))
         return out.view(Values)
 
-    def ray_intersect_preliminary(self, ray: Ray3f, coherent: bool = False, active=True) -> Found:
+    def ray_intersect_preliminary(self, ray: Ray3f, coherent: bool = False, active: Array = True) -> Found:
         n, which, rays = self._listed(ray, active)
         found = np.zeros(n, [("t", np.float32), ("face", np.uint32), ("u", np.float32), ("v", np.float32)])
         found["t"] = inf
         hits = map(self._scene.ray_intersect_preliminary, rays)
         found[which] = np.fromiter(((h.t, h.prim_index, *h.prim_uv) for h in hits), found.dtype, len(which))
-        t, face, u, v = (np.ascontiguousarray(found[name]).view(Values) for name in found.dtype.names)
+        t, face, u, v = (np.ascontiguousarray(found[name]).view(Values) for name in ("t", "face", "u", "v"))
         return Found(t, face, Point2f(u, v))
 
-    def _listed(self, ray: Ray3f, active) -> tuple[int, np.ndarray, Iterator]:
+    def _listed(self, ray: Ray3f, active: Array) -> tuple[int, np.ndarray, Iterator]:
         """How many rays there are, which are active, and those as the variant's own."""
         o, d, far, on = np.broadcast_arrays(*(_bare(a) for a in (ray.o, ray.d, ray.maxt, active)))
         which = np.nonzero(on[0])[0]

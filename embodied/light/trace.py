@@ -9,6 +9,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light import radiosity
+from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import drjit, mitsuba, scene_of
 from embodied.light.baking import Bake
 from embodied.light.colours import linear
@@ -30,27 +31,27 @@ class World:
     lights: Lights
     owner: np.ndarray
     """(m,) int32 instance ids."""
-    is_outdoor: object
-    gloss: object
+    is_outdoor: Array
+    gloss: Array
     """(m * 3) roughness, specular, metallic."""
-    uv: object
+    uv: Array
     """(m * 3 * 2)."""
-    page: object
-    size: object
+    page: Array
+    size: Array
     """(pages * 2) texels: width, height."""
-    base: object
-    albedo: object
+    base: Array
+    albedo: Array
     """Flat linear RGB texels of all pages, then:"""
-    light: object
+    light: Array
     """Flat e (all light, the sun's too) of all texels; for outer parts the picture as shown, as sRGB."""
-    glow: object
+    glow: Array
     """Flat radiance of all texels; None if nothing glows."""
-    dome: object
+    dome: Array
     """Flat sRGB picture of the outdoors as shown."""
-    sky: object
+    sky: Array
     """Flat radiance of the outdoors."""
     rows: int
-    exposure: object
+    exposure: Array
     outdoors: Outdoors
     panes: Panes | None
     """What is seen through: glass and sheer curtains."""
@@ -60,20 +61,20 @@ class World:
 class Panes:
     """See-through things, drawn over what lies behind them as the classic renderer does; k faces."""
 
-    scene: object
-    normal: object
+    scene: RayScene
+    normal: Array
     """(k * 3)."""
-    uv: object
+    uv: Array
     """(k * 3 * 2)."""
-    opacity: object
+    opacity: Array
     """(k,)."""
     owner: np.ndarray
     """(k,) int32 instance ids."""
-    page: object
+    page: Array
     """(k,), then of all pages: size (pages * 2), first texel, and sRGB pictures as shown."""
-    size: object
-    base: object
-    picture: object
+    size: Array
+    base: Array
+    picture: Array
 
 
 def world_of(bake: Bake, house: House) -> World:
@@ -119,7 +120,7 @@ def world_of(bake: Bake, house: House) -> World:
         coarse_glow.append(g.reshape(-1, 3))
     lw, lh = np.array(luxel_sizes).T
     thin = np.concatenate([_listed_twice(m.faces) for m, _ in solid])
-    size = np.array(sizes)
+    size: np.ndarray = np.array(sizes)
     texels = size.prod(1)
     lamps = _lamps(bake)
     sampled = {x.placement for x in house.lights if x.on}
@@ -222,25 +223,25 @@ def _lamps(bake: Bake) -> tuple[Lamp, ...]:
 class Hit:
     """What rays meet first."""
 
-    ok: object
-    distance: object
-    face: object
-    position: object
-    normal: object
+    ok: Array
+    distance: Array
+    face: Array
+    position: Array
+    normal: Array
     """Towards the ray's origin."""
-    albedo: object
-    e: object
+    albedo: Array
+    e: Array
     """Baked light, or the shown sRGB colour of an outer part."""
-    glow: object
-    outdoor: object
-    gloss: object
+    glow: Array
+    outdoor: Array
+    gloss: Array
     """Roughness, specular, metallic."""
-    front: object
-    thin: object
+    front: Array
+    thin: Array
     """A sheet, lit from both its sides."""
 
 
-def look(world: World, ray, active=True) -> Hit:
+def look(world: World, ray: Ray, active: Array = True) -> Hit:
     """Bilinear lookup of the pages where rays hit."""
     mi, dr = mitsuba(), drjit()
     h = world.space.scene.ray_intersect_preliminary(ray, False, active)
@@ -282,11 +283,12 @@ def look(world: World, ray, active=True) -> Hit:
     )
 
 
-def through(panes: Panes, ray, behind, most: int = 6):
+def through(panes: Panes, ray: Ray, behind: Array, most: int = 6) -> Array:
     """What see-through things before `behind` (distances) put over a picture, front to back.
 
     Returns:
-      Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0 without).
+      Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0
+      without).
     """
     mi, dr = mitsuba(), drjit()
     colour, left, start = mi.Color3f(0.0), mi.Float(1.0), mi.Float(0.0)
@@ -317,7 +319,7 @@ def through(panes: Panes, ray, behind, most: int = 6):
     return colour, left, first, face
 
 
-def picture_at(table, rows: int, d, active=True):
+def picture_at(table: Array, rows: int, d: Array, active: Array = True) -> Array:
     """Value of an outdoor picture (flat, rows x 2 rows) in direction d, nearest texel."""
     mi, dr = mitsuba(), drjit()
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (2 * rows)
