@@ -24,7 +24,8 @@ def start() -> int:
 
 
 def stop(number: int, frame) -> None:
-    """What Ctrl-C and a polite kill do: end the program if something is being imported, else raise KeyboardInterrupt."""
+    """What Ctrl-C and a polite kill do: end the program if something is being imported, else raise
+    KeyboardInterrupt."""
     import os
 
     while frame is not None:

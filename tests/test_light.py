@@ -190,7 +190,8 @@ def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
 
 
 def test_neighbours_are_looked_for_on_the_same_layer():
-    """A blanket 25 mm above its mattress, luxels 60 mm apart: the mattress is nearer, faces the same way, and is dark."""
+    """A blanket 25 mm above its mattress, luxels 60 mm apart: the mattress is nearer, faces the same way, and is
+    dark."""
     x, y = np.meshgrid(np.arange(9) * 0.06, np.arange(9) * 0.06)
     layer = lambda z, step: np.stack([x.ravel() * step, y.ravel() * step, np.full(x.size, z)], 1).astype(np.float32)
     position = np.concatenate([layer(0.025, 1.0), layer(0.0, 0.5) + np.float32([0.12, 0.12, 0])])
@@ -294,7 +295,8 @@ def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor(
 
 
 def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
-    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between charts. Overlapping charts would cover less than their area."""
+    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between
+    charts. Overlapping charts would cover less than their area."""
     laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
     flat = unwrap_model(laths, 6000.0)
     on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()

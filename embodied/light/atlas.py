@@ -119,7 +119,8 @@ def things_of(
 
 def coarsened(things: Sequence[Thing], most: float) -> tuple[Thing, ...]:
     """The same things with at most `most` texels, if it takes no more than this: the largest floors lose a fifth
-    of their fineness first, then the largest patterned pieces a quarter. Mirrors (over 5 texels per luxel) stay sharp."""
+    of their fineness first, then the largest patterned pieces a quarter. Mirrors (over 5 texels per luxel) stay
+    sharp."""
     out = list(things)
     texels = lambda t: int(t.flat.size.prod()) * t.fineness**2
     total = sum(map(texels, out))
@@ -138,7 +139,8 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000)
 
     Args:
       widest: a page's largest side in texels.
-      most: texels that a page may have, if one thing alone does not need more; composing a page takes 150 bytes for each.
+      most: texels that a page may have, if one thing alone does not need more; composing a page takes 150 bytes for
+      each.
     """
     owners = tuple(dict.fromkeys(t.owner for t in things))
     number = {o: i for i, o in enumerate(owners)}
@@ -182,7 +184,8 @@ def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped
 
 
 def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: float, sharpness: float) -> int:
-    """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain, 1 where luxels are small.
+    """Texels per luxel: as many as patterns and mirrors need to stay sharp, 2 for what is plain, 1 where luxels are
+    small.
 
     Floors get 200 texels per metre, patterned walls and ceilings 120 and 80, patterned furniture 180 where
     its luxels are not too coarse, mirrors 400; all times `sharpness`.

@@ -21,6 +21,7 @@ import numpy as np
 
 from embodied.errors import UnableError
 from embodied.light import scalar
+from embodied.light.arrays import Array, RayScene
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -64,7 +65,7 @@ def _module() -> types.ModuleType:
         ) from e
     import drjit as dr
 
-    mi.set_variant(variant_of(lambda name: dr.has_backend(getattr(dr.JitBackend, name))))
+    mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
     return mi
 
 
@@ -79,7 +80,8 @@ def variant_of(has_backend: Callable[[str], bool]) -> str:
             return variant
     warn(
         f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
-        f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses with quality='unlit'"
+        f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses "
+        "with quality='unlit'"
     )
     return SCALAR
 
@@ -107,7 +109,7 @@ def device() -> str:
     return _module().variant().split("_")[0]
 
 
-def scene_of(corners: np.ndarray):
+def scene_of(corners: np.ndarray) -> RayScene:
     """A Mitsuba scene of bare triangles, for ray tests only.
 
     Args:
@@ -124,49 +126,49 @@ def scene_of(corners: np.ndarray):
     return scalar.Scene(scene, mi) if device() == "scalar" else scene
 
 
-def vector(a: np.ndarray):
+def vector(a: np.ndarray) -> Array:
     """(n, 3) array as mi.Vector3f."""
     mi = mitsuba()
     a = np.asarray(a, np.float32)
     return mi.Vector3f(*(mi.Float(np.ascontiguousarray(a[:, k])) for k in range(3)))
 
 
-def array(v) -> np.ndarray:
+def array(v: Array) -> np.ndarray:
     """A Dr.Jit vector or colour as an (n, 3) float32 array."""
     drjit().eval(v)
     return np.ascontiguousarray(np.stack([np.asarray(v[k]) for k in range(3)], axis=-1), np.float32)
 
 
-def constant(x: float):
+def constant(x: float) -> Array:
     """A number that kernels read as data, so that changing it compiles nothing anew."""
     return drjit().opaque(mitsuba().Float, float(x))
 
 
 def rest() -> None:
-    """Give back the memory that finished stages held: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
+    """Give back the memory of finished stages: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
     drjit().flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
 
 
-def r2(k):
+def r2(k: Array) -> tuple[Array, Array]:
     """Point k of the R2 low-discrepancy sequence in the unit square (M. Roberts, 2018), both coordinates for any whole
     part: `k` is a number or a device array of them."""
     return (k + 1) * 0.7548776662466927, (k + 1) * 0.5698402909980532
 
 
-def fraction(u):
+def fraction(u: Array) -> Array:
     """The part of device numbers or points behind the decimal point."""
     return u - drjit().floor(u)
 
 
-def number(x: int):
+def number(x: int) -> Array:
     """A whole number that kernels read as data, so that changing it compiles nothing anew."""
     return drjit().opaque(mitsuba().UInt32, int(x))
 
 
-def added_up(count: int, one: Callable, *zeros) -> tuple:
+def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Array) -> tuple[Array, ...]:
     """Sums of what `one` returns for 0 to `count` - 1, in one kernel.
 
     Args:

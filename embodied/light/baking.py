@@ -1,7 +1,8 @@
 """Light a house once: from House to a folder of pages that renderers show and tracers read.
 
 A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the looks of
-all its meshes and materials, the settings and the version. Every stage is a file of its own, so that an interrupted bake goes on where it
+all its meshes and materials, the settings and the version. Every stage is a file of its own, so that an interrupted
+bake goes on where it
 stopped; manifest.json is written last and lists every file with its checksum.
 """
 
@@ -17,12 +18,14 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from tqdm import tqdm
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
+from assets.catalogue import Catalogue
 from assets.records import Finish
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light import tone
@@ -100,7 +103,7 @@ class Bake:
         """One page before exposure."""
         with np.load(self.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
             soft, glow = z["soft"], z["glow"]
-        sun = cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE)
+        sun = np.asarray(cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE))
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
         return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
@@ -131,7 +134,7 @@ def progress_bar() -> Iterator[Progress]:
         yield tell
 
 
-def key_of(house: House, catalogue, settings: Settings) -> str:
+def key_of(house: House, catalogue: Catalogue, settings: Settings) -> str:
     """What a bake is filed under: another catalogue, model or material makes another bake."""
     return digest(
         "light", VERSION, house.digest, looks_of(house_parts(house, catalogue)), dataclasses.asdict(settings)
@@ -140,12 +143,13 @@ def key_of(house: House, catalogue, settings: Settings) -> str:
 
 def looks_of(parts: Sequence[Part]) -> str:
     """Hex digest of all meshes, finishes and colour maps by content, wherever they lie on disk."""
-    maps = {t: digest(Path(t).read_bytes()) for t in sorted({p.mesh.finish.texture for p in parts} - {None})}
+    textures = {p.mesh.finish.texture for p in parts}
+    maps = {t: digest(Path(t).read_bytes()) for t in sorted(t for t in textures if t is not None)}
     meshes: dict[int, str] = {}
     for mesh in (p.mesh for p in parts):
         if id(mesh) not in meshes:
             finish = dataclasses.replace(
-                mesh.finish, texture=maps.get(mesh.finish.texture), normal_map=None, roughness_map=None
+                mesh.finish, texture=maps.get(mesh.finish.texture or ""), normal_map=None, roughness_map=None
             )
             meshes[id(mesh)] = digest(
                 *(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)),
@@ -156,7 +160,7 @@ def looks_of(parts: Sequence[Part]) -> str:
 
 def bake(
     house: House,
-    catalogue,
+    catalogue: Catalogue,
     cache: Path,
     settings: Settings | str = "normal",
     *,
@@ -176,7 +180,7 @@ def bake(
 
 def bake_all(
     lightings: Sequence[House],
-    catalogue,
+    catalogue: Catalogue,
     cache: Path,
     settings: Settings | str = "normal",
     *,
@@ -251,12 +255,13 @@ def open_bake(folder: Path, house: House) -> Bake:
         raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
     if manifest.get("version") != VERSION:
         raise StaleBake(
-            f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; run `embodied light` again"
+            f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; "
+            "run `embodied light` again"
         )
     if manifest.get("house") != house.digest:
         raise StaleBake(
-            f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: it was edited "
-            "after it was lit; run `embodied light` again"
+            f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: "
+            "it was edited after it was lit; run `embodied light` again"
         )
     for name, mark in files.items():
         if _mark(folder / name) != mark:
@@ -297,7 +302,7 @@ class Shared:
     def __init__(
         self,
         house: House,
-        catalogue,
+        catalogue: Catalogue,
         cache: Path,
         settings: Settings,
         *,
@@ -390,20 +395,17 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
     with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(
-            f,
-            **{f"{k}{i}": a for i, m in enumerate(meshes) for k, a in (("v", m.vertices), ("f", m.faces), ("t", m.uv))},
-            **{f"g{i}": g for i, g in enumerate(gloss)},
-        )
+        arrays: dict[str, Any] = {f"g{i}": g for i, g in enumerate(gloss)}
+        for i, m in enumerate(meshes):
+            arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
+        np.savez_compressed(f, **arrays)
     with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(
-            f,
-            **{
-                f"{k}{i}": np.asarray(getattr(x, k))
-                for i, x in enumerate(s.lamps)
-                for k in ("points", "normals", "radiance", "area", "weights")
-            },
-        )
+        of_lamps: dict[str, Any] = {
+            f"{k}{i}": np.asarray(getattr(x, k))
+            for i, x in enumerate(s.lamps)
+            for k in ("points", "normals", "radiance", "area", "weights")
+        }
+        np.savez_compressed(f, **of_lamps)
     clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     files = {
@@ -478,7 +480,7 @@ def _kept(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosi
                 known = Radiosity(*(z[name] for name in names))
             if all(len(getattr(known, name)) == n for name in names):
                 return known
-        except Exception as e:  # noqa: BLE001  a damaged stage file, whatever zip or numpy say about it
+        except Exception as e:
             warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
     made = work()
     if path is not None:
@@ -488,7 +490,8 @@ def _kept(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosi
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
-    """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far brighter than that."""
+    """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far
+    brighter than that."""
     e = light.soft
     room_of_owner = np.array(
         [[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms]
@@ -560,7 +563,8 @@ def gloss_of(finish: Finish) -> tuple[int, int, int]:
     """Roughness, specular and metallic times 255; a mirror is smooth metal."""
     if finish.mirror:
         return 4, 255, 255
-    return tuple(round(255 * min(max(x, 0.0), 1.0)) for x in (finish.roughness, finish.specular, finish.metallic))
+    rough, specular, metal = (min(max(x, 0.0), 1.0) for x in (finish.roughness, finish.specular, finish.metallic))
+    return round(255 * rough), round(255 * specular), round(255 * metal)
 
 
 def _page_files(i: int) -> tuple[str, ...]:
@@ -588,6 +592,6 @@ def _read_picture(path: Path) -> np.ndarray:
     return np.ascontiguousarray(image[..., ::-1])
 
 
-def forget(cache: Path, house: House, catalogue, settings: Settings) -> None:
+def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings) -> None:
     """Delete the bake of `house`, finished or not."""
     shutil.rmtree(Path(cache) / "light" / key_of(house, catalogue, settings), ignore_errors=True)

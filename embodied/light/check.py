@@ -31,7 +31,8 @@ all luxels at fault pass the first twenty one time in seventeen, and a hundred o
 def compare(
     solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and (k, 3).
+    """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and
+    (k, 3).
 
     Rooms that get less than a twentieth of the house's middle light are left out: there the
     difference is far below what a picture shows. Single dark luxels are not: they may be the fault.

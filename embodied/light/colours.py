@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest
+from embodied.light.arrays import Array
 from embodied.light.atlas import Page
 from embodied.light.backend import array, drjit, mitsuba
 from embodied.light.cover import Cover
@@ -29,7 +30,8 @@ class ColourMaps:
     """Reads colour maps and remembers the last ones; all of a house would fill hundreds of megabytes."""
 
     def __init__(self, cache: Path | None = None, kept: int = 96) -> None:
-        """`kept` halved maps are remembered; halved ones are also kept under `cache`, to be decoded once and not per house."""
+        """`kept` halved maps are remembered; halved ones are also kept under `cache`, to be decoded once and not per
+        house."""
         self._cache = Path(cache) / "maps" if cache else None
         self._whole = functools.lru_cache(maxsize=4)(read_colours)
         self.shape = functools.cache(self._shape)
@@ -83,7 +85,7 @@ def gamma(x: np.ndarray) -> np.ndarray:
     return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
-def shown(x):
+def shown(x: Array) -> Array:
     """`gamma` of a device colour or number."""
     dr = drjit()
     x = dr.clip(x, 0.0, 1.0)
@@ -94,15 +96,15 @@ def shown(x):
 class Paints:
     """What colours the faces of one page, on the device; m faces."""
 
-    plain: object
+    plain: Array
     """(m * 3) linear colour of faces without a map."""
-    uv: object
+    uv: Array
     """(m * 3 * 2)."""
-    first: object
+    first: Array
     """(m,) where a face's map begins in `maps`, then its size; 0 wide for none."""
-    width: object
-    height: object
-    maps: object
+    width: Array
+    height: Array
+    maps: Array
     """Codes of all maps."""
 
 
@@ -132,7 +134,7 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
     return Paints(flat(plain), flat(page.uv), *(mi.UInt32(a) for a in (first, width, height, np.concatenate(maps))))
 
 
-def colour_at(paints: Paints, face, b1, b2):
+def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
     """Reflectance (a Color3f) at places on faces: bilinear, repeating; v runs up."""
     mi, dr = mitsuba(), drjit()
     at = lambda c: dr.gather(mi.Point2f, paints.uv, face * 3 + c)
@@ -183,7 +185,7 @@ def _coded(image: np.ndarray, level: int) -> np.ndarray:
     return np.ascontiguousarray(code[..., 0] | code[..., 1] << 10 | code[..., 2] << 20)
 
 
-def _decoded(code):
+def _decoded(code: Array) -> Array:
     mi, dr = mitsuba(), drjit()
     part = lambda shift: dr.square(mi.Float((code >> shift) & CODE) * (1.0 / CODE))
     return mi.Color3f(part(0), part(10), part(20))

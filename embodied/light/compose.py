@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -11,6 +13,7 @@ import shapely
 
 from embodied.house.house import House
 from embodied.light import radiosity
+from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, Page
 from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, vector
 from embodied.light.colours import ColourMaps, colour_at, linear, paints_of, shown
@@ -26,10 +29,12 @@ from embodied.light.tone import Exposure, developed
 METAL = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
 DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
-"""Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left; and
+"""Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
+and
 the rays of sharp metals per texel and of dull ones per luxel."""
 AROUND = 0.15
-"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
+"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
+too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,10 @@ class Solved:
     """The house as rays meet it."""
 
 
+Mirrors: TypeAlias = tuple[Array, Array, Array, Array, np.ndarray]
+"""Metallic share, tint and dullness of faces, what sharp ones show, and a blurred picture for the dull."""
+
+
 class Composer:
     """Makes the pages of a solved house; owns what all of them share on the device."""
 
@@ -81,7 +90,7 @@ class Composer:
         return slice(self._starts[number], self._starts[number + 1])
 
     @functools.cached_property
-    def portals(self):
+    def portals(self) -> RayScene | None:
         """What sunlight comes in by; None without sun or windows."""
         portals = portals_of(self.solved.house)
         return radiosity.portal_scene(portals) if portals and self.solved.outdoors.sun.any() else None
@@ -118,7 +127,14 @@ def page_of(number: int, composer: Composer) -> Ingredients:
 
 
 def _painted(
-    composer: Composer, number: int, c: Cover, soft, gain, sun, glow, mirrors
+    composer: Composer,
+    number: int,
+    c: Cover,
+    soft: np.ndarray,
+    gain: np.ndarray,
+    sun: np.ndarray | None,
+    glow: np.ndarray | None,
+    mirrors: Mirrors | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) uint32 packed sRGB of the covered texels: as shown, and their reflectance.
 
@@ -171,7 +187,7 @@ class _Bilinear:
         self._terms = tuple(zip(spots, ((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy)))
         self._size = page.height, page.width
 
-    def __call__(self, picture: np.ndarray):
+    def __call__(self, picture: np.ndarray) -> Array:
         mi, dr = mitsuba(), drjit()
         assert picture.shape[:2] == self._size
         table, out = mi.Float(np.ascontiguousarray(picture, np.float32).ravel()), mi.Color3f(0.0)
@@ -180,14 +196,14 @@ class _Bilinear:
         return out
 
 
-def _packed(colour):
+def _packed(colour: Array) -> Array:
     """A colour in [0, 1] as red, green and blue bytes of one number, red lowest."""
     mi, dr = mitsuba(), drjit()
     r, g, b = (mi.UInt32(dr.clip(x, 0.0, 1.0) * 255 + 0.5) for x in (colour.x, colour.y, colour.z))
     return r | (g << 8) | (b << 16)
 
 
-def _linear(codes):
+def _linear(codes: Array) -> Array:
     """The linear colour of packed sRGB."""
     mi, dr = mitsuba(), drjit()
     table = mi.Float(linear(np.arange(256, dtype=np.float32) / 255))
@@ -199,8 +215,9 @@ def _unpacked(codes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return cv2.cvtColor(codes.astype("<u4").view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB)
 
 
-def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover):
-    """What mirrors and metals show in place of their diffuse light: what somebody in the middle of the room sees in them.
+def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirrors | None:
+    """What mirrors and metals show in place of their diffuse light: what somebody in the middle of the room sees in
+    them.
 
     A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
 
@@ -227,7 +244,7 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover):
 
 
 def _mirrored(
-    composer: Composer, page: Page, face: np.ndarray, surfaces, rough: np.ndarray, *, dull: bool
+    composer: Composer, page: Page, face: np.ndarray, surfaces: Sequence[np.ndarray], rough: np.ndarray, *, dull: bool
 ) -> np.ndarray:
     """(k, 3) radiance that k places of one page mirror, all of them dull or none.
 
@@ -252,7 +269,7 @@ def _mirrored(
     table = mi.Float(np.minimum(seen, limit).astype(np.float32).ravel())
     spread_of, straight = mi.Float(width.astype(np.float32)), vector(bounced)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k))
         ball = mi.warp.square_to_uniform_sphere(fraction(mi.Point2f(p.turn0 + a, p.turn1 + b)))
         d = dr.normalize(straight + ball * spread_of)
@@ -264,7 +281,8 @@ def _mirrored(
 
 
 def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Values (n, c) at flat positions of a page, each mixed with those two texels around it: the grain of too few rays goes."""
+    """Values (n, c) at flat positions of a page, each mixed with those two texels around it: the grain of too few
+    rays goes."""
     there, sum_ = np.zeros(shape, np.float32), np.zeros((*shape, values.shape[1]), np.float32)
     there.ravel()[index] = 1.0
     sum_.reshape(-1, values.shape[1])[index] = values
@@ -273,7 +291,8 @@ def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.
 
 
 def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(h * w,) int: which of the n covered texels at flat positions `index` each texel of a page shows: its own or the nearest."""
+    """(h * w,) int: which of the n covered texels at flat positions `index` each texel of a page shows: its own or
+    the nearest."""
     if not len(index):
         return np.zeros(shape[0] * shape[1], np.int64)
     mask = np.zeros(shape[0] * shape[1], bool)
@@ -284,7 +303,8 @@ def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 HIDDEN = (2.0, 8.0)
-"""Luxels behind things take their visible neighbours' light up to the first distance (in luxels), and none of it from the second on."""
+"""Luxels behind things take their visible neighbours' light up to the first distance (in luxels), and none of it from
+the second on."""
 
 
 def filled(index: np.ndarray, own: np.ndarray, good: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -316,7 +336,8 @@ def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.
 
 
 def _sharp_sun(composer: Composer, page: Page, coarse: Texels, c: Cover, share: np.ndarray) -> np.ndarray | None:
-    """(n,) float32 share of the sun per texel: traced where luxels around disagree, else taken from them; None for none."""
+    """(n,) float32 share of the sun per texel: traced where luxels around disagree, else taken from them; None for
+    none."""
     if composer.portals is None or not len(c.index) or share.max() <= 0:
         return None
     towards = composer.solved.outdoors.sun_direction

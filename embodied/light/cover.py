@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from embodied.light.arrays import RayScene
 from embodied.light.atlas import Page
 from embodied.light.backend import drjit, mitsuba, scene_of
 from embodied.light.unwrap import face_normals
@@ -118,7 +119,9 @@ def nearest(mask: np.ndarray) -> np.ndarray:
     return at[labels]
 
 
-def _straight_down(scene, spot: np.ndarray, width: int, offset: tuple[float, float]) -> tuple[np.ndarray, ...]:
+def _straight_down(
+    scene: RayScene, spot: np.ndarray, width: int, offset: tuple[float, float]
+) -> tuple[np.ndarray, ...]:
     """Face under each texel `spot` (-1 for none), and where on it."""
     mi, dr = mitsuba(), drjit()
     if not len(spot):

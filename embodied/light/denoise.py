@@ -7,11 +7,12 @@ chart borders never show. Both weigh by distance, normal and likeness of brightn
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from embodied.light.arrays import Array
 from embodied.light.atlas import Atlas
 from embodied.light.backend import array, constant, drjit, mitsuba, vector
 from embodied.light.cover import Texels
@@ -139,7 +140,7 @@ class _Grid:
         self._p, self._n = vector(position[self.mine]), vector(normal[self.mine])
         self.own = mi.UInt32(np.ascontiguousarray(self.mine, np.uint32))
 
-    def around(self, step: int):
+    def around(self, step: int) -> Iterator[tuple[int, int, Array, Array]]:
         """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
         mi, dr = mitsuba(), drjit()
         for j in range(-2, 3):
@@ -155,7 +156,8 @@ class _Grid:
 
 
 LAYER = (0.3, 0.002)
-"""A neighbour lies on the same layer where it is at most this share of its distance, and so many metres more, off the tangent plane."""
+"""A neighbour lies on the same layer where it is at most this share of its distance, and so many metres more, off the
+tangent plane."""
 
 
 def neighbours(
@@ -257,5 +259,5 @@ def cap_sparks(
     return e * np.minimum(1.0, (most * mean + 3.0 * noise) / np.maximum(y, 1e-7))[:, None].astype(np.float32)
 
 
-def _brightness(c):
+def _brightness(c: Array) -> Array:
     return (c.x + c.y + c.z) * (1.0 / 3.0)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.house.house import House, Opening
+from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas
 from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, r2, vector
 from embodied.light.unwrap import areas_of, face_normals
@@ -129,7 +130,7 @@ def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ..
     return tuple(lamps)
 
 
-def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lamp:
+def in_the_open(lamp: Lamp, scene: RayScene, *, rays: int = 48, reach: float = 0.4) -> Lamp:
     """The same lamp with its points drawn by how freely they shine out of their fitting.
 
     Most of a shaded lamp's surface is hidden by the shade; points spread evenly would leave each
@@ -141,7 +142,7 @@ def in_the_open(lamp: Lamp, scene, *, rays: int = 48, reach: float = 0.4) -> Lam
     n = vector(lamp.normals)
     origin, frame = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(*r2(mi.Float(k))))))
         return (dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0),)
 
@@ -168,7 +169,7 @@ def glowing_faces(atlas: Atlas) -> dict[str, np.ndarray]:
 
 
 def _luminance(color: np.ndarray) -> float:
-    return float(max(color @ [0.2126, 0.7152, 0.0722], 1e-3))
+    return max(float(color @ [0.2126, 0.7152, 0.0722]), 1e-3)
 
 
 def _spread(corners: np.ndarray, area: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

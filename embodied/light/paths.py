@@ -16,6 +16,7 @@ from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import constant, drjit, mitsuba
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
+from embodied.light.sky import Outdoors
 from embodied.light.solve import AMBIENT, Luxels
 
 DEEPEST = 14
@@ -77,11 +78,7 @@ def surfaces_of(lux: Luxels) -> Surfaces:
 
 
 def lights_of(
-    space: Space,
-    without: Callable[[str], Space],
-    portals: Sequence[Portal],
-    lamps: Sequence[Lamp],
-    outdoors: Outdoors,
+    space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors: Outdoors
 ) -> Lights:
     """Pool what shines.
 

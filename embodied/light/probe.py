@@ -18,7 +18,8 @@ AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0,
 
 
 def ambient_cubes(solved: Solved, *, rays: int = 256) -> np.ndarray:
-    """(rooms, 6, 3) float32 sRGB in [0, 1]: what white paper looks like that faces +x, -x, +y, -y, +z, -z at 1.1 m height.
+    """(rooms, 6, 3) float32 sRGB in [0, 1]: what white paper looks like that faces +x, -x, +y, -y, +z, -z at 1.1 m
+    height.
 
     Seen from 13 spots around the room's middle, so that one table beside it does not decide.
     """

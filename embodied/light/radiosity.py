@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.atlas import Atlas
 from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, scene_of, vector
 from embodied.light.cover import Texels, nearest
@@ -31,12 +32,12 @@ class Points:
     """Surface points on the device; n of them, Dr.Jit arrays."""
 
     n: int
-    position: object
-    normal: object
-    face_normal: object
-    thin: object
-    turn0: object
-    turn1: object
+    position: Array
+    normal: Array
+    face_normal: Array
+    thin: Array
+    turn0: Array
+    turn1: Array
     """Per-point rotation of the sample sequences (Cranley and Patterson 1976)."""
 
 
@@ -63,21 +64,27 @@ def points_of(
 class Space:
     """The house as something rays can hit; faces in page order."""
 
-    scene: object
+    scene: RayScene
     opaque_faces: np.ndarray
     """(f,) int, position in page order of each face of `scene`; glass is left out."""
-    page: object
+    page: Array
     """Page of each face (device), then the same for:"""
-    luxel_xy: object
-    normal: object
-    thin: object
-    width: object
-    height: object
-    base: object
-    luxel_of: object
+    luxel_xy: Array
+    normal: Array
+    thin: Array
+    width: Array
+    height: Array
+    base: Array
+    luxel_of: Array
     """Per page pixel the luxel to read: the pixel's own or the nearest one that is covered."""
-    env: object
+    env: Array
     """Outdoor radiance (ENV_ROWS x 2 ENV_ROWS pixels, flat RGB)."""
+
+
+def sky_alone(scene: RayScene, env: Array) -> Space:
+    """Triangles without pages before a sky: enough for `env_lookup`, not for what is met."""
+    nothing = np.zeros(0, np.int64)
+    return Space(scene, nothing, None, None, None, None, None, None, None, None, env)
 
 
 def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray | None = None) -> Space:
@@ -139,15 +146,14 @@ def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | Non
         mask = np.zeros(page.width * page.height, bool)
         chosen = np.ones(n, bool) if good is None or not good[start : start + n].any() else good[start : start + n]
         mask[t.index[chosen]] = True
-        mask = mask.reshape(page.height, page.width)
         if mask.any():
-            number = number[nearest(mask).ravel()]
+            number = number[nearest(mask.reshape(page.height, page.width)).ravel()]
         out.append(number)
         start += n
     return np.concatenate(out)
 
 
-def env_lookup(space: Space, d, active=True):
+def env_lookup(space: Space, d: Array, active: Array = True) -> Array:
     """Outdoor radiance in direction `d`, bilinear in yaw and nearest in the few rows of the small picture."""
     mi, dr = mitsuba(), drjit()
     h, w = ENV_ROWS, 2 * ENV_ROWS
@@ -163,7 +169,7 @@ def env_lookup(space: Space, d, active=True):
     return out
 
 
-def sky_light(space: Space, p: Points, portal: Portal, samples: int):
+def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> Array:
     """e (a Color3f) from the outdoors through one portal, by area sampling.
 
     One sample is clamped at 10 / samples and the sum at full view of the portal: without it, things
@@ -174,7 +180,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in sides)
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k))
         q = corner + along * fraction(p.turn0 + a) + up * fraction(p.turn1 + b)
         d = q - p.position
@@ -192,7 +198,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int):
     return total * dr.select(seen > 1, 1 / seen, 1)
 
 
-def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
+def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
     """e (a Color3f) from one lamp."""
     mi, dr = mitsuba(), drjit()
     bare, count = not lamp.normals.any(), number(len(lamp.points))
@@ -201,7 +207,7 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
     weights = mi.Float(np.ascontiguousarray(lamp.weights, np.float32))
     strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         pick = fraction(p.turn0 + r2(mi.Float(k))[0])
         i = dr.minimum(mi.UInt32(pick * mi.Float(count)), count - 1)
         d = dr.gather(mi.Point3f, at, i) - p.position
@@ -224,7 +230,9 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int):
     return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
-def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, directions: int, radius: float = 0.006):
+def sun_share(
+    space: Space, p: Points, portals_scene: RayScene, towards: np.ndarray, directions: int, radius: float = 0.006
+) -> Array:
     """Cosine-weighted share (a Float) of the sun's disc that a point sees through a portal.
 
     Args:
@@ -235,7 +243,7 @@ def sun_share(space: Space, p: Points, portals_scene, towards: np.ndarray, direc
     frame = mi.Frame3f(mi.Vector3f(*(constant(x) for x in towards)))
     whole = constant(directions)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         r, turn = constant(radius * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
         d = dr.normalize(frame.n + frame.s * (r * dr.cos(turn)) + frame.t * (r * dr.sin(turn)))
         cos, side, active = facing(p, d)
@@ -270,7 +278,7 @@ def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
     places, normals = flat(patches.position + patches.normal * lift), flat(patches.normal)
     both, flux, extent = mi.Bool(np.ascontiguousarray(patches.thin)), flat(patches.flux), flat(patches.extent)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         d = dr.gather(mi.Point3f, places, k) - p.position
         far = dr.norm(d)
         d /= dr.maximum(far, 1e-5)
@@ -309,7 +317,7 @@ def gather(
     none, black = dr.zeros(mi.Float, p.n), dr.zeros(mi.Color3f, p.n)
     if memory is None:
 
-        def one(k):
+        def one(k: Array) -> tuple[Array, ...]:
             luxel, seen, wrong = meet(k)
             colour = dr.gather(mi.Color3f, b, luxel, seen)
             return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0)), wrong
@@ -319,7 +327,7 @@ def gather(
         hits, bad = memory.once(("hits", first, samples), lambda: _hits(meet, p.n, samples))
         lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
 
-        def known(k):
+        def known(k: Array) -> tuple[Array, ...]:
             luxel = dr.gather(mi.UInt32, hits, k * count + lane)
             colour = dr.gather(mi.Color3f, b, luxel, luxel != NOTHING)
             return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0))
@@ -336,7 +344,7 @@ def _rays(space: Space, p: Points, first: int) -> Callable:
     mi, dr = mitsuba(), drjit()
     start = number(first)
 
-    def meet(k):
+    def meet(k: Array) -> tuple[Array, ...]:
         u0, u1 = r2(mi.Float(k + start))
         side = dr.select(p.thin & ((k & 1) == 1), -1.0, 1.0)
         u = fraction(mi.Point2f(p.turn0 + u0, p.turn1 + u1))
@@ -355,7 +363,7 @@ def _hits(meet: Callable, n: int, samples: int) -> tuple:
     mi, dr = mitsuba(), drjit()
     found, lane, count = dr.zeros(mi.UInt32, samples * n), dr.arange(mi.UInt32, n), number(n)
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         luxel, seen, wrong = meet(k)
         dr.scatter(found, dr.select(seen, luxel, NOTHING), k * count + lane)
         return (wrong,)
@@ -365,7 +373,7 @@ def _hits(meet: Callable, n: int, samples: int) -> tuple:
     return found, bad
 
 
-def hit_luxel(space: Space, ray, active=True):
+def hit_luxel(space: Space, ray: Ray, active: Array = True) -> Array:
     """Luxel number where a ray hits, whether it hits, whether from the front, whether nearer than 12 mm."""
     mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, near = _met(space, ray, active)
@@ -374,8 +382,9 @@ def hit_luxel(space: Space, ray, active=True):
     return dr.gather(mi.UInt32, space.luxel_of, base + y * w + x, hit), hit, front, near
 
 
-def hit_colour(space: Space, table, ray, active=True):
-    """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits anything."""
+def hit_colour(space: Space, table: Array, ray: Ray, active: Array = True) -> Array:
+    """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits
+    anything."""
     mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, _ = _met(space, ray, active)
     x, y = dr.clip(q.x - 0.5, 0.0, mi.Float(w) - 1), dr.clip(q.y - 0.5, 0.0, mi.Float(height) - 1)
@@ -391,8 +400,9 @@ def hit_colour(space: Space, table, ray, active=True):
     return out, hit
 
 
-def _met(space: Space, ray, active):
-    """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the front, within 12 mm."""
+def _met(space: Space, ray: Ray, active: Array) -> Array:
+    """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the
+    front, within 12 mm."""
     mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     hit = h.is_valid() & active
@@ -407,7 +417,7 @@ def _met(space: Space, ray, active):
     return q, w, height, dr.gather(mi.UInt32, space.base, page, hit), hit, front, h.t < 0.012
 
 
-def portal_scene(portals: Sequence[Portal]):
+def portal_scene(portals: Sequence[Portal]) -> RayScene:
     """The portals alone, as something the sun's rays can be asked about."""
     quads = []
     for p in portals:
@@ -434,7 +444,7 @@ def reached(units: np.ndarray, sees: Callable[[np.ndarray], np.ndarray], *, trie
     return np.sort(np.concatenate([g for g, h in zip(groups, hit) if h.any()] or [np.zeros(0, np.int64)]))
 
 
-def facing(p: Points, d):
+def facing(p: Points, d: Array) -> Array:
     """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
     dr = drjit()
 

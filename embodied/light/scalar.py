@@ -10,7 +10,7 @@ leaves other names of `a` alone, so that no code may count on either.
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, pi
 from typing import Any
@@ -95,14 +95,16 @@ def flush_malloc_cache() -> None:
     """Nothing: NumPy keeps no freed arrays."""
 
 
-def while_loop(state: tuple, cond, body) -> tuple:
+def while_loop(
+    state: tuple[Any, ...], cond: Callable[..., Any], body: Callable[..., tuple[Any, ...]]
+) -> tuple[Any, ...]:
     """`body` from state to state as long as `cond` holds; all entries loop equally long."""
     while np.all(cond(*state)):
         state = body(*state)
     return state
 
 
-def scatter(target: np.ndarray, value, index: np.ndarray) -> None:
+def scatter(target: np.ndarray, value: Array, index: np.ndarray) -> None:
     """Entries of a flat array written."""
     _bare(target)[_bare(index)] = _bare(value)
 

@@ -36,7 +36,8 @@ class Settings:
     jpeg: int = 92
     """Quality of the picture pages on disk."""
     texels: float = 29e6
-    """Of all pages together, before packing; patterns of large houses are drawn coarser to keep to it (`atlas.coarsened`)."""
+    """Of all pages together, before packing; patterns of large houses are drawn coarser to keep to it
+    (`atlas.coarsened`)."""
 
 
 QUALITIES = {

@@ -8,12 +8,13 @@ all of them are computed at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from embodied.light.arrays import Array
 from embodied.light.backend import array, drjit, mitsuba, vector
 from embodied.light.denoise import neighbours
 
@@ -92,7 +93,8 @@ class Spread:
     """Carries values from sites to luxels, on the device."""
 
     def __init__(self, sites: Sites, position: np.ndarray, normal: np.ndarray, good: np.ndarray) -> None:
-        """`position` and `normal`, (n, 3), of all luxels; `good`, (k,) bool, sites whose light counts where there are any."""
+        """`position` and `normal`, (n, 3), of all luxels; `good`, (k,) bool, sites whose light counts where there are
+        any."""
         flat = lambda a: mitsuba().Float(np.ascontiguousarray(a, np.float32).ravel())
         self._sites, self._position, self._normal = sites, position, normal
         self._around = mitsuba().UInt32(np.ascontiguousarray(sites.around, np.uint32).ravel())
@@ -127,9 +129,9 @@ class Spread:
         dr.eval(mean, spread)
         return np.array(mean), np.array(spread)
 
-    def _weights(self, i: np.ndarray | None) -> Sequence[tuple]:
+    def _weights(self, which: np.ndarray | None) -> Iterator[tuple[Array, Array]]:
         mi, dr = mitsuba(), drjit()
-        i = slice(None) if i is None else i
+        i: Any = slice(None) if which is None else which
         own = mi.UInt32(np.ascontiguousarray(self._sites.own[i], np.uint32))
         p, n = vector(self._position[i]), vector(self._normal[i])
         reach = dr.gather(mi.Float, self._reach, own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,8 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light import denoise, radiosity
-from embodied.light.atlas import SHELL, Atlas
+from embodied.light.arrays import Array
+from embodied.light.atlas import SHELL, Atlas, Page
 from embodied.light.backend import added_up, array, drjit, fraction, mitsuba, r2
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.cover import Texels, rasterise
@@ -84,12 +86,14 @@ def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
     ends = np.cumsum([len(t.index) for t in texels])
     places = {k: np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")}
     mine = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
-    texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # views: once in memory, not twice
+    texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # type: ignore[arg-type]  # views: once in memory, not twice
     names = [o.split("/")[0] if k == "opening" else r for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
     unit = {name: i for i, name in enumerate(dict.fromkeys(names))}
     return Luxels(
         texels,
-        *places.values(),
+        places["position"],
+        places["normal"],
+        places["face_normal"],
         np.concatenate([p.thin[t.face] for p, t in pairs]),
         np.concatenate([albedo(p, t.cover, maps) for p, t in pairs]),
         np.zeros((len(owner), 3), np.float32),
@@ -112,7 +116,7 @@ def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) ->
     return replace(lux, glow=glow, sampled=sampled[lux.owner] & (glow.sum(1) > 0))
 
 
-def _share_of_area(page, t: Texels) -> np.ndarray:
+def _share_of_area(page: Page, t: Texels) -> np.ndarray:
     """(n,) square metres each luxel stands for: its face's area shared out, every owner's sum kept exact."""
     faces = areas_of(page.corners)
     count = np.bincount(t.face, minlength=len(faces))
@@ -123,7 +127,7 @@ def _share_of_area(page, t: Texels) -> np.ndarray:
     return (faces / np.maximum(count, 1) * scale[page.owner]).astype(np.float32)[t.face]
 
 
-def glow_of(house: House, atlas: Atlas, page, face: np.ndarray, lamps: Sequence[Lamp]) -> np.ndarray | None:
+def glow_of(house: House, atlas: Atlas, page: Page, face: np.ndarray, lamps: Sequence[Lamp]) -> np.ndarray | None:
     """(n, 3) radiance that texels on faces (n,) of `page` give off themselves; None where nothing does."""
     emission = np.array([f.emission or (0.0, 0.0, 0.0) for f in page.finishes], np.float32)[page.finish]
     if not emission.any():
@@ -171,16 +175,14 @@ def sources_of(problem: Problem) -> list[Source]:
     """Sky and lamps."""
     atlas, lux, space, settings = problem.atlas, problem.lux, problem.space, problem.settings
     found = []
-    for x in portals_of(problem.house):
-        sky = lambda i, rays, x=x: radiosity.sky_light(space, subset(lux, i), x, rays or settings.sky_rays)
+    for way in portals_of(problem.house):
+        sky = lambda i, rays, x=way: radiosity.sky_light(space, subset(lux, i), x, rays or settings.sky_rays)
         found.append(Source(lambda i, rays, f=sky: array(f(i, rays))))
     for x in problem.lamps:
-        bare = x.owner is not None and x.owner in atlas.owners
-        own = (
-            once(problem.memory, ("without", x.owner), lambda x=x: radiosity.without(space, atlas, x.owner))
-            if bare
-            else space
-        )
+        own = space
+        if x.owner is not None and x.owner in atlas.owners:
+            alone = functools.partial(radiosity.without, space, atlas, x.owner)
+            own = once(problem.memory, ("without", x.owner), alone)
         lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, subset(lux, i), x, rays or settings.lamp_rays)
         found.append(Source(lambda i, rays, f=lamp: array(f(i, rays)), x))
     return found
@@ -212,9 +214,14 @@ def shone_on(problem: Problem, source: Source) -> Shone:
         which, e = shone()
     else:  # of the same lamp with another colour or power
         radiance = np.asarray(source.lamp.radiance, np.float32)
-        which, e = problem.memory.once(("shone", source.lamp.id), lambda: (lambda w, e: (w, e / radiance))(*shone()))
+        which, e = problem.memory.once(("shone", source.lamp.id), lambda: _per(radiance, *shone()))
         e = e * radiance
     return Shone(source, np.unique(unit[which]), which, e)
+
+
+def _per(radiance: np.ndarray, which: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Light for each unit of a lamp's radiance."""
+    return which, e / radiance
 
 
 def direct_light(
@@ -266,7 +273,7 @@ def outer_light(problem: Problem, spread: Spread, samples: int = 24) -> np.ndarr
     p = subset(lux, sites.luxel[mine])
     portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k))
         u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
         d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
@@ -282,6 +289,11 @@ def outer_light(problem: Problem, spread: Spread, samples: int = 24) -> np.ndarr
 
 def _nowhere() -> Portal:
     return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray:
+    """(k, 3) e of sunlit patches at some sites."""
+    return radiosity.patch_light(problem.space, subset(problem.lux, problem.sites.luxel[which]), patches)
 
 
 def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -302,8 +314,8 @@ def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     for u in np.unique(lux.unit[share > 0]):
         patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], problem.settings.patches)
         if patches is not None:
-            lit = lambda i, x=patches: radiosity.patch_light(space, subset(lux, sites.luxel[i]), x)
-            which = radiosity.reached(unit, lambda i, lit=lit: lit(i).sum(1) > 0)
+            lit = functools.partial(_lit_by, problem, patches)
+            which = radiosity.reached(unit, lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
             e[which] += lit(which)
     return share, e
 
@@ -433,7 +445,8 @@ def solve(
     atlas, lux, sites, memory = problem.atlas, problem.lux, problem.sites, problem.memory
     k, sources = len(sites.luxel), sources_of(problem)
     anywhere = Spread(sites, lux.position, lux.normal, np.ones(k, bool))
-    shone, first = [], np.zeros((k, 3), np.float32)
+    shone: list[Shone] = []
+    first = np.zeros((k, 3), np.float32)
     for source in sources:
         tell("direct light", len(shone) / len(sources))
         shone.append(shone_on(problem, source))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,16 +10,18 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light import radiosity
+from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, atlas_of, things_of
 from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, r2, scene_of, vector
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.compose import spread
-from embodied.light.cover import cover, rasterise
-from embodied.light.radiosity import ENV_ROWS, LIFT, Space, points_of
+from embodied.light.cover import Texels, cover, rasterise
+from embodied.light.radiosity import ENV_ROWS, LIFT, points_of, sky_alone
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
 from embodied.light.unwrap import face_normals
 from embodied.scene.lit_pages import LitMesh
+from embodied.scene.part import Part
 
 RADIUS = 70.0
 """Metres to the dome."""
@@ -62,24 +65,22 @@ def surroundings(
     return atlas, pages, dome
 
 
-def _flat(part):
+def _flat(part: Part) -> Part:
     """Walls, roofs and lawns of the outdoors unfold like those inside."""
-    import dataclasses
-
     flat = part.owner in ("outdoor/facade", "outdoor/roof", "outdoor/ground", "outdoor/terrace")
     return dataclasses.replace(part, kind="wall") if flat else part
 
 
-def _daylight(scene, outdoors: Outdoors, texels, thin: np.ndarray, rays: int = 24) -> np.ndarray:
+def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndarray, rays: int = 24) -> np.ndarray:
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
     mi, dr = mitsuba(), drjit()
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
     rows = outdoors.picture.shape[0] // ENV_ROWS
     small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)
-    space = Space(scene, *([None] * 9), mi.Float(small.ravel()))
+    space = sky_alone(scene, mi.Float(small.ravel()))
     hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
 
-    def one(k):
+    def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k))
         u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
         d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))

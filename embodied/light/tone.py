@@ -15,6 +15,7 @@ import shapely
 from scipy.ndimage import map_coordinates
 
 from embodied.house.house import House
+from embodied.light.arrays import Array
 from embodied.light.backend import array, drjit, mitsuba, vector
 from embodied.light.colours import shown
 
@@ -88,7 +89,7 @@ def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> E
     y = e @ [0.2126, 0.7152, 0.0722]
     middle = np.exp(np.mean(np.log(np.maximum(y, DARKEST))))
     level = np.maximum(y, DARKEST) ** ADAPT * middle ** (1 - ADAPT)
-    gains = np.stack([_gain(c, l) for c, l in zip(e, level)])
+    gains = np.stack([_gain(c, bright) for c, bright in zip(e, level)])
     storeys = [house.storey_of(r) for r in house.rooms]
     levels = np.array([(s.elevation, s.elevation + s.height) for s in storeys])
     out_y = float(outside @ [0.2126, 0.7152, 0.0722])
@@ -110,7 +111,7 @@ def develop(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
     return array(developed(mitsuba().Color3f(vector(x.reshape(-1, 3))))).reshape(x.shape)
 
 
-def developed(x):
+def developed(x: Array) -> Array:
     """Exposed radiance, a device colour, as sRGB in [0, 1]: extended Reinhard, half on luminance and half per channel.
 
     Then lifted a little, with a shoulder that keeps sunlit walls short of plain white.
@@ -129,5 +130,5 @@ def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
     return (develop(radiance, gain) * 255 + 0.5).astype(np.uint8)
 
 
-def _curve(x):
+def _curve(x: Array) -> Array:
     return x * (1 + x / WHITE**2) / (1 + x)

@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -17,8 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from assets.cache import DAMAGED, atomic_path, digest
 from assets.records import MeshPart
+from embodied.light.arrays import Array
 from embodied.light.backend import added_up, drjit, fraction, mitsuba, r2, scene_of, vector
 
+T = TypeVar("T")
 VERSION = 6
 """Counts up whenever an unwrapping would come out differently."""
 
@@ -93,7 +96,7 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
         sizes.append(np.ceil(flat[mine].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
     places, size = pack(np.array(sizes))
     flat += places[chart][:, None] + 1.0
-    return Unwrapped(*_single(corners, normals, flat, uv), part, np.zeros(len(part), bool), size)
+    return _unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size)
 
 
 def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = False) -> Unwrapped:
@@ -113,9 +116,8 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     corners, normals, uv, part = corners_of(parts)
     if not len(corners):
         empty = np.zeros((0, 3, 3))
-        return Unwrapped(
-            *_single(empty, empty, empty[..., :2], empty[..., :2]), part, np.zeros(0, bool), np.array([1, 1], np.int32)
-        )
+        flat = empty[..., :2]
+        return _unwrapped(empty, empty, flat, flat, part, np.zeros(0, bool), np.array([1, 1], np.int32))
     if not trusted:
         once = _without_doubles(corners)
         corners, normals, uv, part = (x[once] for x in (corners, normals, uv, part))
@@ -136,7 +138,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     atlas.generate(charts, packing)
     _, faces, place = atlas[0]  # faces keep their order, so part and uv carry over per corner
     luxels, size = _repacked(place[faces] * [atlas.width, atlas.height], faces)
-    return Unwrapped(*_single(corners, normals, luxels, uv), part, thin, size)
+    return _unwrapped(corners, normals, luxels, uv, part, thin, size)
 
 
 def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -179,17 +181,17 @@ def cached_model(parts: Sequence[MeshPart], budget: float, cache: Path, *, trust
     return made
 
 
-def save_record(record, path: Path) -> None:
+def save_record(record: Any, path: Path) -> None:
     """Write a dataclass of arrays as .npz, atomically."""
     with atomic_path(path) as temporary, open(temporary, "wb") as f:
         np.savez_compressed(f, **{x.name: getattr(record, x.name) for x in fields(record)})
 
 
-def load_record(kind, path: Path):
+def load_record(kind: type[T], path: Path) -> T | None:
     """Read what `save_record` wrote; None when absent, cut short or of another shape."""
     try:
         with np.load(path, allow_pickle=False) as z:
-            return kind(**{x.name: z[x.name] for x in fields(kind)})
+            return kind(**{x.name: z[x.name] for x in fields(kind)})  # type: ignore[arg-type]  # a dataclass
     except (OSError, *DAMAGED):
         return None
 
@@ -254,8 +256,18 @@ def _spread(corners: np.ndarray) -> float:
     return float(size[1] * size[2])
 
 
-def _single(*arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    return tuple(np.ascontiguousarray(a, np.float32) for a in arrays)
+def _unwrapped(
+    corners: np.ndarray,
+    normals: np.ndarray,
+    luxels: np.ndarray,
+    uv: np.ndarray,
+    part: np.ndarray,
+    thin: np.ndarray,
+    size: np.ndarray,
+) -> Unwrapped:
+    """The record, its coordinates in single precision."""
+    single = lambda a: np.ascontiguousarray(a, np.float32)
+    return Unwrapped(single(corners), single(normals), single(luxels), single(uv), part, thin, size)
 
 
 def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -278,7 +290,7 @@ def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarr
     for side in (1.0, -1.0):
         frame, origin = mi.Frame3f(n * side), mi.Point3f(centre + n * (side * reach))
 
-        def one(k, frame=frame, origin=origin):
+        def one(k: Array, frame: Array = frame, origin: Array = origin) -> tuple[Array, ...]:
             a, b = r2(mi.Float(k))
             d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(r0 + a, r1 + b))))
             return (dr.select(scene.ray_test(mi.Ray3f(origin, d)), 0.0, 1.0),)
@@ -304,7 +316,7 @@ def _with_rings(corners: np.ndarray, keep: np.ndarray, rings: int = 2) -> np.nda
     for _ in range(rings):
         touched = np.zeros(spot.max() + 1, bool)
         touched[spot[keep]] = True
-        keep = touched[spot].any(1)
+        keep = np.asarray(touched[spot].any(1))
     return keep
 
 
