@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test setup lint docs wheel clean
+.PHONY: help demo test quick setup lint docs wheel clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -8,7 +8,8 @@ help:
 	@echo 'make demo    seed -> furnished house -> panoramas -> an agent finds something -> Rerun recording, in $(OUT)'
 	@echo 'make test    the whole test suite'
 	@echo 'make setup   only the set-up: system packages, .venv, Python packages'
-	@echo 'make lint    ruff'
+	@echo 'make quick   the tests that take less than a minute together'
+	@echo 'make lint    ruff, its formatter, mypy'
 	@echo 'make docs    API pages from the docstrings, in docs/api'
 	@echo 'make wheel   build the wheel into dist/'
 
@@ -23,6 +24,11 @@ test: setup
 
 lint: setup
 	@.venv/bin/ruff check .
+	@.venv/bin/ruff format --check .
+	@.venv/bin/mypy
+
+quick: setup
+	@.venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist loadfile
 
 docs: setup
 	@.venv/bin/python -c 'import pdoc' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt -e '.[docs]'

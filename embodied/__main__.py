@@ -7,6 +7,7 @@ once; at all other times it raises KeyboardInterrupt, and whoever is writing tid
 
 import signal
 import sys
+from types import FrameType
 
 STOPPED = b"\nstopped; finished parts are kept and the same command goes on from there\n"
 
@@ -23,7 +24,7 @@ def start() -> int:
         return 130
 
 
-def stop(number: int, frame) -> None:
+def stop(number: int, frame: FrameType | None) -> None:
     """What Ctrl-C and a polite kill do: end the program if something is being imported, else raise
     KeyboardInterrupt."""
     import os

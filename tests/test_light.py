@@ -251,7 +251,7 @@ def test_noise_between_sites_goes_and_an_edge_stays():
     clean = np.where(left, 1.0, 4.0)[:, None].repeat(3, 1).astype(np.float32)
     noise = np.random.default_rng(0).normal(0, 0.1, (len(clean), 1)).astype(np.float32)
     all_ = np.ones(len(clean), bool)
-    options = dict(variance=np.square(0.1 * clean[:, 0]))
+    options = {"variance": np.square(0.1 * clean[:, 0])}
     out = smooth_sites(clean * (1 + noise), sites.position, sites.normal, sites.around, all_, **options)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0

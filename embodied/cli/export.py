@@ -21,6 +21,7 @@ from embodied.cli.options import any_path, folder_to_write, whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from assets.catalogue import Catalogue
     from embodied.datasets.store import Dataset
     from embodied.house.house import House
     from embodied.scene.lit_pages import LitPages
@@ -165,7 +166,7 @@ def run_house(args: argparse.Namespace) -> int:
     return 0
 
 
-def light(args: argparse.Namespace, house: House, catalogue: object) -> LitPages | None:
+def light(args: argparse.Namespace, house: House, catalogue: Catalogue) -> LitPages | None:
     """The house's baked light, from the cache where it is there; None without."""
     if args.light == "none":
         return None
