@@ -1,9 +1,8 @@
 """A lit house as USDZ: its baked pages as what each surface gives off, with names, classes and rooms.
 
 Needs OpenUSD (`pip install embodied-houses[usd]`). There is no maintained converter from glTF to USD for Python, so
-the stage
-is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh says
-what it is, as the extras of the glTF do (embodied.scene.web).
+the stage is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh
+says what it is, as the extras of the glTF do (embodied.scene.web).
 """
 
 from __future__ import annotations
