@@ -36,7 +36,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.playground import make_playground
+from embodied.gym.playground import Playground, make_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
@@ -194,9 +194,6 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join([*lines, line][:2])
 
 
-VIEW_OF_AGENTS = ViewSettings()
-
-
 @dataclass(frozen=True, eq=False)
 class Stage:
     """Everything that environments of one batch share: houses, tasks, assistants, decoded panoramas."""
@@ -211,7 +208,7 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     """The environment of a kind of task over a data set, or over one generated and lit flat without `data`.
 
     Args:
-      options: of `set_stage` (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
+      options: fields of StageSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
         (shaping, strict, patience).
     """
     own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
@@ -259,53 +256,69 @@ def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
         )
 
 
-def set_stage(
-    kind: str,
-    *,
-    data: str | Path | None = None,
-    split: str = "train",
-    seed: int = 0,
-    cache: str | Path | None = None,
-    sees: str | Sequence[str] = ("rgb", "features"),
-    view: ViewSettings = VIEW_OF_AGENTS,
-    pictures: PictureSettings | None = None,
-    source: FeatureSource | None = None,
-    worlds: Mapping[str, SeenPlace] | None = None,
-    layout: Layout | None = None,
-    wheels: bool = False,
-) -> Stage:
-    """What environments of a kind of task play in and see.
+@dataclass(frozen=True, eq=False)
+class StageSettings:
+    """What environments of a kind of task play in and see."""
 
-    Args:
-      data: folder that `embodied dataset` built; without it a flat is generated from `seed` and lit.
-      sees: some of embodied.gym.eyes.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'.
-      view: how pixels are framed.
-      pictures: how the houses are drawn; by default as the data set's pictures are, and 'fast' for a generated flat.
-      source: the features; those of the installed default encoder where not given.
-      worlds: worlds to play in; otherwise opened from `data`.
-      wheels: edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"].
+    data: str | Path | None = None
+    """Folder that `embodied dataset` built; without it a flat is generated from `seed` and lit."""
+    split: str = "train"
+    seed: int = 0
+    cache: str | Path | None = None
+    sees: str | Sequence[str] = ("rgb", "features")
+    """Some of embodied.gym.eyes.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
+    view: ViewSettings = ViewSettings()
+    """How pixels are framed."""
+    pictures: PictureSettings | None = None
+    """How the houses are drawn; by default as the data set's pictures are, and 'fast' for a generated flat."""
+    source: FeatureSource | None = None
+    """The features; those of the installed default encoder where not given."""
+    worlds: Mapping[str, SeenPlace] | None = None
+    """Worlds to play in; otherwise opened from `data`."""
+    layout: Layout | None = None
+    wheels: bool = False
+    """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
+
+
+def set_stage(kind: str, **settings: Any) -> Stage:
+    """Everything that environments of a kind of task share; `settings` are fields of StageSettings.
 
     Raises:
       ValueError: unknown `sees`, pixels where there are none, or wheels for a kind that cannot have them.
     """
-    seen, where = checked_sees(sees), Path(cache) if cache else default_cache()
+    wanted = StageSettings(**settings)
+    seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
     play = make_playground(
-        kind, Path(data) if data else None, split, seed=seed, cache=where, worlds=worlds, pictures=pictures, sees=seen
+        kind,
+        Path(wanted.data) if wanted.data else None,
+        wanted.split,
+        seed=wanted.seed,
+        cache=where,
+        worlds=wanted.worlds,
+        pictures=wanted.pictures,
+        sees=seen,
     )
+    make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
+    layout = wanted.layout or Layout(descriptions=kind == "hari")
+    return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout)
+
+
+def _eyes_of(play: Playground, seen: Sequence[str], wanted: StageSettings) -> Eyes:
+    """Everything that is seen, over one store of decoded panoramas."""
     eyes: list[Eyes] = []
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
     store = PanoramaStore(drawn)
     if pixels := [name for name in PIXELS if name in seen]:
         refuse_blind(play.worlds, drawn)
-        eyes.append(PictureEyes(store, pixels, view))
+        eyes.append(PictureEyes(store, pixels, wanted.view))
     if "features" in seen:
-        if source is None:
+        if wanted.source is None:
             refuse_blind(play.worlds, drawn)
-        eyes.append(FeatureEyes("features", source if source is not None else encoder_entry().load()(store)))
+        source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
+        eyes.append(FeatureEyes("features", source))
     if "oracle" in seen:
         eyes.append(FeatureEyes("oracle", FeatureTable(play.features)))
-    make_env = _on_wheels(kind, play.make_env, where) if wheels else play.make_env
-    return Stage(make_env, play.tasks, AllEyes(eyes), layout or Layout(descriptions=kind == "hari"))
+    return AllEyes(eyes)
 
 
 def refuse_blind(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:

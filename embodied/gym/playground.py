@@ -25,7 +25,6 @@ from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
-from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
 from embodied.world import makers, open_world
 
@@ -94,15 +93,7 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
     Raises:
       ValueError: none, or not of all houses, though they are wanted.
     """
-    found = {}
-    for name in names:
-        path = data.folder / "houses" / name / "panoramas.pano"
-        if path.exists():
-            with PanoramaFile(path) as file:
-                meta = file.meta
-            light = str(meta["light"]) if meta["quality"] not in ("none", "unlit") else None
-            settings = PictureSettings(int(str(meta["size"])), str(meta["quality"]), str(meta["backend"]), light)
-            found[name] = settings
+    found = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
     if wanted and len(found) < len(names):
         raise ValueError(
             f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "

@@ -33,7 +33,7 @@ from embodied.light.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.backend import LightError, device, rest, warn
 from embodied.light.colours import ColourMaps
 from embodied.light.compose import Composer, Ingredients, Solved, page_of
-from embodied.light.emitters import in_the_open, lamps_of
+from embodied.light.emitters import Lamp, in_the_open, lamps_of
 from embodied.light.memory import Memory
 from embodied.light.radiosity import space_of, with_env
 from embodied.light.settings import QUALITIES, VERSION, Settings, settings_of
@@ -394,37 +394,53 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
         gloss += more_gloss
     meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
+    _write_meshes(folder, meshes, gloss)
+    _write_lamps(folder, s.lamps)
+    clock("meshes")
+    (folder / "stage_light.npz").unlink(missing_ok=True)
+    manifest = {
+        **_facts_of(s, house, meshes, folder),
+        "settings": dataclasses.asdict(settings),
+        "pages": first + len(outer_pages) + 1,
+        "seconds": {k: round(v, 2) for k, v in took.items()},
+        "total_seconds": round(time.perf_counter() - start, 1),
+        "processor_seconds": round(time.process_time() - used, 1),
+        "check": error,
+    }
+    write_json(folder / "manifest.json", manifest)
+    progress("done", 1.0)
+    return Bake(folder, manifest)
+
+
+def _write_meshes(folder: Path, meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> None:
     with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
         arrays: dict[str, Any] = {f"g{i}": g for i, g in enumerate(gloss)}
         for i, m in enumerate(meshes):
             arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
         np.savez_compressed(f, **arrays)
+
+
+def _write_lamps(folder: Path, lamps: Sequence[Lamp]) -> None:
     with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
-        of_lamps: dict[str, Any] = {
+        arrays: dict[str, Any] = {
             f"{k}{i}": np.asarray(getattr(x, k))
-            for i, x in enumerate(s.lamps)
+            for i, x in enumerate(lamps)
             for k in ("points", "normals", "radiance", "area", "weights")
         }
-        np.savez_compressed(f, **of_lamps)
-    clock("meshes")
-    (folder / "stage_light.npz").unlink(missing_ok=True)
-    files = {
-        p.name: _mark(p) for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")
-    }
-    manifest = {
+        np.savez_compressed(f, **arrays)
+
+
+def _facts_of(s: Solved, house: House, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
+    """What the manifest says of a bake whose files are written, but how it was made."""
+    written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
+    return {
         "version": VERSION,
         "key": folder.name,
         "house": house.digest,
         "device": device(),
-        "settings": dataclasses.asdict(settings),
-        "pages": first + len(outer_pages) + 1,
         "own_pages": len(s.atlas.pages),
         "owners": list(owners(house)),
-        "seconds": {k: round(v, 2) for k, v in took.items()},
-        "total_seconds": round(time.perf_counter() - start, 1),
-        "processor_seconds": round(time.process_time() - used, 1),
         "luxels": len(s.lux.position),
-        "check": error,
         "exposure": {
             "polygons": s.exposure.polygons,
             "levels": s.exposure.levels.tolist(),
@@ -437,11 +453,8 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
         ],
         "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
         "probes": _probes(s),
-        "files": files,
+        "files": {p.name: _mark(p) for p in written},
     }
-    write_json(folder / "manifest.json", manifest)
-    progress("done", 1.0)
-    return Bake(folder, manifest)
 
 
 def _same_atlas(folder: Path, atlas: Atlas) -> None:

@@ -77,12 +77,58 @@ class Panes:
     picture: Array
 
 
+@dataclass(frozen=True, eq=False)
+class _Pages:
+    """The pages of a bake one after another: (t, 3) float32 of t texels, (n, 3) of n luxels."""
+
+    albedo: np.ndarray
+    light: np.ndarray
+    glow: np.ndarray
+    coarse_albedo: np.ndarray
+    coarse_glow: np.ndarray
+    sizes: np.ndarray
+    """(pages, 2) width and height in texels."""
+    luxels: np.ndarray
+    """(pages, 2) width and height in luxels."""
+
+
+def _pages_of(bake: Bake, own: int, sun: np.ndarray) -> _Pages:
+    """All pages but the sky's; those from `own` on are outdoors, where only what is shown is known.
+
+    Args:
+      sun: (3,) e of the sun behind glass.
+    """
+    columns: list[tuple[np.ndarray, ...]] = []
+    sizes, luxels = [], []
+    for i, picture in enumerate(bake.lit.pages[:-1]):
+        h, w = picture.shape[:2]
+        sizes.append((w, h))
+        if i >= own:
+            nothing = np.zeros((h * w, 3), np.float32)
+            grey, dark = np.full((1, 3), 0.2, np.float32), np.zeros((1, 3), np.float32)
+            columns.append((nothing, picture.reshape(-1, 3).astype(np.float32) / 255, nothing, grey, dark))
+            luxels.append((1, 1))
+            continue
+        one = bake.ingredients(i)
+        soft = one.soft.astype(np.float32)
+        size = soft.shape[1::-1]
+        fine = linear(np.arange(256, dtype=np.float32) / 255)[one.albedo]
+        e = cv2.resize(soft, (w, h), interpolation=cv2.INTER_LINEAR)
+        e += (one.sun.astype(np.float32) / 255)[..., None] * sun
+        g = one.glow.astype(np.float32) if one.glow.size else np.zeros_like(soft)
+        shines = cv2.resize(g, (w, h), interpolation=cv2.INTER_NEAREST)
+        coarse = cv2.resize(fine, size, interpolation=cv2.INTER_AREA)
+        columns.append(tuple(a.reshape(-1, 3) for a in (fine, e, shines, coarse, g)))
+        luxels.append(size)
+    return _Pages(*(np.concatenate(c) for c in zip(*columns)), sizes=np.array(sizes), luxels=np.array(luxels))  # type: ignore[misc]
+
+
 def world_of(bake: Bake, house: House) -> World:
     """Upload a bake."""
     mi = mitsuba()
     u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
     flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
-    lit, own = bake.lit, bake.manifest["own_pages"]
+    lit = bake.lit
     with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
         gloss = [z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
     number = {o: i + 1 for i, o in enumerate(lit.owners)}
@@ -93,41 +139,11 @@ def world_of(bake: Bake, house: House) -> World:
     owner = np.concatenate([np.full(len(m.faces), number.get(m.owner, 0), np.int32) for m, _ in solid])
     outer = np.concatenate([np.full(len(m.faces), m.kind == "outdoor") for m, _ in solid])
     sun = outdoors(house)
-    albedo, light, glow, coarse_albedo, coarse_glow, sizes, luxel_sizes = [], [], [], [], [], [], []
-    for i in range(len(lit.pages) - 1):
-        picture = lit.pages[i]
-        h, w = picture.shape[:2]
-        sizes.append((w, h))
-        if i >= own:
-            light.append(picture.reshape(-1, 3).astype(np.float32) / 255)
-            albedo.append(np.zeros((h * w, 3), np.float32))
-            glow.append(np.zeros((h * w, 3), np.float32))
-            luxel_sizes.append((1, 1))
-            coarse_albedo.append(np.full((1, 3), 0.2, np.float32))
-            coarse_glow.append(np.zeros((1, 3), np.float32))
-            continue
-        one = bake.ingredients(i)
-        soft = one.soft.astype(np.float32)
-        fine = linear(np.arange(256, dtype=np.float32) / 255)[one.albedo]
-        e = cv2.resize(soft, (w, h), interpolation=cv2.INTER_LINEAR)
-        e += (one.sun.astype(np.float32) / 255)[..., None] * (sun.sun * radiosity.GLASS).astype(np.float32)
-        g = one.glow.astype(np.float32) if one.glow.size else np.zeros_like(soft)
-        light.append(e.reshape(-1, 3))
-        albedo.append(fine.reshape(-1, 3))
-        glow.append(cv2.resize(g, (w, h), interpolation=cv2.INTER_NEAREST).reshape(-1, 3))
-        luxel_sizes.append(soft.shape[1::-1])
-        coarse_albedo.append(cv2.resize(fine, soft.shape[1::-1], interpolation=cv2.INTER_AREA).reshape(-1, 3))
-        coarse_glow.append(g.reshape(-1, 3))
-    lw, lh = np.array(luxel_sizes).T
+    pages = _pages_of(bake, bake.manifest["own_pages"], (sun.sun * radiosity.GLASS).astype(np.float32))
+    lw, lh = pages.luxels.T
     thin = np.concatenate([_listed_twice(m.faces) for m, _ in solid])
-    size: np.ndarray = np.array(sizes)
-    texels = size.prod(1)
-    lamps = _lamps(bake)
+    texels = pages.sizes.prod(1)
     sampled = {x.placement for x in house.lights if x.on}
-    glow_coarse = np.concatenate(coarse_glow)
-    rows = radiosity.ENV_ROWS
-    k = sun.picture.shape[0] // rows
-    small = sun.picture.reshape(rows, k, 2 * rows, k, 3).mean((1, 3))
     xy = uv * np.stack([lw, lh], 1)[page][:, None]
     space = Space(
         scene_of(corners),
@@ -140,13 +156,12 @@ def world_of(bake: Bake, house: House) -> World:
         u32(lh),
         u32(np.cumsum(lw * lh) - lw * lh),
         u32(np.arange(int((lw * lh).sum()))),
-        flat(small),
+        flat(_coarse(sun.picture)),
     )
-    hit_by_lamp = glow_coarse if not sampled else np.zeros_like(glow_coarse)
-    surfaces = Surfaces(flat(np.concatenate(coarse_albedo)), flat(hit_by_lamp), flat(np.zeros_like(glow_coarse)))
+    dark = np.zeros_like(pages.coarse_glow)
+    surfaces = Surfaces(flat(pages.coarse_albedo), flat(dark if sampled else pages.coarse_glow), flat(dark))
     without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
-    lights = lights_of(space, without, portals_of(house), lamps, sun)
-    any_glow = np.concatenate(glow)
+    lights = lights_of(space, without, portals_of(house), _lamps(bake), sun)
     return World(
         space,
         surfaces,
@@ -156,11 +171,11 @@ def world_of(bake: Bake, house: House) -> World:
         flat(np.concatenate([g for _, g in solid]) / 255),
         flat(uv),
         u32(page),
-        u32(size.ravel()),
+        u32(pages.sizes.ravel()),
         u32(np.cumsum(texels) - texels),
-        flat(np.concatenate(albedo)),
-        flat(np.concatenate(light)),
-        flat(any_glow) if any_glow.any() else None,
+        flat(pages.albedo),
+        flat(pages.light),
+        flat(pages.glow) if pages.glow.any() else None,
         flat(lit.pages[-1] / 255),
         flat(sun.picture),
         sun.picture.shape[0],
@@ -168,6 +183,13 @@ def world_of(bake: Bake, house: House) -> World:
         sun,
         _panes_of(lit, number),
     )
+
+
+def _coarse(picture: np.ndarray) -> np.ndarray:
+    """(ENV_ROWS, 2 ENV_ROWS, 3) means of an equirect's squares."""
+    rows = radiosity.ENV_ROWS
+    k = picture.shape[0] // rows
+    return picture.reshape(rows, k, 2 * rows, k, 3).mean((1, 3))
 
 
 def _listed_twice(faces: np.ndarray) -> np.ndarray:
