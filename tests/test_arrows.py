@@ -70,7 +70,7 @@ embodied.action_spaces <- embodied.navigation embodied.interface
 embodied.language <- assets.catalogue embodied.interface
 embodied.records <- embodied.interface
 embodied.render <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
-embodied.light <- embodied.house embodied.scene embodied.render
+embodied.light <- assets.catalogue embodied.house embodied.scene embodied.render
 embodied.mattersim <- embodied.render
 embodied.teachers <- embodied.navigation embodied.interface embodied.action_spaces
 embodied.policies <- embodied.interface embodied.action_spaces embodied.language embodied.teachers
