@@ -256,7 +256,7 @@ def open_world(
       graph: the navigation graph; built when not given.
       changes: fields of PictureSettings, instead of those of `pictures`: size=512, quality="normal".
     """
-    graph = graph or build_graph(house, catalogue)
+    graph = graph or build_graph(house)
     return World(house, catalogue, graph, cache, dataclasses.replace(pictures, **changes))
 
 
@@ -272,7 +272,7 @@ def open_folder(
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
-    graph, pictures = build_graph(house, catalogue), dataclasses.replace(pictures, **changes)
+    graph, pictures = build_graph(house), dataclasses.replace(pictures, **changes)
     return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
 
 

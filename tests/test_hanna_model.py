@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, sim_attend, sinusoid
-from agents.hanna.config import HannaConfig
+from agents.hanna.config import HannaSizes
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.percept import (
@@ -24,7 +24,7 @@ from agents.hanna.percept import (
     target_similarity,
 )
 
-SMALL = HannaConfig(
+SMALL = HannaSizes(
     words=12,
     feature_size=6,
     hidden_size=16,
@@ -283,7 +283,7 @@ def test_the_gate_subtracts_what_was_thought_in_the_same_situation():
 
 
 def test_the_paper_sized_model_has_about_the_fifteen_million_parameters_of_table_4_6():
-    net = HannaNetwork(HannaConfig(words=2332))
+    net = HannaNetwork(HannaSizes(words=2332))
     assert sum(p.numel() for p in net.parameters()) == pytest.approx(15.5e6, rel=0.05)
 
 

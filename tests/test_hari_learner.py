@@ -12,12 +12,12 @@ from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import Ground, Run, counts_of, learn_once, train, values
+from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Choice, HariPolicy, policy_of
-from agents.hari.pretraining import Lessons, pretrain, pretraining_success
+from agents.hari.pretraining import Curriculum, pretrain, pretraining_success
 from agents.hari.pretraining import learn_once as lesson
-from agents.hari.rules import RULES, Moment, RandomWithBudgets, RuleAgent
+from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from agents.imitation.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.imitation.checkpoint import CheckpointError
@@ -59,19 +59,19 @@ def fork_task(goal: int) -> Task:
     return Task(f"fork/hari/{goal}", "hari", "fork", Pose(0), what, (goal,), "find a mug in a hall", 0.0, 6)
 
 
-def fork_lessons() -> Lessons:
+def fork_lessons() -> Curriculum:
     """Both ways of the fork, with the goal described densely or as the next action."""
-    return Lessons(
+    return Curriculum(
         {"fork": fork_world()}, Describer(()), [fork_task(1), fork_task(2)] * 8, [fork_task(1), fork_task(2)]
     )
 
 
-def grid_lessons() -> tuple[HandWorld, Lessons]:
+def grid_lessons() -> tuple[HandWorld, Curriculum]:
     world = grid_world()
     config = HariConfig(fewest_nodes=1)
     pool = hari_pool(world, seed=0, config=config)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage(), config=config) for i in range(48)]
-    return world, Lessons({"grid": world}, Describer(frequent_classes([world], 3)), tasks, tasks[:24])
+    return world, Curriculum({"grid": world}, Describer(frequent_classes([world], 3)), tasks, tasks[:24])
 
 
 def words_of(world: HandWorld) -> FeatureWords:
@@ -194,8 +194,10 @@ def test_the_critic_remembers_each_episode_by_itself():
 # Rules ------------------------------------------------------------------------------------------
 
 
-def moment(taken=(0, 0, 0, 0, 0), described=False, would_stop=False, possible=(True,) * 5, budget=(9,) * 5) -> Moment:
-    return Moment(np.array(taken), described, would_stop, np.array(possible), np.array(budget, dtype=float))
+def moment(
+    taken=(0, 0, 0, 0, 0), described=False, would_stop=False, possible=(True,) * 5, budget=(9,) * 5
+) -> RuleMoment:
+    return RuleMoment(np.array(taken), described, would_stop, np.array(possible), np.array(budget, dtype=float))
 
 
 def test_the_rules_of_the_table_ask_when_they_say_and_stop_when_the_execution_policy_would():
@@ -301,7 +303,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
         QUICK, cost=0.1, horizon=6, critic_iterations=10, iterations=90, entropy=0.01, batch=24
     )
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
-    run = Run(agent, new_heads(config, SMALL.hidden_size)[1])
+    run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])
     world = fork_world()
     ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
     hops = {"fork": count_hops(world.graph.next_hop)}

@@ -16,7 +16,7 @@ from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, count_cost, follow
 from embodied.language.plain import with_article
 from embodied.language.route_clauses import legs_of, shortened
-from embodied.language.seen import Eyes, doorway
+from embodied.language.seen import Lookout, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import SLIPS, TEMPLATES
 from embodied.language.voice import People, RouteDescriber
@@ -211,7 +211,7 @@ def test_articles_follow_the_head_of_a_noun():
 
 def test_a_counted_door_is_found_and_another_number_is_not(world):
     """'The second door on the left' means that door to the listener, and only that one."""
-    eyes, checked = Eyes(world), 0
+    eyes, checked = Lookout(world), 0
     for a in range(len(world.graph.ids)):
         for b in world.graph.neighbours(a):
             for c in world.graph.neighbours(b):

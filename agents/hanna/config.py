@@ -1,4 +1,4 @@
-"""HannaConfig: the sizes of the networks. Free of torch, so that the command line answers at once."""
+"""HannaSizes: the sizes of the networks. Free of torch, so that the command line answers at once."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class HannaConfig:
+class HannaSizes:
     """Sizes of Table D.1 and the ablations of Table D.2 (alpha = 0 is an option of training)."""
 
     words: int

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from agents.hanna.attention import DotAttend
-from agents.hanna.config import HannaConfig
+from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
 from agents.hanna.percept import SLOTS, VIEWS, Percept, slot_distribution, target_similarity
 
@@ -37,7 +37,7 @@ class LstmMemory:
 class LstmStateNetwork(nn.Module):
     """Text LSTM, decoder LSTM, attention over words, current view and target view."""
 
-    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int) -> None:
+    def __init__(self, config: HannaSizes, previous_size: int, extra_size: int) -> None:
         super().__init__()
         h, d = config.hidden_size, config.feature_size
         self.hidden_size = h
@@ -87,7 +87,7 @@ def _attend_words(attend: DotAttend, query: Tensor, text: Tensor, mask: Tensor) 
 class LstmNetwork(nn.Module):
     """Navigation and help-request decoders of the baseline."""
 
-    def __init__(self, config: HannaConfig) -> None:
+    def __init__(self, config: HannaSizes) -> None:
         super().__init__()
         self.config = config
         h = config.hidden_size

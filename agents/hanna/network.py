@@ -21,7 +21,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
-from agents.hanna.config import HannaConfig
+from agents.hanna.config import HannaSizes
 from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, slot_distribution, target_similarity
 
 SHORT = 12
@@ -77,7 +77,7 @@ class Scores:
 class StateNetwork(nn.Module):
     """Text-encoding, inter-task and intra-task components: everything but the last layer."""
 
-    def __init__(self, config: HannaConfig, previous_size: int, extra_size: int) -> None:
+    def __init__(self, config: HannaSizes, previous_size: int, extra_size: int) -> None:
         """`previous_size` is that of a_{t-1}, `extra_size` that of P^nav (37) or 0."""
         super().__init__()
         c, h, d = config, config.hidden_size, config.feature_size
@@ -215,7 +215,7 @@ class StateNetwork(nn.Module):
 class HannaNetwork(nn.Module):
     """Navigation policy and help-request policy: two networks that share nothing."""
 
-    def __init__(self, config: HannaConfig) -> None:
+    def __init__(self, config: HannaSizes) -> None:
         super().__init__()
         self.config = config
         h, e = config.hidden_size, config.navigation_embedding

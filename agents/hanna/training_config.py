@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from agents.hanna.asking import RULES
-from agents.hanna.config import HannaConfig
+from agents.hanna.config import HannaSizes
 from embodied.records import from_json
 
 MODELS = ("hanna", "lstm")
@@ -124,9 +124,9 @@ class TrainingConfig:
         falling = round(self.cooldown * self.iterations)
         return self.learning_rate * min(1.0, (self.iterations - update) / (falling + 1))
 
-    def network_config(self, words: int, feature_size: int) -> HannaConfig:
+    def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""
-        return HannaConfig(
+        return HannaSizes(
             words=words,
             feature_size=feature_size,
             hidden_size=self.hidden_size,

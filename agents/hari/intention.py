@@ -77,7 +77,7 @@ def train(
     config, folder = agent.config, Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     agent.executor.network.eval()
-    run = Run(agent, critic)
+    run = IntentionRun(agent, critic)
     progress = run.restore(folder / "checkpoint.pt")
     write_json(folder / "settings.json", as_dict(config), indent=1)
     hops = {name: count_hops(p.graph.next_hop) for name, p in training.places.items()}
@@ -104,7 +104,7 @@ def train(
     return session.progress
 
 
-class Run:
+class IntentionRun:
     """Owns what changes in a run: the two heads and their optimizers."""
 
     def __init__(self, agent: HariAgent, critic: RecurrentHead) -> None:
@@ -141,7 +141,7 @@ class Run:
         return Progress(**body["progress"])
 
 
-def learn_once(run: Run, ground: Ground, hops: Mapping[str, np.ndarray], update: int) -> dict[str, float]:
+def learn_once(run: IntentionRun, ground: Ground, hops: Mapping[str, np.ndarray], update: int) -> dict[str, float]:
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)

@@ -42,7 +42,7 @@ EVERY = 25
 
 
 @dataclass(frozen=True, eq=False)
-class Lessons:
+class Curriculum:
     """Where pre-training takes place."""
 
     places: Mapping[str, Place]
@@ -65,7 +65,7 @@ class Walk:
 
 
 def pretrain(
-    executor: Executor, lessons: Lessons, folder: Path, *, minutes: float | None = None, note: Note = print
+    executor: Executor, lessons: Curriculum, folder: Path, *, minutes: float | None = None, note: Note = print
 ) -> Progress:
     """Train `executor` in place, from `folder`'s checkpoint if there is one.
 
@@ -108,7 +108,9 @@ def pretrain(
     return session.progress
 
 
-def learn_once(executor: Executor, optimizer: torch.optim.Optimizer, lessons: Lessons, update: int) -> dict[str, float]:
+def learn_once(
+    executor: Executor, optimizer: torch.optim.Optimizer, lessons: Curriculum, update: int
+) -> dict[str, float]:
     """One update; returns its loss per step and the share of steps at which the likeliest move was right.
 
     Raises:
@@ -133,7 +135,7 @@ def learn_once(executor: Executor, optimizer: torch.optim.Optimizer, lessons: Le
 
 
 def _play(
-    executor: Executor, lessons: Lessons, walks: Sequence[Walk], horizon: int
+    executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int
 ) -> tuple[list[Tensor], list[Tensor]]:
     """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right."""
     beliefs = executor.network.begin(len(walks))  # (B, h)
@@ -162,7 +164,7 @@ def _play(
     return losses, right
 
 
-def _begin(lessons: Lessons, task: Task, rng: np.random.Generator) -> Walk:
+def _begin(lessons: Curriculum, task: Task, rng: np.random.Generator) -> Walk:
     """An episode with its goal described as in pre-training."""
     place, goal = lessons.places[task.world], task.goal_nodes[0]
     if not isinstance(task.goal, FindObject):
@@ -188,7 +190,7 @@ def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
         walk.pose = poses[column]
 
 
-def pretraining_success(executor: Executor, lessons: Lessons, tasks: Sequence[Task]) -> float:
+def pretraining_success(executor: Executor, lessons: Curriculum, tasks: Sequence[Task]) -> float:
     """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state."""
     config = executor.config
     executor.network.eval()
@@ -199,7 +201,7 @@ def pretraining_success(executor: Executor, lessons: Lessons, tasks: Sequence[Ta
     return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
 
 
-def _play_greedily(executor: Executor, lessons: Lessons, walks: Sequence[Walk], horizon: int) -> None:
+def _play_greedily(executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int) -> None:
     beliefs = executor.network.begin(len(walks)).clone()
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
@@ -222,7 +224,7 @@ def _play_greedily(executor: Executor, lessons: Lessons, walks: Sequence[Walk], 
 
 
 def _validate(
-    executor: Executor, lessons: Lessons, progress: Progress, update: int, folder: Path, note: Note
+    executor: Executor, lessons: Curriculum, progress: Progress, update: int, folder: Path, note: Note
 ) -> Progress:
     tasks = lessons.validation[: executor.config.validation_tasks]
     success = pretraining_success(executor, lessons, tasks)

@@ -16,7 +16,7 @@ CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class RuleMoment:
     """What a rule may look at."""
 
     taken: np.ndarray
@@ -36,7 +36,7 @@ class Rule(Protocol):
         """(5,) the most that an episode may take of each intention."""
         ...
 
-    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+    def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         """The next intention, an index into INTENTIONS."""
         ...
 
@@ -53,7 +53,7 @@ class AskFirst:
     def budget(self, rng: np.random.Generator) -> np.ndarray:
         return np.full(len(INTENTIONS), np.inf)
 
-    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+    def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         if self.goal and not moment.taken[GOAL]:
             return GOAL
         if self.state and not moment.described:
@@ -81,7 +81,7 @@ class RandomWithBudgets:
             budget[k] = whole + (rng.random() < self.means[name] - whole)
         return budget
 
-    def choose(self, moment: Moment, rng: np.random.Generator) -> int:
+    def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         if not moment.taken.any() and moment.possible[GOAL] and moment.budget[GOAL] >= 1:
             return GOAL
         free = moment.possible & (moment.taken < moment.budget)
@@ -131,7 +131,7 @@ class RuleAgent:
             seen = observations[i]
             assert seen is not None  # rows are those that have not ended
             stop = bool(considered.would_stop[k])
-            moment = Moment(taken[i].copy(), bool(described[i]), stop, available(seen), mind.budgets[i])
+            moment = RuleMoment(taken[i].copy(), bool(described[i]), stop, available(seen), mind.budgets[i])
             chosen = self.rule.choose(moment, rngs[i])
             actions[i] = action_of(chosen, int(considered.best_moves[k]))
             taken[i, chosen] += 1

@@ -8,7 +8,7 @@ from pathlib import Path
 from agents.hari.agent import Executor, HariAgent, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
-from agents.hari.pretraining import Lessons, pretrain
+from agents.hari.pretraining import Curriculum, pretrain
 from agents.hari.words import feature_words
 from agents.imitation.loop import Note, Progress
 from embodied.datasets.store import Dataset
@@ -35,11 +35,11 @@ def hari_data(folder: Path) -> Dataset:
     return data
 
 
-def lessons_of(data: Dataset) -> Lessons:
+def lessons_of(data: Dataset) -> Curriculum:
     """The pre-training splits."""
     places: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
     validation = spread(data.tasks("pretrain_val"), None)
-    return Lessons(places, data.describer(), data.tasks("pretrain"), validation)
+    return Curriculum(places, data.describer(), data.tasks("pretrain"), validation)
 
 
 def rules_of(config: IntentionConfig) -> HariRules:

@@ -98,7 +98,7 @@ class Inputs:
 
 
 @dataclass(frozen=True, eq=False)
-class Percept:
+class PerceptRows:
     """What one agent has before it."""
 
     state: np.ndarray
@@ -108,9 +108,11 @@ class Percept:
     allowed: np.ndarray
 
 
-def percept(words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int) -> Percept:
+def percept(
+    words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int
+) -> PerceptRows:
     """One agent's descriptions and moves as rows."""
-    return Percept(
+    return PerceptRows(
         words.rows(state, "state"),
         words.rows(goal, "goal"),
         move_rows(words, candidates),
@@ -119,13 +121,13 @@ def percept(words: FeatureWords, state: Description, goal: Description, candidat
     )
 
 
-def percept_of(words: FeatureWords, observation: Observation) -> Percept:
+def percept_of(words: FeatureWords, observation: Observation) -> PerceptRows:
     """What an agent perceives: d^s, the description on top of the stack, and where it can go."""
     goals = observation.goal_descriptions
     return percept(words, observation.state_description, goals[-1], observation.candidates, observation.turn)
 
 
-def collate(percepts: Sequence[Percept]) -> Inputs:
+def collate(percepts: Sequence[PerceptRows]) -> Inputs:
     """Percepts of B agents side by side, padded; stopping moves to the last column of all."""
     most = max(len(p.moves) for p in percepts)
     return Inputs(

@@ -106,7 +106,7 @@ def viewpoints(
       shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the
         largest.
     """
-    graph = build_graph(house, catalogue)
+    graph = build_graph(house)
     area = {r.id: abs(float(np.ptp(np.array(r.polygon), axis=0).prod())) for r in house.rooms}
     found: list[tuple[str, np.ndarray, float]] = []
     kinds: set[str] = set()

@@ -41,7 +41,7 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         aim=1.0,
     )
     house = generate_house(seed, LARGE, catalogue)
-    yield measure("navigation graph of it", lambda: build_graph(house, catalogue), "s", repeats=5)
+    yield measure("navigation graph of it", lambda: build_graph(house), "s", repeats=5)
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
 
 
@@ -123,7 +123,7 @@ def memory(catalogue: Catalogue, cache: Path, seed: int, count: int) -> Iterator
     process, values = psutil.Process(), []
     for i in tqdm(range(count), "houses loaded and dropped", unit="house"):
         house = generate_house(seed + i, TYPICAL, catalogue)
-        graph: NavGraph = build_graph(house, catalogue)
+        graph: NavGraph = build_graph(house)
         with Renderer(house, catalogue, size=64) as renderer:
             renderer.panorama(graph.positions[0])
         gc.collect()

@@ -111,7 +111,7 @@ def inhabited(
     from embodied.navigation.graph import build_graph
     from embodied.world import open_world
 
-    graph = build_graph(house, catalogue)
+    graph = build_graph(house)
     met = meet(house, graph, catalogue, seed=args.seed)
     paths = route_paths(graph, house.name, seed=args.seed, house_split="test", starts=met)
     house = add_people(house, met, (p[0] for p in paths))

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
         house = generate_house(args.seed, config, catalogue)
         stages.next()
-        graph = build_graph(house, catalogue)
+        graph = build_graph(house)
         stages.next()
         args.out.mkdir(parents=True, exist_ok=True)
         house.save(args.out / "house.json")

@@ -229,7 +229,7 @@ def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: C
         try:
             house = generate_house(house_seed, HouseConfig(area=config.area), catalogue)
             house = dataclasses.replace(house, name=name)
-            return house, build_graph(house, catalogue)
+            return house, build_graph(house)
         except HouseError as e:
             problems.append(f"{house_seed}: {e}")
     raise HouseError(f"no house for {name!r} after {SEEDS} seeds; the last said {problems[-1]}")

@@ -2,7 +2,7 @@
 
 It reads the text with the grammar, then searches, cheapest first, for a walk that fits the
 clauses. A walk is only extended from nodes it has looked around at, so all it knows of the house
-comes through `Eyes`; it may turn back and try another way, as people do.
+comes through `Lookout`; it may turn back and try another way, as people do.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
-from embodied.language.seen import Eyes, Seen, Way, doorway
+from embodied.language.seen import Lookout, Seen, Way, doorway
 
 LONGEST = 4
 """Most steps that one clause may stand for."""
@@ -64,10 +64,10 @@ def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Heard:
     Raises:
       ValueError: the text holds no instruction.
     """
-    return carry_out(Eyes(world), parse(text, lexicon_of(world.catalogue)), start, yaw)
+    return carry_out(Lookout(world), parse(text, lexicon_of(world.catalogue)), start, yaw)
 
 
-def carry_out(eyes: Eyes, instruction: RouteInstruction, start: int, yaw: float) -> Heard:
+def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: float) -> Heard:
     """The cheapest walk that fits the clauses, found by uniform-cost search."""
     clauses = runnable(instruction.clauses)
     tie = itertools.count()
@@ -129,7 +129,7 @@ def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
     return tuple(kept)
 
 
-def _onward(eyes: Eyes, clause: Clause, walk: _Walk) -> Iterator[tuple[float, _Walk]]:
+def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float, _Walk]]:
     """All ways to go on, with what they cost: finish this clause, or take a step within it."""
     path, steps, pending = walk.path, walk.steps, walk.pending
     if isinstance(clause, Turn):
@@ -176,7 +176,7 @@ def turn_cost(turned: float, wanted: float, *, asked: bool) -> float:
     return min(max(off - free, 0.0) / scale, 2.5) ** 2
 
 
-def walk_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
+def walk_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly a stretch of walk (its start included) fits one clause."""
     first, last = eyes.at(path[0]), eyes.at(path[-1])
     crossings = [_way(eyes.at(a), b).leaves for a, b in itertools.pairwise(path)]
@@ -201,7 +201,7 @@ def walk_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
     return 0.0
 
 
-def count_cost(clause: Clause, eyes: Eyes, path: Sequence[int]) -> float:
+def count_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly the doorway of the last step fits 'the second door on your left'; `path` begins before the clause."""
     if not isinstance(clause, Enter) or not clause.nth:
         return 0.0
@@ -215,7 +215,7 @@ def near_cost(seen: Seen, thing: Referent) -> float:
     return MISSING if found is None else min(1.3 * max(found.distance - NEAR, 0.0) + 0.15 * found.distance, MISSING)
 
 
-def past_cost(clause: Past, eyes: Eyes, path: Sequence[int]) -> float:
+def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly a stretch passes a thing: it should come near, on the right side."""
     best = MISSING
     for a, b in itertools.pairwise(path):
@@ -252,8 +252,8 @@ def cost(world: SeenPlace, instruction: RouteInstruction, path: Sequence[int], y
     return carry_out(eyes, RouteInstruction(clauses), path[0], yaw).cost if len(path) > 1 else 0.0
 
 
-class _Led(Eyes):
-    """Eyes of somebody who is led along a path: the only way on is the path's own."""
+class _Led(Lookout):
+    """Lookout of somebody who is led along a path: the only way on is the path's own."""
 
     def __init__(self, world: SeenPlace, path: Sequence[int]) -> None:
         super().__init__(world)

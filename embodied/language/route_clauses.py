@@ -33,7 +33,7 @@ from embodied.language.clauses import (
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import BESIDE, NEAR
-from embodied.language.seen import Eyes, Seen, SeenThing, doorway
+from embodied.language.seen import Lookout, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
 from embodied.language.templates import ORDINALS
 
@@ -106,7 +106,7 @@ class _Telling:
     """A speaker who is finding words for a route."""
 
     world: SeenPlace
-    eyes: Eyes
+    eyes: Lookout
     lexicon: Lexicon
     speaker: Speaker
     rng: np.random.Generator
@@ -125,7 +125,7 @@ def plan(
     world: SeenPlace, path: Sequence[int], yaw: float, speaker: Speaker, *, rng: np.random.Generator
 ) -> list[Phrase]:
     """Clauses for `path`, with the nouns that the speaker chooses."""
-    telling = _Telling(world=world, eyes=Eyes(world), lexicon=lexicon_of(world.catalogue), speaker=speaker, rng=rng)
+    telling = _Telling(world=world, eyes=Lookout(world), lexicon=lexicon_of(world.catalogue), speaker=speaker, rng=rng)
     phrases: list[Phrase] = []
     legs = legs_of(world, path, yaw)
     for n, leg in enumerate(legs):
@@ -210,7 +210,7 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
     return [*phrases, Phrase(Enter(there))]
 
 
-def _counted(eyes: Eyes, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
+def _counted(eyes: Lookout, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
     """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
     found = doorway(eyes, walked)
     if found is None or found[2] < 2 or found[1] >= len(ORDINALS) or not isinstance(crossing[-1].clause, Enter):

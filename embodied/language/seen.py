@@ -77,7 +77,7 @@ class Seen:
         return min(fitting, key=lambda s: (s.distance, s.placement)) if fitting else None
 
 
-class Eyes:
+class Lookout:
     """Looks around in a world, remembering every look. The only way a listener learns of the world."""
 
     def __init__(self, world: SeenPlace) -> None:
@@ -142,7 +142,7 @@ def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:
     return found
 
 
-def doorway(eyes: Eyes, path: Sequence[int]) -> tuple[str, int, int] | None:
+def doorway(eyes: Lookout, path: Sequence[int]) -> tuple[str, int, int] | None:
     """Which doorway the last step of `path` goes through: (side, its number on that side, doors on that side).
 
     Counted along the way, from where the path came into the room that it leaves; None where nobody would count.

@@ -12,7 +12,7 @@ from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
 from embodied.language.plain import PlainLanguage
 from embodied.language.route_clauses import plan, shortened
-from embodied.language.seen import Eyes
+from embodied.language.seen import Lookout
 from embodied.language.speakers import draw_speaker
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
@@ -51,7 +51,7 @@ class People:
             text = say(phrases, speaker, rng=rng)
             if self.tries == 1:
                 return text
-            heard = carry_out(Eyes(world), parse(text, lexicon), path[0], yaw)
+            heard = carry_out(Lookout(world), parse(text, lexicon), path[0], yaw)
             missed = float(world.graph.distance[heard.path[-1], path[-1]])
             if missed <= ARRIVED:
                 return text

@@ -123,7 +123,7 @@ def scene_of(corners: np.ndarray) -> RayScene:
     params["faces"] = np.arange(3 * m, dtype=np.uint32)
     params.update()
     scene = mi.load_dict({"type": "scene", "triangles": mesh})
-    return scalar.Scene(scene, mi) if device() == "scalar" else scene
+    return scalar.ScalarScene(scene, mi) if device() == "scalar" else scene
 
 
 def vector(a: np.ndarray) -> Array:

@@ -50,7 +50,7 @@ class Lights:
     lamp: Array
     """(k,) bool: a bare bulb; any lamp."""
     spaces: tuple[Space, ...]
-    """Worlds to ask for shadows: the house, and for each bare bulb's lamp the house without it."""
+    """Scenes to ask for shadows: the house, and for each bare bulb's lamp the house without it."""
     space_of_light: RayScene
     portal_scene: RayScene | None
     towards_sun: np.ndarray

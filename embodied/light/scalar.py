@@ -234,7 +234,7 @@ class Found:
         return self.t < inf
 
 
-class Scene:
+class ScalarScene:
     """A scene of Mitsuba's scalar variant that is asked about arrays of rays."""
 
     def __init__(self, scene: RayScene, variant: types.ModuleType) -> None:

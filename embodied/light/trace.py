@@ -22,7 +22,7 @@ from embodied.scene.lit_pages import LitPages
 
 
 @dataclass(frozen=True, eq=False)
-class World:
+class BakedScene:
     """Device arrays; m faces in mesh order."""
 
     space: Space
@@ -123,7 +123,7 @@ def _pages_of(bake: Bake, own: int, sun: np.ndarray) -> _Pages:
     return _Pages(*(np.concatenate(c) for c in zip(*columns)), sizes=np.array(sizes), luxels=np.array(luxels))  # type: ignore[misc]
 
 
-def world_of(bake: Bake, house: House) -> World:
+def world_of(bake: Bake, house: House) -> BakedScene:
     """Upload a bake."""
     mi = mitsuba()
     u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
@@ -162,7 +162,7 @@ def world_of(bake: Bake, house: House) -> World:
     surfaces = Surfaces(flat(pages.coarse_albedo), flat(dark if sampled else pages.coarse_glow), flat(dark))
     without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
     lights = lights_of(space, without, portals_of(house), _lamps(bake), sun)
-    return World(
+    return BakedScene(
         space,
         surfaces,
         lights,
@@ -263,7 +263,7 @@ class Hit:
     """A sheet, lit from both its sides."""
 
 
-def look(world: World, ray: Ray, active: Array = True) -> Hit:
+def look(world: BakedScene, ray: Ray, active: Array = True) -> Hit:
     """Bilinear lookup of the pages where rays hit."""
     mi, dr = mitsuba(), drjit()
     h = world.space.scene.ray_intersect_preliminary(ray, False, active)

@@ -111,7 +111,7 @@ def count_hops(next_hop: np.ndarray) -> np.ndarray:
     raise ValueError("next_hop does not lead everywhere in n steps; rebuild the graph")
 
 
-def build_graph(house: House, catalogue: object | None = None, spacing: float = 2.25) -> NavGraph:
+def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
     """The house's viewpoints, about `spacing` metres apart, joined where one walks straight.
 
     A node or an edge keeps the agent's radius from walls, leaves and everything that stands between

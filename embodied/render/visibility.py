@@ -28,7 +28,7 @@ Sector = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Portal:
+class Passage:
     """An opening as seen from inside the room `leaves`."""
 
     opening: str
@@ -45,19 +45,19 @@ class Portal:
 class Portals:
     """The openings of a house by the room that one looks out of; OUTDOORS is a room too."""
 
-    of_room: Mapping[str, tuple[Portal, ...]]
+    of_room: Mapping[str, tuple[Passage, ...]]
     stairs: Mapping[str, tuple[str, ...]]
     """Rooms joined to a room by a staircase: seen together with it."""
 
 
 def portals_of(house: House) -> Portals:
     """All openings of `house`, each once per side."""
-    of_room: dict[str, list[Portal]] = {name: [] for name in (*(r.id for r in house.rooms), OUTDOORS)}
+    of_room: dict[str, list[Passage]] = {name: [] for name in (*(r.id for r in house.rooms), OUTDOORS)}
     for o in house.openings:
         a, b, out = np.array(o.a), np.array(o.b), -inward(house, o)
         first, second = o.rooms[0], o.rooms[1] or OUTDOORS
-        of_room[first].append(Portal(o.id, first, second, a, b, out))
-        of_room[second].append(Portal(o.id, second, first, a, b, -out))
+        of_room[first].append(Passage(o.id, first, second, a, b, out))
+        of_room[second].append(Passage(o.id, second, first, a, b, -out))
     stairs: dict[str, list[str]] = {r.id: [] for r in house.rooms}
     for s in house.stairs:
         stairs[s.rooms[0]].append(s.rooms[1])
@@ -99,7 +99,7 @@ def _look(
     return all(_look(portals, eye, other, FULL, path, seen) for other in portals.stairs.get(room, ()))
 
 
-def _through(eye: np.ndarray, portal: Portal, sector: Sector) -> list[Sector]:
+def _through(eye: np.ndarray, portal: Passage, sector: Sector) -> list[Sector]:
     """The parts of `sector` that go out through `portal`."""
     to_a, to_b = portal.a - eye, portal.b - eye
     away = float(to_a @ portal.normal)
