@@ -223,6 +223,7 @@ def listed_arrows() -> dict[str, set[str]]:
     return {room.strip(): set(there.split()) for room, _, there in rows}
 
 
+@pytest.mark.slow
 def test_rooms_import_what_the_list_says_and_nothing_else():
     found, listed = found_arrows(), listed_arrows()
     rooms = set(found) - GROUND - set(PACKAGES)
@@ -232,6 +233,7 @@ def test_rooms_import_what_the_list_says_and_nothing_else():
     assert not new and not gone, f"not in the list: {sorted(new)}; no longer needed: {sorted(gone)}"
 
 
+@pytest.mark.slow
 def test_there_is_no_circle_not_even_of_types():
     order = list(graphlib.TopologicalSorter(found_arrows()).static_order())
     assert order.index("embodied.house") < order.index("embodied.generate") < order.index("embodied.world")

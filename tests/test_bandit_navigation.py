@@ -120,6 +120,7 @@ def test_the_shortest_walk_gets_the_best_score(split):
         assert score_of(away, graph, "nDTW") == pytest.approx(math.exp(-far / (3 * len(path))))
 
 
+@pytest.mark.slow
 def test_stars_alone_teach_to_walk(split, tmp_path):
     config = dataclasses.replace(STARS, updates=40, batch=16, learning_rate=3e-3, critic_updates=3)
     found = learn_from_stars(
@@ -177,6 +178,7 @@ def test_settings_are_checked():
     assert navigation.StateCritic(4)(torch.zeros(3, 2, 4)).shape == (3, 2)
 
 
+@pytest.mark.slow
 def test_a_study_learns_judges_and_writes_once(split, tmp_path):
     agent = agent_for(split)
     save_agent(agent, tmp_path / "agent.safetensors")

@@ -236,6 +236,7 @@ KINDS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_a_damaged_file_is_refused_in_a_line_or_harmless(name, kinds):
     kind = kinds[name]

@@ -153,6 +153,7 @@ def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monk
         refuse_too_many(1000, space)
 
 
+@pytest.mark.slow
 def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
     with pytest.raises(ValueError, match=r"pictures of 0 of its \d+ houses.*--panoramas fast"):

@@ -166,6 +166,7 @@ SKIES = st.builds(
 )
 
 
+@pytest.mark.slow
 @hypothesis.settings(derandomize=True, deadline=None)
 @hypothesis.given(
     rugs=st.lists(RUGS, max_size=3, unique_by=lambda p: p.id),

@@ -426,6 +426,7 @@ def star(corners: int) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], 1) * np.random.default_rng(0).uniform(0.3, 1.0, (corners, 1))
 
 
+@pytest.mark.slow
 def test_a_polygon_of_ten_thousand_corners_is_filled_quickly_and_exactly():
     points = star(10_000)
     text = "\n".join([*(f"v {x:.12f} 0 {-y:.12f}" for x, y in points), "f " + " ".join(map(str, range(1, 10_001)))])

@@ -13,6 +13,7 @@ from embodied.interface import Episode, Route, Task
 from embodied.records import from_json, save_lines
 
 
+@pytest.mark.slow
 def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
     data = build(tmp_path / "d", tmp_path / "c")
     episodes = play(data.split("val_unseen").make_env, agent("hanna", "ask every 5"), data.tasks("val_unseen"), seed=0)

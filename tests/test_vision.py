@@ -344,6 +344,7 @@ raise SystemExit(cli.main(["doctor"]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["encoder.safetensors", "checkpoint.pt"])
 def test_a_full_disk_is_one_line_that_names_the_file_of_weights(name, tmp_path):
     done = subprocess.run(
