@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pyarrow.parquet as pq
+import pytest
 from hand_data import build
 
 from embodied.datasets.parquet import SCHEMAS, export_parquet, size_category
