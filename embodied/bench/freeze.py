@@ -24,7 +24,7 @@ AREAS = ((38.0, 46.0), (56.0, 70.0), (90.0, 200.0), (150.0, 420.0))
 HOUSES_OF_A_BAND = 10
 FLAT = HouseConfig(area=(38.0, 46.0))
 """What is lit."""
-CODE = ("code", "version", "commit", "digest", "libraries", "seconds", "cache", "data", "folder")
+CODE = ("code", "program", "version", "commit", "digest", "libraries", "seconds", "cache", "data", "folder")
 """Fields of JSON files that name the program or the place rather than the product."""
 
 
