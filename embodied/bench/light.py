@@ -6,7 +6,7 @@ import ctypes.util
 import functools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ from embodied import gl
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
-from embodied.light.baking import Bake, bake
+from embodied.light.baking import Bake, bake, forget
 from embodied.light.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
@@ -38,7 +38,9 @@ RAYS = 64
 """Per pixel of the path-traced ways."""
 AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
-DRAWN = ("unlit", "normal", *(("filament",) if ctypes.util.find_library("vulkan") else ()))
+BAKES = ("fast", "normal")
+"""Light qualities that are compared; what is traced reads the last one."""
+DRAWN = ("unlit", *BAKES, *(("filament",) if ctypes.util.find_library("vulkan") else ()))
 WAYS = (*DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
@@ -56,6 +58,8 @@ class Shot:
     ms: float
     plain: np.ndarray | None = None
     """(h, w) bool, what is neither mirror nor metal; with way 'diffuse' only."""
+    processor: float = 0.0
+    """Seconds of all cores that tracing it took."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ def compare(
       seed: of the first house; the others have the next ones, each at another time of day.
     """
     shots: list[Shot] = []
-    bakes: list[Bake] = []
+    bakes: list[dict[str, Bake]] = []
     kinds: list[str] = []
     for k in range(HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
@@ -83,7 +87,9 @@ def compare(
         progress(
             f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
         )
-        bakes.append(bake(house, catalogue, cache, "normal"))
+        for quality in BAKES:
+            forget(cache, house, catalogue, quality)
+        bakes.append({quality: bake(house, catalogue, cache, quality) for quality in BAKES})
         chosen = viewpoints(house, catalogue, VIEWS, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
         shots += draw(house, catalogue, bakes[-1], chosen, SIZE, RAYS)
@@ -124,7 +130,7 @@ def viewpoints(
 def draw(
     house: House,
     catalogue: Catalogue,
-    baked: Bake,
+    baked: Mapping[str, Bake],
     views: Sequence[tuple[str, np.ndarray, float]],
     size: tuple[int, int],
     rays: int,
@@ -133,26 +139,27 @@ def draw(
     shots = []
     for way in WAYS:
         if way in DRAWN:
-            lit = None if way == "unlit" else baked.lit
-            painter = Painter(house, catalogue, baked.lit) if way == "filament" else None
+            lit = None if way == "unlit" else baked.get(way, baked[BAKES[-1]]).lit
+            painter = Painter(house, catalogue, baked[BAKES[-1]].lit) if way == "filament" else None
             with Renderer(house, catalogue, lit=lit, painter=painter) as r:
                 for room, eye, yaw in views:
                     rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
                     ms = _median_ms(functools.partial(r.rgb, camera_at(eye, yaw), (256, 256)))
                     shots.append(Shot(room, house.sky.hour, way, rgb, ms))
         else:
-            tracer = Tracer(baked, house, quality=way, rays=16 if way == "glossy" else rays)
+            tracer = Tracer(baked[BAKES[-1]], house, quality=way, rays=16 if way == "glossy" else rays)
             for room, eye, yaw in views:
                 camera = camera_at(eye, yaw, -0.1, VFOV)
-                start = time.perf_counter()
+                start, used = time.perf_counter(), time.process_time()
                 rgb, _, _ = tracer.picture(eye, camera.forward, camera.up, VFOV, size)
                 ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (size[0] * size[1])
+                used = time.process_time() - used
                 plain = tracer.plain(eye, camera.forward, camera.up, VFOV, size) if way == "diffuse" else None
-                shots.append(Shot(room, house.sky.hour, way, rgb, ms, plain))
+                shots.append(Shot(room, house.sky.hour, way, rgb, ms, plain, used))
     return shots
 
 
-def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
+def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
     """Medians over all views per way, and what the bakes cost.
 
     Against the diffuse reference only diffuse surfaces count: a page cannot follow the eye as mirrors
@@ -171,12 +178,14 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
             row[f"psnr_{name}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
             row[f"ssim_{name}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
         rows.append(row)
+    bakes = [b[BAKES[-1]] for b in baked]
     pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
     return {
         "rows": rows,
         "views": [list(v) for v in views],
         "device": device(),
         "renderer": str(gl.info()),
+        "processor": costs(shots, baked),
         "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),
         "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
         "disk_mb": float(np.median(pages)),
@@ -184,6 +193,18 @@ def measure(shots: Sequence[Shot], bakes: Sequence[Bake]) -> dict:
         "shiny": float(np.mean([1 - p.mean() for v in views if (p := by[*v, "diffuse"].plain) is not None])),
         "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
     }
+
+
+def costs(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict[str, float]:
+    """Median processor seconds: of a bake per quality, its furniture imported and unwrapped, and of path tracing one
+    view of the reference, by the name of the way."""
+    lit = {q: [_without_unwrapping(b[q].manifest) for b in baked] for q in BAKES}
+    lit["reference"] = [s.processor for s in shots if s.way == "reference"]
+    return {name: round(float(np.median(seconds)), 1) for name, seconds in lit.items()}
+
+
+def _without_unwrapping(manifest: dict) -> float:
+    return sum(v for k, v in manifest["seconds"].items() if k != "unwrap")
 
 
 def table(facts: dict) -> str:
@@ -200,6 +221,12 @@ def table(facts: dict) -> str:
             for t in ("reference", "diffuse", "diffuse_all")
         ]
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
+    spent, last = facts["processor"], facts["processor"][BAKES[-1]]
+    lines.append(
+        "\nProcessor time of a flat's light, furniture unwrapped: "
+        + ", ".join(f"{q} {spent[q]:.0f} s ({spent[q] / last:.2f})" for q in BAKES)
+        + f"; of one view of {SIZE[1]} × {SIZE[0]} by the path tracer: {spent['reference']:.0f} s."
+    )
     lines.append(
         f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or "
         f"metal; {facts['renderer']}. "

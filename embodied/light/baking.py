@@ -197,9 +197,9 @@ def bake_all(
     settings = settings_of(settings) if isinstance(settings, str) else settings
     if len({_unlit(h).digest for h in lightings}) > 1:
         raise ValueError("bake_all lights one house at several hours; what came differs in more than sky and lamps")
-    name, shared, out = _name(settings), None, []
+    shared, out = None, []
     for house in lightings:
-        folder = Path(cache) / "light" / f"{name}-{key_of(house, catalogue, settings)}"
+        folder = _folder(cache, house, catalogue, settings)
         done = _open(folder, house)
         if done is None:
             folder.mkdir(parents=True, exist_ok=True)
@@ -215,11 +215,6 @@ def bake_all(
 def _unlit(house: House) -> House:
     lights = tuple(dataclasses.replace(x, on=True) for x in house.lights)
     return dataclasses.replace(house, sky=Sky(), lights=lights)
-
-
-def _name(settings: Settings) -> str:
-    """The quality of settings, to be seen in the names of folders."""
-    return next((name for name, known in QUALITIES.items() if known == settings), "custom")
 
 
 def lightings_of(house: House, count: int) -> tuple[House, ...]:
@@ -382,7 +377,7 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
             _write_page(folder, i, one, settings.jpeg)
     clock("pages")
     outer, outer_pages, dome = surroundings(
-        house, shared.outer, s.atlas, s.outdoors, s.exposure, shared.cache, shared.maps
+        house, shared.outer, s.atlas, s.outdoors, s.exposure, shared.cache, shared.maps, settings.sharpness
     )
     first = len(s.atlas.pages)
     for i, picture in enumerate([*outer_pages, dome], first):
@@ -605,6 +600,13 @@ def _read_picture(path: Path) -> np.ndarray:
     return np.ascontiguousarray(image[..., ::-1])
 
 
-def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings) -> None:
+def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:
     """Delete the bake of `house`, finished or not."""
-    shutil.rmtree(Path(cache) / "light" / key_of(house, catalogue, settings), ignore_errors=True)
+    shutil.rmtree(_folder(cache, house, catalogue, settings), ignore_errors=True)
+
+
+def _folder(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> Path:
+    """Where the bake of `house` is, or will be; its name begins with the quality's."""
+    settings = settings_of(settings) if isinstance(settings, str) else settings
+    name = next((name for name, known in QUALITIES.items() if known == settings), "custom")
+    return Path(cache) / "light" / f"{name}-{key_of(house, catalogue, settings)}"

@@ -32,13 +32,21 @@ LUXELS = 110_000
 
 
 def surroundings(
-    house: House, parts: Sequence, indoors: Atlas, outdoors: Outdoors, exposure: Exposure, cache: Path, maps: ColourMaps
+    house: House,
+    parts: Sequence,
+    indoors: Atlas,
+    outdoors: Outdoors,
+    exposure: Exposure,
+    cache: Path,
+    maps: ColourMaps,
+    sharpness: float = 1.0,
 ) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
     """Outer parts in the light of sun and sky, and the picture on the dome.
 
     Args:
       parts: the house's parts of kind 'outdoor'.
       indoors: casts shadows.
+      sharpness: as in `Settings`.
 
     Returns:
       The atlas of the outer parts (None if there are none), their pages, and the dome's page; (h, w, 3) uint8 each.
@@ -51,7 +59,7 @@ def surroundings(
         float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
         for c in (p.mesh.vertices[p.mesh.faces] for p in parts)
     )
-    density = float(min(14.0, np.sqrt(LUXELS / max(area, 1.0))))
+    density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
     atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=1500, cache=cache, finest=2))
     blockers = scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass]))
     pages = []
