@@ -136,7 +136,8 @@ def draw_floors(axes: Axes) -> None:
         axes,
         35.6,
         "Folders, and what may import what",
-        "a room imports from rooms above it and left of it, never the other way",
+        "a module imports from above it in its column and from columns left of it; "
+        "of place, play knows house, navigation, scene only",
     )
     columns = {"ground": (14.5, 10.0), "place": (35.0, 23.0), "play": (62.0, 23.0), "use": (87.5, 20.0)}
     titles = {"ground": "embodied: ground", "place": "place: from seed to pixels", "play": "play", "use": "use"}
