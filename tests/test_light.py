@@ -1,4 +1,4 @@
-"""Light: closed forms of energy, agreement with the path tracer, and what happens when a bake goes wrong."""
+"""Light: closed forms of energy, sites and what lies between them, the sky, exposure, and machines without LLVM."""
 
 from __future__ import annotations
 
@@ -7,52 +7,32 @@ import itertools
 import os
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import two_rooms
-from handmade import HandCatalogue, box_mesh, furnished
+from hand_light import TINY
+from handmade import box_mesh
 
-from assets.records import Finish, MeshPart
+from assets.records import Finish
 from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
-from embodied.house.shapes import inward
-from embodied.light import (
-    LightError,
-    StaleBake,
-    bake,
-    bake_all,
-    baking,
-    check,
-    compose,
-    cover,
-    lightings_of,
-    open_bake,
-    radiosity,
-    scalar,
-    settings_of,
-    solve,
-)
-from embodied.light.atlas import Page, Thing, atlas_of, coarsened, things_of
+from embodied.light import LightError, check, compose, radiosity, scalar, settings_of, solve
+from embodied.light.atlas import atlas_of, things_of
 from embodied.light.backend import array, drjit, find_llvm, mitsuba, variant_of
 from embodied.light.colours import ColourMaps
 from embodied.light.cover import rasterise
 from embodied.light.denoise import cap_sparks, neighbours, smooth_sites
 from embodied.light.emitters import lamps_of, portals_of
-from embodied.light.memory import Memory
-from embodied.light.settings import Settings
 from embodied.light.sites import Spread, around_good, sites_of
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
-from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
 from embodied.scene.part import Part
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
-TINY = Settings(
-    12.0, 400.0, every=1.5, sky_rays=12, lamp_rays=12, sun_rays=4, patches=16, bounces=(4, 4, 4, 8, 48), jpeg=90
-)
 DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))
 SRGB_HALF = 0.7353569831
 """sRGB value of linear 0.5."""
@@ -112,51 +92,6 @@ def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     assert e == pytest.approx(np.full(3, 4 * quarter), rel=0.02)
 
 
-def test_unwrapping_keeps_every_face_and_its_proportions():
-    mesh = box_mesh((0, 0, 0), (0.5, 0.4, 0.8), (0.9, 0.1, 0.1, 1.0))
-    for flat, uneven in ((unwrap_planes([mesh], 40.0), 1e-3), (unwrap_model([mesh], 3000.0), 0.2)):
-        assert len(flat.corners) == 12 and not flat.thin.any()
-        on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
-        assert np.ptp(on_page / areas_of(flat.corners)) / np.mean(on_page / areas_of(flat.corners)) < uneven
-        assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
-
-
-def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():
-    mesh = box_mesh((0, 0, 0), (1, 1, 1), (0.5, 0.5, 0.5, 1.0))
-    inside_out = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1])
-    from embodied.light.unwrap import face_normals
-
-    flat = unwrap_model([inside_out], 1000.0)
-    outward = flat.corners.mean(1) - 0.5
-    assert ((face_normals(flat.corners) * outward).sum(1) > 0).all()
-    sheet = dataclasses.replace(mesh, faces=mesh.faces[:2])
-    assert unwrap_model([sheet], 1000.0).thin.all()
-
-
-def test_sheets_listed_once_per_side_are_unwrapped_once():
-    mesh = box_mesh((0, 0, 0), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5, 1.0))
-    doubled = dataclasses.replace(mesh, faces=np.concatenate([mesh.faces, mesh.faces[:, ::-1]]))
-    flat = unwrap_model([doubled], 1000.0)
-    assert len(flat.corners) == 12 and not flat.thin.any()
-    from embodied.light.unwrap import face_normals
-
-    assert (
-        (face_normals(flat.corners) * (flat.corners.mean(1) - 0.2)).sum(1)[
-            np.abs(flat.corners.mean(1)[:, 2] - 0.2) < 0.19
-        ]
-        > 0
-    ).all()
-
-
-def test_packed_rectangles_do_not_overlap():
-    sizes = np.random.default_rng(3).integers(2, 40, (60, 2))
-    places, sheet = pack(sizes)
-    taken = np.zeros(sheet[::-1], int)
-    for (x, y), (w, h) in zip(places, sizes):
-        taken[y : y + h, x : x + w] += 1
-    assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
-
-
 def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_farther_in():
     """A row of which the left six luxels are seen and bright, and the rest lie below a bed that lets a tenth in."""
     good = np.arange(24) < 6
@@ -166,27 +101,6 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(
         0.1
     )  # never brighter than beside it
-
-
-def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
-    def some(name, fineness, side):
-        flat = SimpleNamespace(size=np.array([side, side]))
-        return Thing(name, "room", "object", flat, (), fineness, False)
-
-    things = [
-        some("floor", 5, 10),
-        some("small floor", 5, 5),
-        some("rug", 4, 10),
-        some("mirror", 8, 4),
-        some("wall", 2, 20),
-    ]
-    total = lambda ts: sum(int(t.flat.size.prod()) * t.fineness**2 for t in ts)
-    fineness = lambda most: [t.fineness for t in coarsened(things, most)]
-    assert fineness(total(things)) == [5, 5, 4, 8, 2]
-    assert fineness(total(things) - 1) == [4, 5, 4, 8, 2]
-    assert fineness(total(things) - 901) == [4, 4, 4, 8, 2]
-    assert fineness(0) == [3, 3, 3, 8, 2]
-    assert total(coarsened(things, total(things) - 500)) <= total(things) - 500
 
 
 def test_neighbours_are_looked_for_on_the_same_layer():
@@ -276,40 +190,6 @@ def test_pixels_left_out_do_not_count_in_the_bench():
     assert psnr(a, b) < 10 and ssim(a, b, np.arange(60)[None].repeat(40, 0) < 30) > 0.98 > ssim(a, b)
 
 
-def ring(side: float, width: float) -> MeshPart:
-    """The upper edges of skirting around a square room: four strips in one plane, mitred at the corners."""
-    outer = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
-    inner = side / 2 + (outer - side / 2) * (1 - 2 * width / side)
-    vertices = np.concatenate([np.pad(np.concatenate([outer, inner]), ((0, 0), (0, 1)))]).astype(np.float32)
-    faces = np.array(
-        [f for k in range(4) for f in ((k, (k + 1) % 4, 4 + k), ((k + 1) % 4, 4 + (k + 1) % 4, 4 + k))], np.int32
-    )
-    return MeshPart(vertices, faces, np.tile(np.float32([0, 0, 1]), (8, 1)), np.zeros((8, 2), np.float32), Finish())
-
-
-def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor():
-    flat = unwrap_planes([ring(4.0, 0.05)], 40.0)
-    assert np.prod(flat.size) < 0.15 * (4.0 * 40.0) ** 2
-    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
-    assert on_page == pytest.approx(areas_of(flat.corners) * 40.0**2, rel=1e-3)
-
-
-def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
-    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between
-    charts. Overlapping charts would cover less than their area."""
-    laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
-    flat = unwrap_model(laths, 6000.0)
-    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()
-    assert on_page > 0.43 * np.prod(flat.size)
-    assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
-    monkeypatch.setattr(cover, "OFFSETS", ())
-    width, height = (int(x) for x in flat.size)
-    page = Page(
-        width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part
-    )
-    assert len(rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
-
-
 def test_the_sun_rises_in_the_east_stands_south_at_noon_and_is_below_at_midnight():
     north = np.pi / 2
     morning, noon = sun_direction(Sky(8.0, "clear", north)), sun_direction(Sky(12.0, "clear", north))
@@ -387,45 +267,13 @@ def test_arrays_without_llvm_mean_the_same():
 def test_houses_are_lit_without_llvm():
     """The closed forms hold in Mitsuba's scalar variant, too, and a whole bake agrees with its path tracer."""
     names = ("in_a_furnace", "a_closed_box", "sky_through", "inside_out", "a_bake_agrees")
-    run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__, "-k", " or ".join(names)]
+    files = [str(Path(__file__).with_name(f"test_{name}.py")) for name in ("light", "unwrap", "baking")]
+    run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files, "-k", " or ".join(names)]
     done = subprocess.run(
         run, check=False, capture_output=True, text=True, env={**os.environ, "DRJIT_LIBLLVM_PATH": "/none"}
     )
     assert done.returncode == 0, done.stdout[-3000:]
     assert "scalar variant computes the light" in done.stdout and f"{len(names)} passed" in done.stdout
-
-
-@pytest.fixture(scope="module")
-def lit(tmp_path_factory):
-    """The furnished two-room house at dusk and noon light, baked tinily: house, catalogue, cache, bake."""
-    lamps = (
-        Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
-        Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0),
-    )
-    house = dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
-    cache = tmp_path_factory.mktemp("light")
-    return house, HandCatalogue(), cache, bake(house, HandCatalogue(), cache, TINY)
-
-
-@pytest.fixture(scope="module")
-def solved(lit):
-    house, catalogue, cache, _ = lit
-    return baking.solve_house(house, baking.Shared(house, catalogue, cache / "light", TINY), TINY)
-
-
-def test_windows_take_light_from_the_open_sky_on_their_outer_side_only(solved):
-    house, atlas, lux, sites = solved.house, solved.atlas, solved.lux, sites_of(solved.lux, TINY.every)
-    problem = solve.Problem(house, atlas, lux, sites, solved.space, solved.outdoors, solved.lamps, TINY)
-    everywhere = Spread(sites, lux.position, lux.normal, np.ones(len(sites.luxel), bool))
-    e = solve.outer_light(problem, everywhere).mean(1)
-    frames = [f"{o.id}/frame" for o in house.openings if o.kind == "window" and None in o.rooms]
-    assert frames
-    for name in frames:
-        mine = lux.owner == atlas.owners.index(name)
-        into = inward(house, next(o for o in house.openings if name.startswith(f"{o.id}/")))
-        towards = lux.face_normal[:, :2] @ into
-        assert (e[mine & (towards < -0.9)] > 0.1).any()
-        assert not e[mine & (towards > 0.9)].any()
 
 
 def test_grain_is_evened_without_loss_and_not_across_charts():
@@ -441,30 +289,6 @@ def test_grain_is_evened_without_loss_and_not_across_charts():
     assert out[left].max() < 1.5 and out[~left].min() > 4.5
 
 
-def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
-    report = lit[3].manifest["check"]
-    assert report["luxels"] in (check.LUXELS, check.AGAIN) and abs(report["bias"]) < 0.1 and report["beyond"] <= 0.25
-
-
-@pytest.mark.parametrize(
-    "fault", ["all bounces a third too bright", "no bounces", "a third of the luxels dark", "lamps forgotten"]
-)
-def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatch):
-    monkeypatch.setattr(check, "AGAIN", 40)
-    light = solved.light
-    third = (np.arange(len(light.direct)) % 3 > 0)[:, None]
-    broken = {
-        "all bounces a third too bright": dataclasses.replace(light, indirect=light.indirect * 1.33),
-        "no bounces": dataclasses.replace(light, indirect=light.indirect * 0),
-        "a third of the luxels dark": dataclasses.replace(
-            light, direct=light.direct * third, indirect=light.indirect * third
-        ),
-        "lamps forgotten": dataclasses.replace(light, direct=light.direct * 0),
-    }[fault]
-    with pytest.raises(LightError, match="disagrees with the path tracer.*worst at"):
-        check.check(dataclasses.replace(solved, light=broken))
-
-
 def test_the_verdict_counts_luxels_beyond_a_tenth_and_its_noise():
     one, none, where = np.ones(20), np.zeros(20), np.zeros((20, 3))
     off = lambda k, by: np.where(np.arange(20) < k, 1 + by, 1.0)
@@ -473,139 +297,10 @@ def test_the_verdict_counts_luxels_beyond_a_tenth_and_its_noise():
     assert not check.judge(off(9, 0.3), one, one * 0.15, where)[1], "what the tracer itself does not know is no fault"
 
 
-def test_another_look_of_a_material_makes_another_bake(lit):
-    """An edited catalogue must not silently show an old bake; the same content elsewhere on disk may."""
-    house, catalogue, _, baked = lit
-
-    class Repainted(HandCatalogue):
-        def mesh(self, *args):
-            return tuple(
-                dataclasses.replace(m, finish=dataclasses.replace(m.finish, color=(0.1, 0.2, 0.9, 1.0)))
-                for m in super().mesh(*args)
-            )
-
-    assert f"custom-{baking.key_of(house, catalogue, TINY)}" == baked.folder.name
-    assert baking.key_of(house, catalogue, TINY) != baking.key_of(house, Repainted(), TINY)
-    assert f"custom-{baking.key_of(house, HandCatalogue(), TINY)}" == baked.folder.name
-
-
-def test_no_valid_texel_is_black_and_every_owner_has_its_mesh(lit):
-    house, _, _, baked = lit
-    pages = baked.lit
-    assert {p.id for p in house.placements} <= {m.owner for m in pages.meshes}
-    for m in pages.meshes:
-        assert m.uv.min() >= -1e-6 and m.uv.max() <= 1 + 1e-6 and m.faces.max() < len(m.vertices)
-        if any(f"/{k}" in m.owner for k in ("wall_", "floor", "ceiling")):
-            h, w = pages.pages[m.page].shape[:2]
-            centre = m.uv[m.faces].mean(1) * [w, h]
-            x, y = centre.astype(int).clip(0, [w - 1, h - 1]).T
-            assert np.median(pages.pages[m.page][y, x].max(-1)) > 60
-
-
-def test_lighting_again_opens_the_same_bake(lit):
-    house, catalogue, cache, baked = lit
-    before = (baked.folder / "manifest.json").stat().st_mtime_ns
-    again = bake(house, catalogue, cache, TINY)
-    assert again.folder == baked.folder and (again.folder / "manifest.json").stat().st_mtime_ns == before
-
-
-def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, monkeypatch):
-    """Hits of rays, lamps' light and colours are shared; the second lighting must not be a mix of both."""
-    house, catalogue, cache, _ = lit
-    monkeypatch.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
-    lightings = lightings_of(house, 3)
-    assert lightings[0] == house and len({h.digest for h in lightings}) == 3 and lightings == lightings_of(house, 3)
-    shared = bake_all(lightings, catalogue, tmp_path, TINY)
-    assert [b.manifest["house"] for b in shared] == [h.digest for h in lightings]
-    alone = bake(lightings[1], catalogue, cache, TINY)
-    for a, b in zip(shared[1].lit.pages, alone.lit.pages):
-        assert np.abs(a.astype(int) - b).mean() < 0.5
-    with pytest.raises(ValueError, match="one house"):
-        bake_all((house, dataclasses.replace(house, rooms=house.rooms[:1])), catalogue, tmp_path, TINY)
-
-
-def test_rays_remembered_bring_what_they_met(solved):
-    space, lux = solved.space, solved.lux
-    p = solve.subset(lux, np.arange(0, len(lux.position), 50))
-    memory, table = Memory(), lux.albedo.copy()
-    for _ in range(2):
-        for known, asked in zip(
-            radiosity.gather(space, p, table, 8, 3, memory), radiosity.gather(space, p, table, 8, 3)
-        ):
-            np.testing.assert_allclose(known, asked, rtol=1e-4, atol=1e-6)
-        table *= 0.5
-
-
-def test_a_house_edited_after_its_bake_is_refused_by_name(lit):
-    house, _, _, baked = lit
-    edited = dataclasses.replace(house, sky=Sky(20.0))
-    with pytest.raises(StaleBake, match="edited.*embodied light"):
-        open_bake(baked.folder, edited)
-    with pytest.raises(StaleBake, match="no finished bake"):
-        open_bake(baked.folder.parent / "nothing", house)
-
-
-def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path, monkeypatch):
-    house, catalogue, _, baked = lit
-    monkeypatch.setattr(check, "LUXELS", 2)
-
-    def interrupt(*_, **__):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as m:
-        m.setattr(baking, "page_of", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            bake(house, catalogue, tmp_path, TINY)
-    with monkeypatch.context() as m:
-        m.setattr(solve, "direct_light", interrupt)  # must not be needed again
-        m.setattr(solve, "bounce", interrupt)
-        m.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
-        done = bake(house, catalogue, tmp_path, TINY)
-    own = baked.manifest["own_pages"]
-    assert all(np.abs(a.astype(int) - b).max() <= 1 for a, b in zip(done.lit.pages[:own], baked.lit.pages[:own]))
-    (done.folder / "page_000.jpg").write_bytes(b"cut")
-    with pytest.raises(StaleBake, match="damaged"):
-        open_bake(done.folder, house)
-    monkeypatch.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
-    with pytest.warns(RuntimeWarning, match="damaged"):
-        repaired = bake(house, catalogue, tmp_path, TINY)
-    assert open_bake(repaired.folder, house).manifest["files"]["page_000.jpg"][0] > 100
-
-
 def test_an_unknown_quality_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="fast.*high.*normal"):
         settings_of("beautiful")
     assert issubclass(LightError, RuntimeError)
-
-
-def test_probes_know_where_the_window_is(lit):
-    """The living room's window is in its south wall, so a face that looks to -y is brighter than one to +y."""
-    cube = lit[3].probe("living_room_1")
-    assert cube.shape == (6, 3) and cube.min() > 0.05 and cube.max() <= 1.0
-    assert cube[3].mean() > cube[2].mean()
-
-
-def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
-    """28 dB and 6 levels at most between the classic renderer's pages and a path-traced picture of the same walls."""
-    import cv2
-
-    from embodied.light.reference import Tracer
-    from embodied.render.camera import camera_at
-    from embodied.render.classic import Renderer
-
-    house, catalogue, _, baked = lit
-    at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)
-    with Renderer(house, catalogue, lit=baked.lit, size=96) as renderer:
-        view = renderer.view(at, yaw, pitch, vfov, size)
-    camera = camera_at(at, yaw, pitch, vfov)
-    traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(
-        at, camera.forward, camera.up, vfov, size
-    )
-    a, b = (cv2.GaussianBlur(x, (0, 0), 1).astype(float) for x in (view.rgb, traced))
-    psnr = 10 * np.log10(255**2 / np.mean((a - b) ** 2))
-    assert psnr > 28 and abs((a - b).mean()) < 6
-    known = np.isfinite(depth) & (ids == view.ids)
-    assert known.mean() > 0.9 and np.median(np.abs(depth - view.depth)[known]) < 0.01
 
 
 def test_windows_are_portals_that_look_into_their_room():

@@ -20,7 +20,8 @@ from embodied import gl
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
-from embodied.light.baking import Bake, bake, forget
+from embodied.light.baking import bake, forget
+from embodied.light.files import Bake
 from embodied.light.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at

@@ -1,39 +1,44 @@
 """Light a house once: from House to a folder of pages that renderers show and tracers read.
 
 A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the looks of
-all its meshes and materials, the settings and the version. Every stage is a file of its own, so that an interrupted
-bake goes on where it
-stopped; manifest.json is written last and lists every file with its checksum.
+all its meshes and materials, the settings and the version. Its files are `embodied.light.files`'; an interrupted bake
+goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
-import json
 import shutil
 import time
-import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import atomic_path, digest, write_bytes, write_json
+from assets.cache import digest, write_json
 from assets.catalogue import Catalogue
 from assets.records import Finish
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light import tone
 from embodied.light.atlas import Atlas, atlas_of, coarsened, things_of
-from embodied.light.backend import LightError, device, rest, warn
+from embodied.light.backend import rest, warn
 from embodied.light.colours import ColourMaps
-from embodied.light.compose import Composer, Ingredients, Solved, page_of
-from embodied.light.emitters import Lamp, in_the_open, lamps_of
+from embodied.light.compose import Composer, Solved, page_of
+from embodied.light.emitters import in_the_open, lamps_of
+from embodied.light.files import (
+    Bake,
+    facts_of,
+    kept_light,
+    page_files,
+    reopened,
+    same_atlas,
+    write_jpeg,
+    write_lamps,
+    write_meshes,
+    write_page,
+)
 from embodied.light.memory import Memory
 from embodied.light.radiosity import space_of, with_env
 from embodied.light.settings import QUALITIES, VERSION, Settings, settings_of
@@ -41,71 +46,14 @@ from embodied.light.sites import sites_of
 from embodied.light.sky import outdoors as outdoors_of
 from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, with_glow
 from embodied.light.surroundings import dome_mesh, surroundings
-from embodied.light.tone import Exposure, expose
+from embodied.light.tone import expose
 from embodied.light.unwrap import areas_of
-from embodied.scene.house_meshes import house_parts, owners
-from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.house_meshes import house_parts
+from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 from embodied.seeds import stream
 
 Progress = Callable[[str, float], None]
-
-
-class StaleBake(LightError):
-    """A bake that does not belong to the house at hand."""
-
-
-@dataclass(frozen=True, eq=False)
-class Bake:
-    """A lit house on disk."""
-
-    folder: Path
-    manifest: dict
-
-    @functools.cached_property
-    def exposure(self) -> Exposure:
-        e = self.manifest["exposure"]
-        polygons = tuple(tuple(tuple(c) for c in p) for p in e["polygons"])
-        return Exposure(polygons, np.array(e["levels"]), np.array(e["gains"]), np.array(e["outdoors"]))
-
-    @functools.cached_property
-    def lit(self) -> LitPages:
-        """What renderers draw."""
-        pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
-        with np.load(self.folder / "meshes.npz", allow_pickle=False) as z:
-            meshes = tuple(
-                LitMesh(
-                    m["owner"],
-                    m["kind"],
-                    m["room"],
-                    m["page"],
-                    z[f"v{i}"],
-                    z[f"f{i}"],
-                    z[f"t{i}"],
-                    m["alpha"],
-                    m["gloss"],
-                )
-                for i, m in enumerate(self.manifest["meshes"])
-            )
-        return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
-
-    def probe(self, room: str) -> np.ndarray:
-        """(6, 3) float32 light that reaches the middle of a room from +x, -x, +y, -y, +z, -z, as sRGB in [0, 1].
-
-        Multiply a moving thing's sRGB colour by the value of the side a face looks to.
-
-        Raises:
-          KeyError: no such room.
-        """
-        return np.array(self.manifest["probes"][room], np.float32)
-
-    def ingredients(self, page: int) -> Ingredients:
-        """One page before exposure."""
-        with np.load(self.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
-            soft, glow = z["soft"], z["glow"]
-        sun = np.asarray(cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE))
-        shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
-        return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
 
 STAGES = {
@@ -200,7 +148,7 @@ def bake_all(
     shared, out = None, []
     for house in lightings:
         folder = _folder(cache, house, catalogue, settings)
-        done = _open(folder, house)
+        done = reopened(folder, house)
         if done is None:
             folder.mkdir(parents=True, exist_ok=True)
             if shared is None:
@@ -234,61 +182,6 @@ def lightings_of(house: House, count: int) -> tuple[House, ...]:
         sky = dataclasses.replace(house.sky, hour=hour, weather=weather)
         out.append(dataclasses.replace(house, sky=sky, lights=lights))
     return tuple(out)
-
-
-def open_bake(folder: Path, house: House) -> Bake:
-    """Open a finished bake and make sure that it belongs to `house`.
-
-    Raises:
-      StaleBake: absent, unfinished, damaged, of another version, or of a house that was edited since.
-    """
-    folder = Path(folder)
-    try:
-        manifest = json.loads((folder / "manifest.json").read_text())
-        files = dict(manifest["files"])
-    except (OSError, ValueError, KeyError, TypeError) as e:
-        raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
-    if manifest.get("version") != VERSION:
-        raise StaleBake(
-            f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; "
-            "run `embodied light` again"
-        )
-    if manifest.get("house") != house.digest:
-        raise StaleBake(
-            f"{folder} was baked for house {manifest.get('house', '')[:12]}, this house is {house.digest[:12]}: "
-            "it was edited after it was lit; run `embodied light` again"
-        )
-    for name, mark in files.items():
-        if _mark(folder / name) != mark:
-            raise StaleBake(f"{folder / name} is missing or damaged; run `embodied light` again")
-    return Bake(folder, manifest)
-
-
-def _open(folder: Path, house: House) -> Bake | None:
-    if not folder.exists():
-        return None
-    try:
-        return open_bake(folder, house)
-    except StaleBake as e:
-        if (folder / "manifest.json").exists():
-            warn(f"{e}; doing so now")
-        _drop_damaged(folder)
-        return None
-
-
-def _mark(path: Path) -> list[int] | None:
-    """Size and CRC-32 of a file; None where there is none."""
-    return [path.stat().st_size, zlib.crc32(path.read_bytes())] if path.is_file() else None
-
-
-def _drop_damaged(folder: Path) -> None:
-    """Delete the manifest and every file that is not as it says, so that they are made anew."""
-    path = folder / "manifest.json"
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        for name, mark in json.loads(path.read_text())["files"].items():
-            if _mark(folder / name) != mark:
-                (folder / name).unlink(missing_ok=True)
-    path.unlink(missing_ok=True)
 
 
 class Shared:
@@ -342,7 +235,7 @@ def solve_house(
     clock = _Clock({} if took is None else took)
     atlas = shared.atlas
     if folder is not None:
-        _same_atlas(folder, atlas)
+        same_atlas(folder, atlas)
     outdoors = outdoors_of(house)
     clock("outdoors")
     space = with_env(shared.space, outdoors.picture)
@@ -350,7 +243,7 @@ def solve_house(
     lux = with_glow(shared.lux, house, atlas, lamps)
     clock("luxels")
     problem = Problem(house, atlas, lux, shared.sites, space, outdoors, lamps, settings, shared.memory)
-    light = _kept(folder, len(lux.position), lambda: solve(problem, progress, clock))
+    light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))
     clock("direct")
     outside = np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
     exposure = expose(house, _light_of_rooms(house, atlas, lux, light), outside)
@@ -372,16 +265,16 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     composer = Composer(s, settings, shared.maps, shared.memory)
     for i in range(len(s.atlas.pages)):
         progress("pages", i / len(s.atlas.pages))
-        if not all((folder / n).exists() for n in _page_files(i)):
+        if not all((folder / n).exists() for n in page_files(i)):
             one = page_of(i, composer)
-            _write_page(folder, i, one, settings.jpeg)
+            write_page(folder, i, one, settings.jpeg)
     clock("pages")
     outer, outer_pages, dome = surroundings(
         house, shared.outer, s.atlas, s.outdoors, s.exposure, shared.cache, shared.maps, settings.sharpness
     )
     first = len(s.atlas.pages)
     for i, picture in enumerate([*outer_pages, dome], first):
-        _write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
+        write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
     meshes, gloss = _meshes(s.atlas, 0)
     if outer is not None:
         more, more_gloss = _meshes(outer, first)
@@ -389,12 +282,12 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
         gloss += more_gloss
     meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
-    _write_meshes(folder, meshes, gloss)
-    _write_lamps(folder, s.lamps)
+    write_meshes(folder, meshes, gloss)
+    write_lamps(folder, s.lamps)
     clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
-        **_facts_of(s, house, meshes, folder),
+        **facts_of(s, meshes, _probes(s), folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(outer_pages) + 1,
         "seconds": {k: round(v, 2) for k, v in took.items()},
@@ -405,64 +298,6 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
     return Bake(folder, manifest)
-
-
-def _write_meshes(folder: Path, meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> None:
-    with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
-        arrays: dict[str, Any] = {f"g{i}": g for i, g in enumerate(gloss)}
-        for i, m in enumerate(meshes):
-            arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
-        np.savez_compressed(f, **arrays)
-
-
-def _write_lamps(folder: Path, lamps: Sequence[Lamp]) -> None:
-    with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
-        arrays: dict[str, Any] = {
-            f"{k}{i}": np.asarray(getattr(x, k))
-            for i, x in enumerate(lamps)
-            for k in ("points", "normals", "radiance", "area", "weights")
-        }
-        np.savez_compressed(f, **arrays)
-
-
-def _facts_of(s: Solved, house: House, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
-    """What the manifest says of a bake whose files are written, but how it was made."""
-    written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
-    return {
-        "version": VERSION,
-        "key": folder.name,
-        "house": house.digest,
-        "device": device(),
-        "own_pages": len(s.atlas.pages),
-        "owners": list(owners(house)),
-        "luxels": len(s.lux.position),
-        "exposure": {
-            "polygons": s.exposure.polygons,
-            "levels": s.exposure.levels.tolist(),
-            "gains": s.exposure.gains.tolist(),
-            "outdoors": s.exposure.outdoors.tolist(),
-        },
-        "meshes": [
-            {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
-            for m in meshes
-        ],
-        "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
-        "probes": _probes(s),
-        "files": {p.name: _mark(p) for p in written},
-    }
-
-
-def _same_atlas(folder: Path, atlas: Atlas) -> None:
-    """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
-    pages = [
-        digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
-        for p in atlas.pages
-    ]
-    mark, path = digest(pages), folder / "atlas.txt"
-    if not path.exists() or path.read_text() != mark:
-        for old in sorted(folder.iterdir()):
-            old.unlink()
-        write_bytes(path, mark.encode())
 
 
 class _Clock:
@@ -476,25 +311,6 @@ class _Clock:
         now = time.process_time()
         self._took[name] = self._took.get(name, 0.0) + now - self._last
         self._last = now
-
-
-def _kept(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
-    """What `work` returns, from disk if an interrupted run left it there whole."""
-    path = folder / "stage_light.npz" if folder else None
-    names = [f.name for f in dataclasses.fields(Radiosity)]
-    if path is not None and path.exists():
-        try:
-            with np.load(path, allow_pickle=False) as z:
-                known = Radiosity(*(z[name] for name in names))
-            if all(len(getattr(known, name)) == n for name in names):
-                return known
-        except Exception as e:
-            warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
-    made = work()
-    if path is not None:
-        with atomic_path(path) as temporary, open(temporary, "wb") as f:
-            np.savez(f, **{name: getattr(made, name) for name in names})
-    return made
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
@@ -573,31 +389,6 @@ def gloss_of(finish: Finish) -> tuple[int, int, int]:
         return 4, 255, 255
     rough, specular, metal = (min(max(x, 0.0), 1.0) for x in (finish.roughness, finish.specular, finish.metallic))
     return round(255 * rough), round(255 * specular), round(255 * metal)
-
-
-def _page_files(i: int) -> tuple[str, ...]:
-    return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
-
-
-def _write_page(folder: Path, i: int, page: Ingredients, quality: int) -> None:
-    light, sun, shown, picture = _page_files(i)
-    with atomic_path(folder / light) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, soft=page.soft, glow=page.glow)
-    write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
-    _write_jpeg(folder / shown, page.albedo, quality)
-    _write_jpeg(folder / picture, page.picture, quality)
-
-
-def _write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
-    data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    write_bytes(path, data.tobytes())
-
-
-def _read_picture(path: Path) -> np.ndarray:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise StaleBake(f"{path} is missing or damaged; run `embodied light` again")
-    return np.ascontiguousarray(image[..., ::-1])
 
 
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:

@@ -12,7 +12,7 @@ from embodied.house.house import House
 from embodied.light import paths, radiosity
 from embodied.light.arrays import Array, Ray, Triple
 from embodied.light.backend import array, drjit, mitsuba
-from embodied.light.baking import Bake
+from embodied.light.files import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
 from embodied.light.trace import Hit, look, picture_at, through, world_of

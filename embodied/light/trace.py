@@ -11,9 +11,9 @@ from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import drjit, mitsuba, scene_of
-from embodied.light.baking import Bake
 from embodied.light.colours import linear
 from embodied.light.emitters import Lamp, portals_of
+from embodied.light.files import Bake
 from embodied.light.paths import Lights, Surfaces, lights_of
 from embodied.light.radiosity import Space
 from embodied.light.sky import Outdoors, outdoors

@@ -1,0 +1,216 @@
+"""Bakes: agreement with the path tracer, several lightings, and what happens when one goes wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from hand_light import TINY
+from handmade import HandCatalogue, furnished
+
+from embodied.house.house import Light, Sky
+from embodied.house.shapes import inward
+from embodied.light import (
+    LightError,
+    StaleBake,
+    bake,
+    bake_all,
+    baking,
+    check,
+    lightings_of,
+    open_bake,
+    radiosity,
+    solve,
+)
+from embodied.light.memory import Memory
+from embodied.light.sites import Spread, sites_of
+
+pytestmark = [pytest.mark.slow, pytest.mark.gl]
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory):
+    """The furnished two-room house at dusk and noon light, baked tinily: house, catalogue, cache, bake."""
+    lamps = (
+        Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
+        Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0),
+    )
+    house = dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
+    cache = tmp_path_factory.mktemp("light")
+    return house, HandCatalogue(), cache, bake(house, HandCatalogue(), cache, TINY)
+
+
+@pytest.fixture(scope="module")
+def solved(lit):
+    house, catalogue, cache, _ = lit
+    return baking.solve_house(house, baking.Shared(house, catalogue, cache / "light", TINY), TINY)
+
+
+def test_windows_take_light_from_the_open_sky_on_their_outer_side_only(solved):
+    house, atlas, lux, sites = solved.house, solved.atlas, solved.lux, sites_of(solved.lux, TINY.every)
+    problem = solve.Problem(house, atlas, lux, sites, solved.space, solved.outdoors, solved.lamps, TINY)
+    everywhere = Spread(sites, lux.position, lux.normal, np.ones(len(sites.luxel), bool))
+    e = solve.outer_light(problem, everywhere).mean(1)
+    frames = [f"{o.id}/frame" for o in house.openings if o.kind == "window" and None in o.rooms]
+    assert frames
+    for name in frames:
+        mine = lux.owner == atlas.owners.index(name)
+        into = inward(house, next(o for o in house.openings if name.startswith(f"{o.id}/")))
+        towards = lux.face_normal[:, :2] @ into
+        assert (e[mine & (towards < -0.9)] > 0.1).any()
+        assert not e[mine & (towards > 0.9)].any()
+
+
+def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
+    report = lit[3].manifest["check"]
+    assert report["luxels"] in (check.LUXELS, check.AGAIN) and abs(report["bias"]) < 0.1 and report["beyond"] <= 0.25
+
+
+@pytest.mark.parametrize(
+    "fault", ["all bounces a third too bright", "no bounces", "a third of the luxels dark", "lamps forgotten"]
+)
+def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatch):
+    monkeypatch.setattr(check, "AGAIN", 40)
+    light = solved.light
+    third = (np.arange(len(light.direct)) % 3 > 0)[:, None]
+    broken = {
+        "all bounces a third too bright": dataclasses.replace(light, indirect=light.indirect * 1.33),
+        "no bounces": dataclasses.replace(light, indirect=light.indirect * 0),
+        "a third of the luxels dark": dataclasses.replace(
+            light, direct=light.direct * third, indirect=light.indirect * third
+        ),
+        "lamps forgotten": dataclasses.replace(light, direct=light.direct * 0),
+    }[fault]
+    with pytest.raises(LightError, match="disagrees with the path tracer.*worst at"):
+        check.check(dataclasses.replace(solved, light=broken))
+
+
+def test_another_look_of_a_material_makes_another_bake(lit):
+    """An edited catalogue must not silently show an old bake; the same content elsewhere on disk may."""
+    house, catalogue, _, baked = lit
+
+    class Repainted(HandCatalogue):
+        def mesh(self, *args):
+            return tuple(
+                dataclasses.replace(m, finish=dataclasses.replace(m.finish, color=(0.1, 0.2, 0.9, 1.0)))
+                for m in super().mesh(*args)
+            )
+
+    assert f"custom-{baking.key_of(house, catalogue, TINY)}" == baked.folder.name
+    assert baking.key_of(house, catalogue, TINY) != baking.key_of(house, Repainted(), TINY)
+    assert f"custom-{baking.key_of(house, HandCatalogue(), TINY)}" == baked.folder.name
+
+
+def test_no_valid_texel_is_black_and_every_owner_has_its_mesh(lit):
+    house, _, _, baked = lit
+    pages = baked.lit
+    assert {p.id for p in house.placements} <= {m.owner for m in pages.meshes}
+    for m in pages.meshes:
+        assert m.uv.min() >= -1e-6 and m.uv.max() <= 1 + 1e-6 and m.faces.max() < len(m.vertices)
+        if any(f"/{k}" in m.owner for k in ("wall_", "floor", "ceiling")):
+            h, w = pages.pages[m.page].shape[:2]
+            centre = m.uv[m.faces].mean(1) * [w, h]
+            x, y = centre.astype(int).clip(0, [w - 1, h - 1]).T
+            assert np.median(pages.pages[m.page][y, x].max(-1)) > 60
+
+
+def test_lighting_again_opens_the_same_bake(lit):
+    house, catalogue, cache, baked = lit
+    before = (baked.folder / "manifest.json").stat().st_mtime_ns
+    again = bake(house, catalogue, cache, TINY)
+    assert again.folder == baked.folder and (again.folder / "manifest.json").stat().st_mtime_ns == before
+
+
+def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, monkeypatch):
+    """Hits of rays, lamps' light and colours are shared; the second lighting must not be a mix of both."""
+    house, catalogue, cache, _ = lit
+    monkeypatch.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
+    lightings = lightings_of(house, 3)
+    assert lightings[0] == house and len({h.digest for h in lightings}) == 3 and lightings == lightings_of(house, 3)
+    shared = bake_all(lightings, catalogue, tmp_path, TINY)
+    assert [b.manifest["house"] for b in shared] == [h.digest for h in lightings]
+    alone = bake(lightings[1], catalogue, cache, TINY)
+    for a, b in zip(shared[1].lit.pages, alone.lit.pages):
+        assert np.abs(a.astype(int) - b).mean() < 0.5
+    with pytest.raises(ValueError, match="one house"):
+        bake_all((house, dataclasses.replace(house, rooms=house.rooms[:1])), catalogue, tmp_path, TINY)
+
+
+def test_rays_remembered_bring_what_they_met(solved):
+    space, lux = solved.space, solved.lux
+    p = solve.subset(lux, np.arange(0, len(lux.position), 50))
+    memory, table = Memory(), lux.albedo.copy()
+    for _ in range(2):
+        for known, asked in zip(
+            radiosity.gather(space, p, table, 8, 3, memory), radiosity.gather(space, p, table, 8, 3)
+        ):
+            np.testing.assert_allclose(known, asked, rtol=1e-4, atol=1e-6)
+        table *= 0.5
+
+
+def test_a_house_edited_after_its_bake_is_refused_by_name(lit):
+    house, _, _, baked = lit
+    edited = dataclasses.replace(house, sky=Sky(20.0))
+    with pytest.raises(StaleBake, match="edited.*embodied light"):
+        open_bake(baked.folder, edited)
+    with pytest.raises(StaleBake, match="no finished bake"):
+        open_bake(baked.folder.parent / "nothing", house)
+
+
+def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path, monkeypatch):
+    house, catalogue, _, baked = lit
+    monkeypatch.setattr(check, "LUXELS", 2)
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as m:
+        m.setattr(baking, "page_of", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            bake(house, catalogue, tmp_path, TINY)
+    with monkeypatch.context() as m:
+        m.setattr(solve, "direct_light", interrupt)  # must not be needed again
+        m.setattr(solve, "bounce", interrupt)
+        m.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
+        done = bake(house, catalogue, tmp_path, TINY)
+    own = baked.manifest["own_pages"]
+    assert all(np.abs(a.astype(int) - b).max() <= 1 for a, b in zip(done.lit.pages[:own], baked.lit.pages[:own]))
+    (done.folder / "page_000.jpg").write_bytes(b"cut")
+    with pytest.raises(StaleBake, match="damaged"):
+        open_bake(done.folder, house)
+    monkeypatch.setattr(baking, "surroundings", lambda *_: (None, [], np.zeros((4, 8, 3), np.uint8)))
+    with pytest.warns(RuntimeWarning, match="damaged"):
+        repaired = bake(house, catalogue, tmp_path, TINY)
+    assert open_bake(repaired.folder, house).manifest["files"]["page_000.jpg"][0] > 100
+
+
+def test_probes_know_where_the_window_is(lit):
+    """The living room's window is in its south wall, so a face that looks to -y is brighter than one to +y."""
+    cube = lit[3].probe("living_room_1")
+    assert cube.shape == (6, 3) and cube.min() > 0.05 and cube.max() <= 1.0
+    assert cube[3].mean() > cube[2].mean()
+
+
+def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
+    """28 dB and 6 levels at most between the classic renderer's pages and a path-traced picture of the same walls."""
+    import cv2
+
+    from embodied.light.reference import Tracer
+    from embodied.render.camera import camera_at
+    from embodied.render.classic import Renderer
+
+    house, catalogue, _, baked = lit
+    at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)
+    with Renderer(house, catalogue, lit=baked.lit, size=96) as renderer:
+        view = renderer.view(at, yaw, pitch, vfov, size)
+    camera = camera_at(at, yaw, pitch, vfov)
+    traced, depth, ids = Tracer(baked, house, quality="diffuse", rays=64).picture(
+        at, camera.forward, camera.up, vfov, size
+    )
+    a, b = (cv2.GaussianBlur(x, (0, 0), 1).astype(float) for x in (view.rgb, traced))
+    psnr = 10 * np.log10(255**2 / np.mean((a - b) ** 2))
+    assert psnr > 28 and abs((a - b).mean()) < 6
+    known = np.isfinite(depth) & (ids == view.ids)
+    assert known.mean() > 0.9 and np.median(np.abs(depth - view.depth)[known]) < 0.01
