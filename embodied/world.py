@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -48,11 +48,18 @@ class World:
         pictures: PictureSettings = PictureSettings(),
         *,
         file: Path | None = None,
+        may_differ: Collection[str] = (),
     ) -> None:
-        """See `open_world`; `file` is where the panoramas go, or lie, instead of the cache."""
+        """See `open_world`.
+
+        Args:
+          file: where the panoramas go, or lie, instead of the cache.
+          may_differ: fields of `fingerprint` in which panoramas in `file` may differ from those that would be drawn
+            here and now: a data set is read with other drivers ('renderer') and later versions ('code') than drew it.
+        """
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.pictures = pictures
-        self._path = file
+        self._path, self._may_differ = file, frozenset(may_differ)
         self._renderer: Renderer | None = None
         self._tracer: Tracer | None = None
         self._file: PanoramaFile | None = None
@@ -215,10 +222,8 @@ class World:
             except PanoramaFileError as e:
                 log.warning("%s", e)
                 return None
-            if file.meta != self.fingerprint:
-                log.warning(
-                    "%s holds other pictures (%s); drawing again", self.path, differing(file.meta, self.fingerprint)
-                )
+            if others := differing(file.meta, self.fingerprint, self._may_differ):
+                log.warning("%s holds other pictures (%s); drawing again", self.path, others)
                 file.close()
                 return None
             self._file, self._refused = file, False
@@ -276,9 +281,13 @@ def open_folder(
     return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
 
 
-def differing(held: Mapping[str, object], wanted: Mapping[str, object]) -> str:
-    """What differs between what pictures were made of and what they should be made of: 'size 256 instead of 192'."""
-    names = sorted({*held, *wanted}, key=str)
+def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_differ: Collection[str] = ()) -> str:
+    """What differs between what pictures were made of and what they should be made of: 'size 256 instead of 192'.
+
+    Args:
+      may_differ: what is not looked at.
+    """
+    names = sorted({*held, *wanted} - {*may_differ}, key=str)
     facts = [(n, held.get(n), wanted.get(n)) for n in names if held.get(n) != wanted.get(n)]
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 

@@ -21,9 +21,15 @@ def hand_house(seed, name, config, catalogue):
     return dataclasses.replace(world.house, placements=world.house.placements + more), world.graph
 
 
-def build(folder, cache, kind="hanna", workers=1, **options):
-    config = DatasetConfig(kind, "tiny", seed=4, language="plain", **options)
-    build_dataset(config, folder, cache, workers=workers, make_house=hand_house)
+def small_house(seed, name, config, catalogue):
+    """Sixteen nodes and few things: quickly drawn."""
+    world = grid_world(4, name=name)
+    return world.house, world.graph
+
+
+def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_house, **options):
+    config = DatasetConfig(kind, size, seed=4, language="plain", **options)
+    build_dataset(config, folder, cache, workers=workers, make_house=make_house)
     return Dataset(folder)
 
 

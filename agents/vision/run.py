@@ -8,7 +8,8 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 import torch
 
 from agents.device import check_device
-from agents.vision.config import PLAIN, VisionConfig
+from agents.vision.config import PLAIN, VisionConfig, drawing
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips, all_classes, look, mean_log_depth_of_views, visible_in_views
@@ -26,6 +27,7 @@ from agents.vision.strip import view_of_strip
 from agents.vision.training import save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from assets.catalogue import load_catalogue
+from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
 from embodied.interface import VIEWS
 from embodied.locks import locked
@@ -151,16 +153,27 @@ def pictures_of(data: Dataset, name: str, quality: str | None = None) -> Picture
 
 
 def run_features(args: argparse.Namespace, note: Note = print) -> int:
-    """Features of every house of a data set; houses that have them are skipped."""
+    """Features of every house of a data set; houses that have them, from pictures drawn so, are skipped."""
     check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
     wanted = {n: pictures_of(data, n, args.quality) for n in _houses(data, data.splits)}
-    missing = [n for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
-    jobs = (joblib.delayed(_make_features)(data, n, encoder, wanted[n], args) for n in missing)
-    for line in joblib.Parallel(n_jobs=args.workers, return_as="generator_unordered")(jobs):
-        note(line)
-    note(f"{len(missing)} houses made, encoder {encoder.digest[:16]}")
+    missing = [(n, pictures) for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
+
+    def watch(lines: Iterable[str], total: int) -> Iterable[str]:
+        for line in lines:
+            note(line)
+            yield line
+
+    arguments = (args.data.resolve(), encoder, args.cache, args.threads)
+    for_each_unit(_make_features, missing, arguments, workers=args.workers, watch=watch, ray_address=args.ray)
+    note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
     return 0
+
+
+def _ways(pictures: Iterable[PictureSettings]) -> str:
+    """'pictures: 40 fast_256, 2 unlit_192'."""
+    count = Counter(drawing(p) for p in pictures)
+    return "pictures: " + ", ".join(f"{n} {way}" for way, n in sorted(count.items()))
 
 
 def _has_features(data: Dataset, name: str, encoder: Encoder, pictures: PictureSettings) -> bool:
@@ -173,11 +186,11 @@ def _has_features(data: Dataset, name: str, encoder: Encoder, pictures: PictureS
         return False
 
 
-def _make_features(
-    data: Dataset, name: str, encoder: Encoder, pictures: PictureSettings, args: argparse.Namespace
-) -> str:
-    torch.set_num_threads(args.threads)
-    with _drawn_world(data, name, args.cache, pictures) as world:
+def _make_features(unit: tuple[str, PictureSettings], folder: Path, encoder: Encoder, cache: Path, threads: int) -> str:
+    """The features of one house (name, how it is drawn) into the data set's folder; returns what was done."""
+    torch.set_num_threads(threads)
+    (name, pictures), data = unit, Dataset(folder)
+    with _drawn_world(data, name, cache, pictures) as world:
         panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)

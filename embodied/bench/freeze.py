@@ -58,7 +58,8 @@ def _all(catalogue: Catalogue, cache: Path, folder: Path, lit: bool) -> Iterator
         yield "light/flat", _light(catalogue, cache)
     for kind in KINDS:
         data = folder / kind
-        _run("dataset", kind, "--out", data, "--scale", "tiny", "--area", "60", "110", "--cache", cache)
+        small = ("--scale", "tiny", "--area", "60", "110", "--panoramas", "none")
+        _run("dataset", kind, "--out", data, *small, "--cache", cache)
         yield f"dataset/{kind}", folder_digest(data)
     yield "eval/hanna", _judged(folder, "eval", "hanna", "--data", folder / "hanna", "--tasks", "12", "--cache", cache)
     yield (

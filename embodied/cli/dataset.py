@@ -1,7 +1,8 @@
-"""Build a data set: houses, graphs, routes, tasks and, if wanted, panoramas.
+"""Build a data set: houses, graphs, routes, tasks and the lit panoramas of all viewpoints.
 
 Interrupt it whenever you like: the same command goes on from there, and the files do not depend
-on the number of workers. One house is one unit of work.
+on the number of workers. One house is one unit of work. Whoever needs words only leaves the pictures
+out by --panoramas none; they can be drawn later, by the same command without it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,10 @@ from embodied.cli.common import add_cache, add_json, add_packs, note, show
 from embodied.cli.options import face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import QUALITIES, PictureSettings
+
+WORDS_ONLY = ("hari",)
+"""Kinds that are not drawn unless asked: all that HARI's agent perceives are words, its learner and its tables (4.7
+and 4.8) need no pictures, and lighting the houses would be most of the work."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +62,14 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)",
     )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
-    parser.add_argument("--panoramas", choices=QUALITIES[1:5], help="also draw every viewpoint, this well")
     parser.add_argument(
-        "--size", type=face, default=256, help="side of a panorama's cube face in pixels (default: %(default)s)"
+        "--panoramas",
+        choices=QUALITIES[:5],
+        help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
+        "that are there already, else fast; hari: none)",
+    )
+    parser.add_argument(
+        "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
     )
     parser.add_argument(
         "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
@@ -95,29 +105,44 @@ def run(args: argparse.Namespace) -> int:
     build_dataset(
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray
     )
-    if args.panoramas:
-        note("drawing panoramas; what is drawn already is kept")
+    data = Dataset(args.out)
+    pictures = chosen_pictures(args.kind, args.panoramas, args.size, data.pictures)
+    if pictures.quality != "none":
+        note(f"drawing panoramas: {pictures.quality}, faces of {pictures.size} pixels; what is drawn already is kept")
         draw_panoramas(
             config,
             args.out,
             args.cache,
-            pictures=PictureSettings(args.size, args.panoramas),
+            pictures=pictures,
             workers=args.workers,
             watch=watch,
             packs=tuple(args.pack),
             ray_address=args.ray,
         )
-    data = Dataset(args.out)
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
     show(
         args,
-        {"folder": str(args.out), "digest": data.digest, "splits": splits},
+        {"folder": str(args.out), "digest": data.digest, "splits": splits, "panoramas": dataclasses.asdict(pictures)},
         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
     )
     return 0
+
+
+def chosen_pictures(kind: str, quality: str | None, size: int | None, held: PictureSettings | None) -> PictureSettings:
+    """How the panoramas of a data set are drawn; quality 'none': not at all.
+
+    Args:
+      quality, size: what --panoramas and --size say; None where they are left out.
+      held: how those that the data set holds were drawn, None where it holds none. They are gone on with rather than
+        drawn again in another way that nobody asked for.
+    """
+    if quality is None and held is not None:
+        return held if size is None else dataclasses.replace(held, size=size)
+    chosen = quality or ("none" if kind in WORDS_ONLY else "fast")
+    return PictureSettings(size or PictureSettings().size, chosen)
 
 
 def chosen_scale(args: argparse.Namespace) -> str:

@@ -70,6 +70,7 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
+    parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
 
 

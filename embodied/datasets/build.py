@@ -7,9 +7,10 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import joblib
 
@@ -31,6 +32,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
+W = TypeVar("W")
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
@@ -126,7 +128,7 @@ def build_dataset(
     """
     folder = Path(folder)
     work = units(scale(config.scale, config.kind))
-    arguments = (config, folder, Path(cache), make_house or make_dataset_house, packs)
+    arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, packs)
     with locked(folder):
         _claim(folder, config)
         for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
@@ -152,8 +154,19 @@ def draw_panoramas(
     packs: tuple[Path, ...] = (),
     ray_address: str | None = None,
 ) -> None:
-    """Draw the panoramas of all houses into their folders, unless they are there."""
-    arguments = (Path(folder), Path(cache), pictures, packs)
+    """Draw the panoramas of all houses into their folders, unless they are there; a lit house is lit first.
+
+    A house is a unit of work, and its file is written when it is whole: the same command goes on after an
+    interruption. Pictures that were drawn otherwise, or by another version of the program, are drawn again.
+
+    Args:
+      pictures: how all of them are drawn.
+      workers, watch, packs, ray_address: as in `build_dataset`.
+
+    Raises:
+      LockedError: another process writes into the folder.
+    """
+    arguments = (Path(folder).resolve(), Path(cache), pictures, packs)
     work = units(scale(config.scale, config.kind))
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
@@ -165,21 +178,22 @@ def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings, 
     home = folder / "houses" / unit.name
     house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
     catalogue = load_catalogue(cache, packs)
-    with World(house, catalogue, graph, cache, pictures, file=home / "panoramas.pano") as world:
+    path, may = home / "panoramas.pano", ("renderer",)  # nodes of a cluster may have other drivers
+    with World(house, catalogue, graph, cache, pictures, file=path, may_differ=may) as world:
         world.render_all()
     return unit.name
 
 
 def for_each_unit(
     job: Callable[..., str],
-    work: tuple[Unit, ...],
+    work: Sequence[W],
     arguments: tuple,
     *,
     workers: int,
     watch: Watch | None,
     ray_address: str | None,
 ) -> None:
-    """Run job(unit, *arguments) for every unit, on this machine's processes or on a Ray cluster."""
+    """Run job(unit, *arguments) for every unit of work, on this machine's processes or on a Ray cluster."""
     if ray_address is not None:
         from embodied.datasets.cluster import run_on_ray  # an optional extra
 

@@ -135,7 +135,10 @@ class Dataset:
 
         place = self.place(name)
         file = self.folder / "houses" / name / "panoramas.pano"
-        return World(place.house, catalogue, place.graph, cache, dataclasses.replace(pictures, **changes), file=file)
+        pictures = dataclasses.replace(pictures, **changes)
+        # what is in a data set is data: whoever reads it has other drivers and, later, another version
+        may = ("renderer", "code")
+        return World(place.house, catalogue, place.graph, cache, pictures, file=file, may_differ=may)
 
     def drawn_pictures(self, name: str) -> PictureSettings | None:
         """How the panoramas of a house that the data set holds were drawn; None where it holds none of this house."""
@@ -154,6 +157,12 @@ class Dataset:
             return from_plain(PictureSettings, fields)
         except RecordError:  # drawn by a version with other words for it
             return None
+
+    @property
+    def pictures(self) -> PictureSettings | None:
+        """How the panoramas of the first house that has any were drawn; None where no house has."""
+        names = (unit.name for unit in units(self.scale))
+        return next((drawn for n in names if (drawn := self.drawn_pictures(n)) is not None), None)
 
     def routes(self, name: str) -> tuple[Route, ...]:
         """The routes that assistants know in a house.

@@ -1,0 +1,148 @@
+"""The pictures of a data set: which are drawn, what is kept, who believes them, and features that come from them."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+from hand_data import build, small_house
+from handmade import HandCatalogue
+
+from agents.vision import run as vision
+from agents.vision.config import PLAIN
+from agents.vision.encoder import random_encoder
+from agents.vision.features import encode_panoramas, feature_path, load_features
+from agents.vision.resnet import ARCHITECTURES
+from embodied.cli.dataset import chosen_pictures
+from embodied.datasets import build as building
+from embodied.datasets.store import Dataset
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
+from embodied.render.pictures import PictureSettings
+from embodied.world import World
+
+SMALL = PictureSettings(size=16)
+
+
+def test_houses_are_drawn_lit_unless_the_kind_needs_words_only_or_pictures_are_there():
+    assert chosen_pictures("hanna", None, None, None) == PictureSettings(256, "fast")
+    assert chosen_pictures("find", None, 128, None) == PictureSettings(128, "fast")
+    assert chosen_pictures("hari", None, None, None).quality == "none"
+    assert chosen_pictures("hari", "unlit", None, None).quality == "unlit"
+    held = PictureSettings(192, "normal")
+    assert chosen_pictures("hanna", None, None, held) == held, "not drawn again in another way that nobody asked for"
+    assert chosen_pictures("hanna", None, 64, held) == PictureSettings(64, "normal")
+    assert chosen_pictures("hanna", "fast", None, held) == PictureSettings(256, "fast")
+    assert chosen_pictures("hanna", "none", None, held).quality == "none"
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Dataset:
+    """Three small houses by hand, without pictures."""
+    folder = tmp_path_factory.mktemp("pictures")
+    return build(folder / "data", folder / "cache", "find", size="1x4", make_house=small_house)
+
+
+@pytest.fixture(autouse=True)
+def hand_catalogue(monkeypatch):
+    for module in (building, vision):
+        monkeypatch.setattr(module, "load_catalogue", lambda *_: HandCatalogue())
+
+
+def files(data: Dataset) -> dict[str, int]:
+    """House to when its panoramas were written."""
+    return {p.parent.name: p.stat().st_mtime_ns for p in sorted(data.folder.glob("houses/*/panoramas.pano"))}
+
+
+def pano(data: Dataset, name: str):
+    return data.folder / "houses" / name / "panoramas.pano"
+
+
+def draw(data: Dataset, pictures: PictureSettings = SMALL) -> None:
+    building.draw_panoramas(data.config, data.folder, data.folder / "cache", pictures=pictures)
+
+
+def grey(level: int, size: int = 16) -> Panorama:
+    faces = np.full((6, size, size, 3), level, np.uint8)
+    return Panorama(faces, np.ones((6, size, size), np.float32), np.zeros((6, size, size), np.int32))
+
+
+def pretend_drawn(data: Dataset, name: str, pictures: PictureSettings, **other: str) -> None:
+    """Grey pictures that say of themselves that they were drawn so."""
+    place = data.place(name)
+    world = World(place.house, HandCatalogue(), place.graph, data.folder / "cache", pictures)
+    nodes = [grey(40 + i, pictures.size) for i in range(len(place.graph.ids))]
+    write_panoramas(pano(data, name), nodes, {**world.fingerprint, **other})
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_drawing_goes_on_where_it_was_stopped(data, caplog):
+    draw(data)
+    first, names = files(data), [u.name for u in building.units(data.scale)]
+    assert sorted(first) == sorted(names) and data.pictures == SMALL
+    pano(data, names[0]).unlink()  # killed before this one
+    cut = pano(data, names[1])
+    cut.write_bytes(cut.read_bytes()[:-9])  # or the disk was full
+    draw(data)
+    again = files(data)
+    assert {n for n in names if again[n] != first[n]} == set(names[:2])
+    assert all(data.drawn_pictures(n) == SMALL for n in names)
+    draw(data, PictureSettings(size=8))
+    assert all(data.drawn_pictures(n).size == 8 for n in names), "another size is drawn anew"
+
+
+@pytest.mark.gl
+def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_and_drawn_again_by_them(data):
+    name = data.names("train")[0]
+    pretend_drawn(data, name, SMALL, renderer="another card", code="an earlier version")
+    with data.open_world(name, HandCatalogue(), data.folder / "cache", SMALL) as world:
+        assert abs(int(world.panorama(3).rgb.mean()) - 43) <= 1, "read, not drawn"
+    pretend_drawn(data, name, SMALL, renderer="another card")
+    os.utime(pano(data, name), ns=(1, 1))
+    unit = next(u for u in building.units(data.scale) if u.name == name)
+    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL, ())
+    assert pano(data, name).stat().st_mtime_ns == 1, "nodes of a cluster differ in their drivers"
+    pretend_drawn(data, name, SMALL, code="an earlier version")
+    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL, ())
+    with data.open_world(name, HandCatalogue(), data.folder / "cache", SMALL) as world:
+        assert len(np.unique(world.panorama(3).rgb)) > 3, "one data set is of one version"
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_features_of_other_pictures_are_other_features(data, monkeypatch):
+    """An unlit run must not pass for a lit one."""
+    monkeypatch.setattr(vision, "PLAIN", SMALL)
+    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
+    encoder = random_encoder(seed=0)
+    names = [u.name for u in building.units(data.scale)]
+    lit = PictureSettings(16, "fast")
+
+    def features(quality: str | None) -> str:
+        lines: list[str] = []
+        args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=None)
+        args.threads, args.device, args.network, args.encoder = 1, "cpu", "random", None
+        assert vision.run_features(args, lines.append) == 0
+        return lines[-1]
+
+    for name in names:
+        pano(data, name).unlink(missing_ok=True)
+    assert features(None).startswith("3 of 3 houses made, pictures: 3 unlit_16")
+    for name in names:
+        pretend_drawn(data, name, lit, code="whoever drew them")
+    assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_16")
+    assert features("fast").startswith("0 of 3 houses made")
+    assert features("unlit").startswith("0 of 3 houses made"), "they are still there"
+    name = names[0]
+    path = feature_path(data.folder / "features", encoder.digest, name, lit)
+    found, _ = load_features(path, encoder=encoder.digest, source=data.place(name).house.digest, pictures=lit)
+    with data.open_world(name, HandCatalogue(), data.folder / "cache", lit) as world:
+        wanted = encode_panoramas(encoder, [world.panorama(n) for n in range(4)])
+    assert np.allclose(found[:4].astype(float), wanted.astype(float), atol=1e-2), "of the very pictures that it holds"
+    with pytest.raises(ValueError, match="made from drawing fast_16"):
+        load_features(path, pictures=PLAIN)
