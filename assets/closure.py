@@ -11,7 +11,7 @@ import functools
 import importlib.metadata
 import sys
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,18 +32,21 @@ class Closure:
     """Top names of what is neither ours nor Python's, sorted."""
 
 
-def closure(*makers: str, root: Path = ROOT) -> Closure:
+def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> Closure:
     """The import closure of modules, read from their sources; what is imported for type checkers only is left out.
 
     Args:
       makers: dotted names of modules.
       root: the folder that holds our packages.
+      without: modules and libraries that are left out with all that they alone import: those that decide nothing about
+        the product, and those of which the product's key holds what they made.
 
     Raises:
       ModuleNotFoundError: a maker is no module of ours.
     """
     found: dict[str, Path] = {}
     libraries: set[str] = set()
+    known = {*OURS, *sys.stdlib_module_names, *without}
     waiting = list(makers)
     for name in makers:
         if _file_of(name, root) is None:
@@ -51,13 +54,13 @@ def closure(*makers: str, root: Path = ROOT) -> Closure:
     while waiting:
         name = waiting.pop()
         path = _file_of(name, root)
-        if name in found or path is None:
+        if name in found or name in without or path is None:
             continue
         found[name] = path
         names = _names_in(path.read_bytes(), name, path.name == "__init__.py")
         ours = [n for n in names if n.split(".")[0] in OURS]
         waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
-        libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in (*OURS, *sys.stdlib_module_names))
+        libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in known)
     return Closure(dict(sorted(found.items())), tuple(sorted(libraries)))
 
 
@@ -81,10 +84,16 @@ def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
 
 
 @functools.cache
-def code_digest(*makers: str, root: Path = ROOT) -> str:
-    """Hex digest of what the import closure of `makers` does: its code, data files beside it, versions of libraries."""
-    whole = closure(*makers, root=root)
-    data = sorted({f for path in whole.modules.values() for f in (path.parent / "data").glob("*") if f.is_file()})
+def code_digest(*makers: str, root: Path = ROOT, without: tuple[str, ...] = ()) -> str:
+    """Hex digest of what the import closure of `makers` does: its code, data files beside it, versions of libraries.
+
+    Args:
+      without: as for `closure`; 'assets.data' leaves out the data files beside the modules of `assets`.
+    """
+    whole = closure(*makers, root=root, without=without)
+    folders = {path.parent / "data" for path in whole.modules.values()}
+    named = [f for f in folders if ".".join(f.relative_to(root).parts) not in without]
+    data = sorted(f for folder in named for f in folder.glob("*") if f.is_file())
     return digest(
         {name: _code_of(path.read_bytes()) for name, path in whole.modules.items()},
         {f.relative_to(root).as_posix(): digest(f) for f in data},

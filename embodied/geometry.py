@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -34,6 +34,18 @@ def yaw_of_heading(heading: np.ndarray) -> np.ndarray: ...
 def yaw_of_heading(heading: float | np.ndarray) -> np.floating | np.ndarray:
     """Yaw (ccw from +x, in [-pi, pi)) of a Matterport heading (clockwise from +y)."""
     return wrap(np.pi / 2 - np.asarray(heading))
+
+
+def r2(k: Any) -> tuple[Any, Any]:
+    """Point k of the R2 low-discrepancy sequence, both coordinates with any whole part: in the unit square lie their
+    fractions.
+
+    Args:
+      k: a number or an array of numbers, on the device, too, counted from 0, which is the origin.
+
+    Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+    """
+    return k * 0.7548776662466927, k * 0.5698402909980532
 
 
 def facing_of(yaw: float) -> float:

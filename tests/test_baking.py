@@ -19,6 +19,7 @@ from embodied.light import (
     bake_all,
     baking,
     check,
+    files,
     lightings_of,
     open_bake,
     radiosity,
@@ -101,6 +102,16 @@ def test_another_look_of_a_material_makes_another_bake(lit):
     assert f"custom-{baking.key_of(house, catalogue, TINY)}" == baked.folder.name
     assert baking.key_of(house, catalogue, TINY) != baking.key_of(house, Repainted(), TINY)
     assert f"custom-{baking.key_of(house, HandCatalogue(), TINY)}" == baked.folder.name
+
+
+def test_a_bake_of_other_code_is_refused_and_has_another_key(lit, monkeypatch):
+    house, catalogue, _, baked = lit
+    before = baking.key_of(house, catalogue, TINY)
+    for module in (baking, files):
+        monkeypatch.setattr(module, "light_code", lambda: "0123456789abcdef")
+    assert baking.key_of(house, catalogue, TINY) != before
+    with pytest.raises(StaleBake, match="other code.*0123456789abcdef.*embodied light"):
+        open_bake(baked.folder, house)
 
 
 def test_no_valid_texel_is_black_and_every_owner_has_its_mesh(lit):

@@ -9,7 +9,10 @@ import pytest
 
 import assets.closure
 from assets.closure import ROOT, closure, code_digest
+from assets.importing import importer
+from embodied.light import colours, settings, unwrap
 from embodied.render.pictures import PictureSettings
+from embodied.scene import collision
 from embodied.world import makers
 
 TOP = "from __future__ import annotations"
@@ -29,10 +32,10 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new, 1))
 
 
-def key(root: Path, *modules: str) -> str:
+def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
     """The digest, read anew."""
     code_digest.cache_clear()
-    return code_digest(*modules, root=root)
+    return code_digest(*modules, root=root, without=without)
 
 
 def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
@@ -65,6 +68,54 @@ def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
     before = key(tree, *unlit)
     edit(tree / file, old, new)
     assert key(tree, *unlit) != before
+
+
+PRODUCTS = {
+    "bakes": ("embodied.light.baking", settings.APART),
+    "unwrappings": ("embodied.light.unwrap", unwrap.APART),
+    "halved maps": ("embodied.light.colours", colours.APART),
+    "boxes": ("embodied.scene.collision", collision.APART),
+    "models": (importer.READER, importer.APART),
+}
+DECIDED_BY = {
+    "embodied/light/sky.py": {"bakes"},
+    "embodied/house/shapes.py": {"bakes"},
+    "embodied/light/unwrap.py": {"bakes", "unwrappings"},
+    "embodied/light/colours.py": {"bakes", "halved maps"},
+    "embodied/geometry.py": {"bakes", "unwrappings", "boxes"},
+    "embodied/scene/collision.py": {"boxes"},
+    "assets/records.py": {"bakes", "unwrappings", "boxes", "models"},
+    "assets/importing/glb.py": {"models"},
+    "embodied/light/settings.py": set(),
+    "embodied/light/reference.py": set(),
+    "embodied/light/__init__.py": set(),
+    "embodied/scene/walls.py": set(),
+    "embodied/gym/registration.py": set(),
+    "assets/built/soft.py": set(),
+}
+"""File to the products that a constant in it decides. What builds a house's parts is in no bake's code: the parts
+themselves are in its key."""
+
+
+def test_products_follow_the_code_that_makes_them_and_no_other(tree):
+    before = {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
+    for file, decided in DECIDED_BY.items():
+        edit(tree / file, TOP, f"{TOP}\nX = 1") if "__init__" not in file else (tree / file).open("a").write("X = 1\n")
+        after = {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
+        assert {name for name in PRODUCTS if after[name] != before[name]} == decided, file
+        before = after
+    data = next(p for p in sorted((tree / "assets/data").iterdir()) if p.suffix == ".json")
+    data.write_text(data.read_text() + "\n")
+    assert {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()} == before
+
+
+def test_versions_of_libraries_that_decide_bakes_are_in_their_key(monkeypatch):
+    libraries = closure("embodied.light.baking", without=settings.APART).libraries
+    assert {"drjit", "mitsuba", "numpy", "xatlas", "cv2"} <= set(libraries) and "tqdm" not in libraries
+    before = key(ROOT, "embodied.light.baking", without=settings.APART)
+    monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mitsuba" else "")
+    assert key(ROOT, "embodied.light.baking", without=settings.APART) != before
+    code_digest.cache_clear()
 
 
 def test_data_beside_the_code_is_in_the_key(tree):

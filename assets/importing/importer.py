@@ -20,14 +20,18 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
+from assets.closure import code_digest
 from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import Material, MeshError, libraries, parse_mtl, parse_obj
 from assets.importing.sh3f import Pack, PackError
 from assets.records import Finish, MeshPart, Recipe, bounds
 
-VERSION = 3
-"""Part of every cache key; raise it when the import changes."""
+READER = "assets.importing.own"
+"""The module that imports models of all formats: its code is part of every cache key."""
+APART = ("assets", "assets.data", "assets.importing")
+"""What the code of imported models does not count: packages' names, and the catalogue's rows, whose recipes are in the
+keys."""
 FORMATS = ("PNG", "JPEG", "BMP", "TGA")
 """What textures are opened as. Pillow knows many more; some of them start other programs (PostScript)."""
 MAX_TEXTURE = 512
@@ -70,7 +74,7 @@ def cached(recipe: Recipe, source: str, cache: Path, read: Callable[[], tuple[Ra
     """
     folder = Path(cache) / "assets" / source[:16]
     told = {k: v for k, v in asdict(recipe).items() if k != "model" or v}
-    stem = recipe.key.replace("/", "__") + "-" + digest(VERSION, told)[:12]
+    stem = recipe.key.replace("/", "__") + "-" + digest(code_digest(READER, without=APART), told)[:12]
     parts = _load(folder, stem)
     if parts is None:
         _save(folder, stem, finish_parts(read(), recipe))

@@ -152,12 +152,6 @@ def rest() -> None:
         trim(0)
 
 
-def r2(k: Array) -> tuple[Array, Array]:
-    """Point k of the R2 low-discrepancy sequence in the unit square (M. Roberts, 2018), both coordinates for any whole
-    part: `k` is a number or a device array of them."""
-    return (k + 1) * 0.7548776662466927, (k + 1) * 0.5698402909980532
-
-
 def fraction(u: Array) -> Array:
     """The part of device numbers or points behind the decimal point."""
     return u - drjit().floor(u)

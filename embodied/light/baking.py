@@ -1,8 +1,8 @@
 """Light a house once: from House to a folder of pages that renderers show and tracers read.
 
-A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, the looks of
-all its meshes and materials, the settings and the version. Its files are `embodied.light.files`'; an interrupted bake
-goes on where it stopped.
+A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, all its parts with their meshes and
+materials, the settings and the code that bakes (`embodied.light.settings.light_code`). Its files are
+`embodied.light.files`'; an interrupted bake goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ from embodied.light.files import (
 )
 from embodied.light.memory import Memory
 from embodied.light.radiosity import space_of, with_env
-from embodied.light.settings import QUALITIES, VERSION, Settings, settings_of
+from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
 from embodied.light.sites import sites_of
 from embodied.light.sky import outdoors as outdoors_of
 from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, with_glow
 from embodied.light.surroundings import dome_mesh, surroundings
 from embodied.light.tone import expose
 from embodied.light.unwrap import areas_of
-from embodied.scene.house_meshes import house_parts
+from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 from embodied.seeds import stream
@@ -84,13 +84,13 @@ def progress_bar() -> Iterator[Progress]:
 
 def key_of(house: House, catalogue: Catalogue, settings: Settings) -> str:
     """What a bake is filed under: another catalogue, model or material makes another bake."""
-    return digest(
-        "light", VERSION, house.digest, looks_of(house_parts(house, catalogue)), dataclasses.asdict(settings)
-    )[:24]
+    parts = looks_of(house_parts(house, catalogue))
+    return digest("light", light_code(), house.digest, owners(house), parts, dataclasses.asdict(settings))[:24]
 
 
 def looks_of(parts: Sequence[Part]) -> str:
-    """Hex digest of all meshes, finishes and colour maps by content, wherever they lie on disk."""
+    """Hex digest of all parts: whose they are, where they stand, and their meshes, finishes and colour maps by content,
+    wherever these lie on disk."""
     textures = {p.mesh.finish.texture for p in parts}
     maps = {t: digest(Path(t).read_bytes()) for t in sorted(t for t in textures if t is not None)}
     meshes: dict[int, str] = {}
@@ -103,7 +103,7 @@ def looks_of(parts: Sequence[Part]) -> str:
                 *(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)),
                 repr(finish),
             )
-    return digest([meshes[id(p.mesh)] for p in parts])
+    return digest([(p.owner, p.kind, p.room, p.mesh_key, p.position, p.yaw, meshes[id(p.mesh)]) for p in parts])
 
 
 def bake(

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest
+from assets.closure import code_digest
 from embodied.light.arrays import Array
 from embodied.light.atlas import Page
 from embodied.light.backend import array, drjit, mitsuba
@@ -20,8 +21,14 @@ from embodied.light.unwrap import areas_of
 
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
-MAPS = 1
-"""Counts up whenever halved maps would come out differently."""
+APART = (
+    "assets",
+    "assets.data",
+    "embodied",
+    "embodied.light",
+    *(f"embodied.light.{name}" for name in ("atlas", "cover", "unwrap")),
+)
+"""What the code of halved maps does not count: packages' names, and the geometry that this module colours."""
 CODE = 1023
 """Colour maps lie on the device as three 10-bit square roots of linear light per pixel."""
 
@@ -56,13 +63,18 @@ class ColourMaps:
         if not source.is_file():
             return make()
         stat = source.stat()
-        file = self._cache / f"{digest(MAPS, str(source), stat.st_size, stat.st_mtime_ns)[:32]}_{name}.npy"
+        file = self._cache / f"{digest(maps_code(), str(source), stat.st_size, stat.st_mtime_ns)[:32]}_{name}.npy"
         with contextlib.suppress(OSError, ValueError, EOFError):
             return np.load(file, allow_pickle=False)
         made = make()
         with atomic_path(file) as temporary, open(temporary, "wb") as f:
             np.save(f, made)
         return made
+
+
+def maps_code() -> str:
+    """Digest of the code and the libraries that halve colour maps."""
+    return code_digest(__name__, without=APART)
 
 
 def read_colours(path: str) -> np.ndarray:

@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 import shapely
 
+from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, Page
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, vector
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, vector
 from embodied.light.colours import ColourMaps, colour_at, linear, paints_of, shown
 from embodied.light.cover import Cover, Texels, cover, nearest, surface
 from embodied.light.emitters import Lamp, portals_of
@@ -270,7 +271,7 @@ def _mirrored(
     spread_of, straight = mi.Float(width.astype(np.float32)), vector(bounced)
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k))
+        a, b = r2(mi.Float(k) + 1)
         ball = mi.warp.square_to_uniform_sphere(fraction(mi.Point2f(p.turn0 + a, p.turn1 + b)))
         d = dr.normalize(straight + ball * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas
-from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, r2, vector
+from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, vector
 from embodied.light.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
@@ -143,7 +144,7 @@ def in_the_open(lamp: Lamp, scene: RayScene, *, rays: int = 48, reach: float = 0
     origin, frame = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n)
 
     def one(k: Array) -> tuple[Array, ...]:
-        d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(*r2(mi.Float(k))))))
+        d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(*r2(mi.Float(k) + 1)))))
         return (dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0),)
 
     share = np.asarray(added_up(rays, one, dr.zeros(mi.Float, len(lamp.points)))[0]) / rays
@@ -177,7 +178,8 @@ def _spread(corners: np.ndarray, area: np.ndarray, n: int) -> tuple[np.ndarray, 
     cut = np.cumsum(area) / area.sum()
     k = np.arange(n)
     face = np.minimum(np.searchsorted(cut, (k + 0.5) / n), len(area) - 1)
-    u, v = np.sqrt((k * 0.7548776662466927 + 0.5) % 1), (k * 0.5698402909980532 + 0.5) % 1
+    a, b = r2(k)
+    u, v = np.sqrt((a + 0.5) % 1), (b + 0.5) % 1
     w = np.stack([1 - u, u * (1 - v), u * v], axis=1)
     return np.einsum("nk,nkc->nc", w, corners[face]), face_normals(corners)[face]
 

@@ -25,7 +25,7 @@ from embodied.light.atlas import Atlas
 from embodied.light.backend import LightError, device, warn
 from embodied.light.compose import Ingredients, Solved
 from embodied.light.emitters import Lamp
-from embodied.light.settings import VERSION
+from embodied.light.settings import light_code
 from embodied.light.solve import Radiosity
 from embodied.light.tone import Exposure
 from embodied.scene.house_meshes import owners
@@ -93,7 +93,7 @@ def open_bake(folder: Path, house: House) -> Bake:
     """Open a finished bake and make sure that it belongs to `house`.
 
     Raises:
-      StaleBake: absent, unfinished, damaged, of another version, or of a house that was edited since.
+      StaleBake: absent, unfinished, damaged, made by other code, or of a house that was edited since.
     """
     folder = Path(folder)
     try:
@@ -101,9 +101,9 @@ def open_bake(folder: Path, house: House) -> Bake:
         files = dict(manifest["files"])
     except (OSError, ValueError, KeyError, TypeError) as e:
         raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
-    if manifest.get("version") != VERSION:
+    if manifest.get("code") != light_code():
         raise StaleBake(
-            f"{folder} was baked by light version {manifest.get('version')}, this is {VERSION}; "
+            f"{folder} was baked by other code ({manifest.get('code', 'an earlier version')}; this is {light_code()}); "
             "run `embodied light` again"
         )
     if manifest.get("house") != house.digest:
@@ -207,7 +207,7 @@ def facts_of(s: Solved, meshes: Sequence[LitMesh], probes: Mapping[str, list], f
     """What the manifest says of a bake whose files are written, but how it was made."""
     written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
     return {
-        "version": VERSION,
+        "code": light_code(),
         "key": folder.name,
         "house": s.house.digest,
         "device": device(),

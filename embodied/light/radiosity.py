@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from embodied.geometry import r2
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.atlas import Atlas
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, r2, scene_of, vector
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, scene_of, vector
 from embodied.light.cover import Texels, nearest
 from embodied.light.emitters import GLASS, Lamp, Portal
 from embodied.light.memory import Memory
@@ -181,7 +182,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> Array:
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k))
+        a, b = r2(mi.Float(k) + 1)
         q = corner + along * fraction(p.turn0 + a) + up * fraction(p.turn1 + b)
         d = q - p.position
         far = dr.norm(d)
@@ -208,7 +209,7 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
     strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
-        pick = fraction(p.turn0 + r2(mi.Float(k))[0])
+        pick = fraction(p.turn0 + r2(mi.Float(k) + 1)[0])
         i = dr.minimum(mi.UInt32(pick * mi.Float(count)), count - 1)
         d = dr.gather(mi.Point3f, at, i) - p.position
         far = dr.norm(d)
@@ -345,7 +346,7 @@ def _rays(space: Space, p: Points, first: int) -> Callable:
     start = number(first)
 
     def meet(k: Array) -> tuple[Array, ...]:
-        u0, u1 = r2(mi.Float(k + start))
+        u0, u1 = r2(mi.Float(k + start) + 1)
         side = dr.select(p.thin & ((k & 1) == 1), -1.0, 1.0)
         u = fraction(mi.Point2f(p.turn0 + u0, p.turn1 + u1))
         d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u))

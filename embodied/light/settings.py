@@ -4,8 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-VERSION = 15
-"""Counts up whenever a bake would come out differently; older bakes are then made anew."""
+from assets.closure import code_digest
+
+APART = (
+    "assets",
+    "assets.catalogue",
+    "assets.data",
+    "embodied",
+    "embodied.light",
+    "embodied.light.settings",
+    "embodied.scene.house_meshes",
+    "tqdm",
+)
+"""What the code of a bake does not count: what builds a house's parts and the settings, since the parts and the
+settings themselves are in a bake's key; what packages offer by name; the progress bar."""
+
+
+def light_code() -> str:
+    """Digest of the code and the libraries that bake; bakes made by others are made anew."""
+    return code_digest("embodied.light.baking", without=APART)
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light import denoise, radiosity
 from embodied.light.arrays import Array
 from embodied.light.atlas import SHELL, Atlas, Page
-from embodied.light.backend import added_up, array, drjit, fraction, mitsuba, r2
+from embodied.light.backend import added_up, array, drjit, fraction, mitsuba
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.cover import Texels, rasterise
 from embodied.light.emitters import Lamp, Portal, portals_of
@@ -274,7 +275,7 @@ def outer_light(problem: Problem, spread: Spread, samples: int = 24) -> np.ndarr
     portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k))
+        a, b = r2(mi.Float(k) + 1)
         u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
         d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         ray = mi.Ray3f(p.position + p.face_normal * radiosity.LIFT, d)

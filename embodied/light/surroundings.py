@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, atlas_of, things_of
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, r2, scene_of, vector
+from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, scene_of, vector
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.compose import spread
 from embodied.light.cover import Texels, cover, rasterise
@@ -89,7 +90,7 @@ def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndar
     hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k))
+        a, b = r2(mi.Float(k) + 1)
         u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
         d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))

@@ -17,13 +17,15 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from assets.cache import DAMAGED, atomic_path, digest
+from assets.closure import code_digest
 from assets.records import MeshPart
+from embodied.geometry import r2
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, drjit, fraction, mitsuba, r2, scene_of, vector
+from embodied.light.backend import added_up, drjit, fraction, mitsuba, scene_of, vector
 
 T = TypeVar("T")
-VERSION = 6
-"""Counts up whenever an unwrapping would come out differently."""
+APART = ("assets", "assets.data", "embodied", "embodied.light")
+"""What the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,13 +174,20 @@ def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def cached_model(parts: Sequence[MeshPart], budget: float, cache: Path, *, trusted: bool = False) -> Unwrapped:
     """`unwrap_model`, done once per geometry; a damaged cache file is replaced."""
-    shape = [digest(*(np.ascontiguousarray(a).tobytes() for a in (p.vertices, p.faces, p.uv))) for p in parts]
-    path = Path(cache) / "unwrapped" / f"{digest(VERSION, round(budget), trusted, shape)[:32]}.npz"
+    arrays = [(p.vertices, p.faces, p.normals, p.uv) for p in parts]
+    shapes = [digest(*(np.ascontiguousarray(a).tobytes() for a in of_part)) for of_part in arrays]
+    key = digest(unwrap_code(), round(budget), trusted, shapes)
+    path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
     if (known := load_record(Unwrapped, path)) is not None:
         return known
     made = unwrap_model(parts, budget, trusted=trusted)
     save_record(made, path)
     return made
+
+
+def unwrap_code() -> str:
+    """Digest of the code and the libraries that unwrap; unwrappings made by others are made anew."""
+    return code_digest(__name__, without=APART)
 
 
 def save_record(record: Any, path: Path) -> None:
@@ -291,7 +300,7 @@ def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarr
         frame, origin = mi.Frame3f(n * side), mi.Point3f(centre + n * (side * reach))
 
         def one(k: Array, frame: Array = frame, origin: Array = origin) -> tuple[Array, ...]:
-            a, b = r2(mi.Float(k))
+            a, b = r2(mi.Float(k) + 1)
             d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(r0 + a, r1 + b))))
             return (dr.select(scene.ray_test(mi.Ray3f(origin, d)), 0.0, 1.0),)
 

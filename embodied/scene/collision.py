@@ -15,11 +15,14 @@ import shapely
 from scipy import ndimage
 
 from assets.cache import atomic_path, digest
+from assets.closure import code_digest
 from assets.records import Asset, MeshPart
+from embodied.geometry import r2
 from embodied.house.house import House, Room
 
-BOXES_VERSION = 1
-"""Counts up whenever `object_boxes` would give other boxes."""
+APART = ("assets", "assets.data", "embodied", "embodied.house", "embodied.house.house", "embodied.scene")
+"""What the code of boxes does not count: packages' names, the catalogue's rows, and houses, which they know nothing
+of."""
 CELLS = (20, 14, 10, 7, 5, 3, 2)
 """Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
 MOST_BOXES = 30
@@ -64,7 +67,7 @@ def kept_boxes(
     """`object_boxes`, kept on disk under what they depend on; a file that makes no sense is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
-    path = Path(cache) / "collision" / f"{digest(BOXES_VERSION, surfaces, asset.size, size, *meshes)[:32]}.json"
+    path = Path(cache) / "collision" / f"{digest(boxes_code(), surfaces, asset.size, size, *meshes)[:32]}.json"
     try:
         rows = np.array(json.loads(path.read_text()), float).reshape(-1, 7)
         if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
@@ -75,6 +78,11 @@ def kept_boxes(
     with atomic_path(path, sync=False) as temporary:
         temporary.write_text(json.dumps([[*map(float, (*b.centre, *b.half, b.yaw))] for b in boxes]))
     return boxes
+
+
+def boxes_code() -> str:
+    """Digest of the code and the libraries that make boxes; boxes made by others are made anew."""
+    return code_digest(__name__, without=APART)
 
 
 def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[Box, ...]:
@@ -113,17 +121,15 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
 
 
 def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
-    """(k, 3) points spread evenly over the surface of `parts`, vertices included.
-
-    Source: the R2 sequence, M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
-    """
+    """(k, 3) points spread evenly over the surface of `parts` (`embodied.geometry.r2`), vertices included."""
     corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if areas.sum() <= 0:
         return corners.reshape(-1, 3)
     k = np.arange(n)
     chosen = corners[np.searchsorted(np.cumsum(areas) / areas.sum(), (k + 0.5) / n).clip(max=len(corners) - 1)]
-    a, b = np.sqrt(k * 0.7548776662466927 % 1)[:, None], (k * 0.5698402909980532 % 1)[:, None]
+    first, second = r2(k)
+    a, b = np.sqrt(first % 1)[:, None], (second % 1)[:, None]
     spread = (1 - a) * chosen[:, 0] + a * (1 - b) * chosen[:, 1] + a * b * chosen[:, 2]
     return np.concatenate([spread, corners.reshape(-1, 3)[:: max(1, len(corners) // 1000)]])
 
