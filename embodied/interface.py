@@ -323,7 +323,7 @@ class Subtask:
     target: int
     """Node where the assistant wants it to end: v_depart (4.6), a subgoal in HARI."""
     start: Pose | None = None
-    """HANNA: where the route is entered and with which angles; None stays put."""
+    """HANNA: where the route is entered and with which angles; None stays put. VNLA: where `words` begin."""
     goal: int | None = None
     """HANNA: g* (4.7), whose image is shown after departing."""
     path: tuple[int, ...] = ()

@@ -86,7 +86,7 @@ embodied.datasets <- embodied.locks assets.catalogue embodied.house embodied.nav
 embodied.bench <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.generate
     embodied.interface embodied.language embodied.render embodied.light embodied.mattersim embodied.tasks
     embodied.world embodied.assistants embodied.envs embodied.datasets embodied.gym
-embodied.evaluation <- embodied.navigation embodied.interface embodied.teachers embodied.policies embodied.envs
+embodied.evaluation <- embodied.navigation embodied.interface embodied.policies embodied.envs
     embodied.datasets
 embodied.gym <- assets.catalogue embodied.house embodied.generate embodied.interface embodied.language embodied.render
     embodied.world embodied.assistants embodied.envs embodied.datasets embodied.evaluation

@@ -60,6 +60,28 @@ def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
     assert data.table().count("\n") == 2 + len(data.splits)
 
 
+def test_tasks_without_rooms_are_a_data_set_of_their_own_and_the_others_do_not_change(tmp_path):
+    with_rooms = build(tmp_path / "a", tmp_path / "cache", "vnla")
+    without = build(tmp_path / "b", tmp_path / "cache", "vnla", rooms=False)
+    assert all(t.goal.room_kind is None and " in " not in t.request for t in without.tasks("train"))
+    assert all(t.goal.room_kind for t in with_rooms.tasks("train"))
+    assert "rooms" not in (tmp_path / "a/dataset.json").read_text() + (tmp_path / "a/config.json").read_text()
+    assert not Dataset(tmp_path / "b").config.rooms
+    with pytest.raises(ValueError, match="tasks without rooms are VNLA's"):
+        DatasetConfig("find", rooms=False)
+
+
+def test_tasks_of_vnla_get_the_time_that_their_rules_take(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache", "vnla")
+    usual, longer = (data.split("val_unseen", vnla=rules).tasks for rules in ("direct", "algorithm-6"))
+    assert usual == data.tasks("val_unseen")
+    assert [b.horizon - a.horizon for a, b in zip(usual, longer, strict=True)] == [
+        2 * int(np.ceil(t.budget)) for t in usual
+    ]
+    with pytest.raises(ValueError, match="are VNLA's"):
+        build(tmp_path / "hanna", tmp_path / "cache", "find").split("train", vnla="direct")
+
+
 def test_seen_splits_share_houses_but_no_tasks(tmp_path):
     data = build(tmp_path / "data", tmp_path / "cache")
     keys = {s: {(t.world, t.request, t.start.node) for t in data.tasks(s)} for s in data.splits}

@@ -298,6 +298,17 @@ def test_vnlas_words_of_sub_goals_cover_what_the_advisor_says(data_sets, folders
     assert set(subgoal_words(merged=False)) < words
 
 
+def test_a_data_set_without_rooms_is_exported_as_it_is(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache", "vnla", rooms=False)
+    files = {p.name for p in export_folder("vnla", data, tmp_path / "out")}
+    assert "noroom_train.json" in files and "asknav_train.json" not in files
+    items = read(tmp_path / "out/data/noroom/noroom_train.json")
+    tasks = data.tasks("train")
+    assert [i["instructions"][0] for i in items] == [t.request for t in tasks]
+    assert all(" in " not in t.request for t in tasks)
+    assert [len(i["paths"]) for i in items] == [len(t.goal_nodes) for t in tasks]
+
+
 def test_a_no_room_request_names_no_room_and_any_room_will_do(folders):
     root = folders / "vnla" / "data"
     by_room = {i["path_id"]: i for i in read(root / "asknav/asknav_train.json")}

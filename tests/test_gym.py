@@ -44,6 +44,15 @@ def test_the_environment_checker_has_nothing_to_say(kind, tmp):
         check_env(env.unwrapped, skip_render_check=False)
 
 
+@pytest.mark.slow
+def test_the_rules_of_vnla_and_its_rooms_are_chosen_by_name(tmp):
+    env = make("vnla", tmp, rules="algorithm-6", rooms=False)
+    env.reset(seed=0)
+    assert type(env._env).__name__ == "Algorithm6Env" and all(t.goal.room_kind is None for t in env._tasks)
+    with pytest.raises(ValueError, match="unknown rules"):
+        make("vnla", tmp, rules="algorithm 7")
+
+
 def test_all_are_registered():
     for name in ("Find", "VLN", "VNLA", "HANNA", "HARI"):
         assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym.env:make"

@@ -35,8 +35,8 @@ def missing(text: str, known: set[int]) -> list[int]:
     return [int(n) for m in LIST.finditer(text) for n in CITED.findall(m[1]) if int(n) not in known]
 
 
-def test_differences_are_numbered_without_gaps():
-    assert rows() == list(range(1, len(rows()) + 1))
+def test_every_difference_has_a_number_of_its_own():
+    assert len(rows()) == len(set(rows())) > 0
 
 
 def test_every_cited_difference_exists():

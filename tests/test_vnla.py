@@ -11,14 +11,24 @@ from hand_worlds import grid_world, line_world
 from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
-from embodied.envs.vnla import Algorithm6Env, DirectVnlaEnv, GoalAwareVnlaEnv, VnlaEnv
+from embodied.envs.make import environment_maker, tasks_under
+from embodied.envs.vnla import (
+    RULES,
+    Algorithm6Env,
+    DirectVnlaEnv,
+    GoalAwareVnlaEnv,
+    MuteDirectVnlaEnv,
+    VnlaEnv,
+    fitted,
+    teacher_of,
+)
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
-from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason, stepwise_action
+from embodied.teachers.vnla import AskRules, GoalAwareTeacher, VnlaTeacher, ask_reason, stepwise_action
 
 TASK = Task(
     "line/vnla/0", "vnla", "line", Pose(0, 6), FindObject("mug", "hall", ("mug_1",)), (3,), "find a mug", 0.0, 20, 2.0
@@ -108,6 +118,62 @@ def test_algorithm_6_overwrites_costs_a_step_and_resumes():
     assert env.step(Stop()) is None
 
 
+def test_the_teacher_of_algorithm_6_does_what_was_said_before_it_stops():
+    """A sub-goal of turns ends where the agent stands: by its node alone the teacher said stop at once."""
+    teacher, env = VnlaTeacher(), line_env(Algorithm6Env)
+    env.reset(dataclasses.replace(TASK, horizon=60))
+    env.step(Ask())
+    said = []
+    while env.mode is Mode.SUB:
+        said.append(teacher.label(env.situation).move)
+        env.step(said[-1])
+    assert said == [go("left")] * 4 + [Stop()]
+    assert (env.pose.node, env.instruction, env.ended) == (0, "find a mug", None)
+
+
+def test_off_the_described_way_the_teacher_of_algorithm_6_leads_to_where_it_ends():
+    teacher, env = VnlaTeacher(), line_env(Algorithm6Env)
+    env.reset(dataclasses.replace(TASK, horizon=60))
+    env.step(Ask())
+    env.step(go("up"))
+    end = teacher.plan(env.world).after(TASK.start, ("left",) * 4)
+    while (move := teacher.label(env.situation).move) != Stop():
+        env.step(move)
+    assert env.pose == end != TASK.start
+
+
+def test_asking_first_and_obeying_the_teacher_of_algorithm_6_arrives_in_the_time_it_is_given():
+    world, teacher, tasks, make = grid_setup(Algorithm6Env)
+    for task in tasks:
+        task, env = fitted(dataclasses.replace(task, budget=2), world, "algorithm-6", teacher), make()
+        env.reset(task)
+        while env.ended is None:
+            ask = env.observation.mode is Mode.MAIN and env.observation.can_ask
+            env.step(Ask() if ask else teacher.label(env.situation).move)
+        assert env.ended == "stop" and metrics.success(env.episode(), world.graph), task.id
+        again = teacher.relabel(env.episode(), world)
+        moves = [(s.action, x.move) for s, x in zip(env.episode().steps, again, strict=True) if x.move is not None]
+        assert all(a == b for a, b in moves), "what is said of a finished episode is what was said in it"
+
+
+def test_a_listener_comes_back_from_what_it_was_told_under_algorithm_6():
+    world, teacher, tasks, make = grid_setup(Algorithm6Env)
+    given = [fitted(dataclasses.replace(t, budget=30), world, "algorithm-6", teacher) for t in tasks]
+    episodes = [listened(make(), t) for t in given]
+    assert all(metrics.success(e, world.graph) and e.ended == "stop" for e in episodes)
+
+
+def listened(env, task):
+    """Asks whenever it is back at the request and does what it hears, the listener's way."""
+    listener, memory, rng = SubgoalListener(), None, np.random.default_rng(0)
+    o = env.reset(task)
+    while o is not None:
+        (move,), memory = listener.act([o], memory, rngs=[rng])
+        stopping = o.mode is Mode.MAIN and isinstance(move, Stop)
+        o = env.step(Ask() if o.mode is Mode.MAIN and o.can_ask and not stopping else move)
+    return env.episode()
+
+
 def test_direct_intervention_acts_in_the_agents_place():
     env = line_env(DirectVnlaEnv)
     env.reset(TASK)
@@ -118,6 +184,46 @@ def test_direct_intervention_acts_in_the_agents_place():
     assert env.pose.node == 3
     env.step(Stop())
     assert metrics.success(env.episode(), line_world().graph) == 1
+
+
+def test_direct_intervention_may_be_silent():
+    env = line_env(MuteDirectVnlaEnv)
+    env.reset(TASK)
+    assert env.step(Ask()).instruction == "find a mug"
+    env.step(go("down"))
+    assert env.pose == Pose(0, 7), "it was turned to the left all the same"
+
+
+def test_the_goal_aware_teacher_says_what_its_forward_does():
+    world, _, tasks, make = grid_setup(GoalAwareVnlaEnv)
+    teacher = GoalAwareTeacher()
+    env = GoalAwareVnlaEnv({"grid": world}, Advisor(teacher, PlainLanguage(), 200), teacher.moves)
+    for task in tasks[:10]:
+        task = fitted(dataclasses.replace(task, budget=1), world, "goal-aware", teacher)
+        env.reset(task)
+        env.step(Ask())
+        words = env.last_step.reply.subtask.words
+        for word in words:
+            assert env.step(Stop() if word == "stop" else go(word)) is not None or word == "stop"
+        assert metrics.spl(env.episode(), world.graph) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("rules", RULES)
+def test_every_rule_is_chosen_by_name_and_its_teacher_wins_in_time(rules):
+    world = grid_world()
+    tasks = grid_setup()[2][:8]
+    make = environment_maker("vnla", {"grid": world}, vnla=rules)
+    tasks = tasks_under("vnla", tasks, {"grid": world}, rules)
+    assert type(make()) is RULES[rules]
+    episodes = play(make, Shortest(teacher_of(rules)), tasks, seed=0)
+    assert all(metrics.success(e, world.graph) and e.ended == "stop" for e in episodes)
+
+
+def test_rules_that_are_none_are_refused_with_those_that_are():
+    with pytest.raises(ValueError, match="use one of .*algorithm-6"):
+        environment_maker("vnla", {}, vnla="algorithm 7")
+    with pytest.raises(ValueError, match="'direct' are VNLA's, these tasks are of kind 'find'"):
+        environment_maker("find", {}, vnla="direct")
 
 
 def test_asking_all_the_way_and_listening_arrives_and_the_deaf_do_not():

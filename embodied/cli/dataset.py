@@ -61,6 +61,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         default="people",
         help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)",
     )
+    parser.add_argument(
+        "--no-rooms", action="store_true", help="requests name no room: any such thing in the house will do (VNLA)"
+    )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
     parser.add_argument(
         "--panoramas",
@@ -96,7 +99,14 @@ def run(args: argparse.Namespace) -> int:
     if args.export and not programs:
         raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
     config = DatasetConfig(
-        args.kind, chosen_scale(args), args.seed, tuple(args.area), args.routes, not args.no_people, args.language
+        args.kind,
+        chosen_scale(args),
+        args.seed,
+        tuple(args.area),
+        args.routes,
+        not args.no_people,
+        args.language,
+        rooms=not args.no_rooms,
     )
 
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:

@@ -120,6 +120,20 @@ def _refuse_unwritable(wanted: Path) -> None:
         raise argparse.ArgumentTypeError(f"{there} may not be written by you; choose another place than {wanted}")
 
 
+VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
+"""As in embodied.envs.vnla, which --help should not import."""
+
+
+def add_rules(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--rules",
+        choices=VNLA_RULES,
+        default=VNLA_RULES[0],
+        help="VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not "
+        "(direct-mute), the program's 'forward' (goal-aware), Algorithm 6 as printed (default: %(default)s)",
+    )
+
+
 # Options made from settings ---------------------------------------------------------------------
 
 

@@ -57,13 +57,23 @@ class DatasetConfig:
     """Whether assistants stand in the house as figures (HANNA)."""
     language: str = "people"
     """Who words the routes: 'people' with their habits and landmarks, or 'plain' turns and rooms."""
+    rooms: bool = True
+    """Whether requests name the room (VNLA); without, any thing of the class in the house will do."""
 
     def __post_init__(self) -> None:
         if self.routes not in ("sampled", "spanning"):
             raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
+        if not self.rooms and self.kind != "vnla":
+            raise ValueError(f"tasks without rooms are VNLA's, these are of kind {self.kind!r}; leave rooms as it is")
         scale(self.scale, self.kind)
+
+    def facts(self) -> dict[str, object]:
+        """The settings as they are written; what came later and is at its default is left out, so that data sets
+        without it keep their digests."""
+        facts = dataclasses.asdict(self)
+        return {k: v for k, v in facts.items() if k != "rooms" or not v}
 
 
 @dataclass(frozen=True)
@@ -273,6 +283,7 @@ def _write_unit(
             [(_part(s, unit, config.kind), n) for s, n in shares(unit, config)],
             seed=config.seed,
             language=language,
+            rooms=config.rooms,
         )
     house.save(home / "house.json")
     to_matterport(graph, house, home / "connectivity.json")
@@ -284,7 +295,7 @@ def _write_unit(
     facts = UnitFacts(
         VERSION, config, unit.group, unit.index, house.digest, nodes=len(graph.ids), routes=len(routes), tasks=counts
     )
-    body = json.dumps(dataclasses.asdict(facts), sort_keys=True, indent=1)
+    body = json.dumps({**dataclasses.asdict(facts), "config": config.facts()}, sort_keys=True, indent=1)
     write_bytes(home / "unit.json", (body + "\n").encode())
 
 
@@ -307,7 +318,7 @@ def _part(split: SplitPlan, unit: Unit, kind: str) -> str:
 
 def _claim(folder: Path, config: DatasetConfig) -> None:
     """Write down whose folder it is, or refuse another data set's, or one that another program began."""
-    mine = {"version": VERSION, "config": json.loads(json.dumps(dataclasses.asdict(config)))}
+    mine = {"version": VERSION, "config": json.loads(json.dumps(config.facts()))}
     path = folder / "config.json"
     if path.exists():
         theirs = read_json(path)
@@ -347,7 +358,7 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
     order = [s.name for s in scale(config.scale, config.kind).splits]
     body = {
         "version": VERSION,
-        "config": dataclasses.asdict(config),
+        "config": config.facts(),
         "splits": {n: table[n] for n in order},
         "digest": digest(files),
         "files": files,

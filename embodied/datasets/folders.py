@@ -200,8 +200,10 @@ def _route(route: Route, graph: NavGraph) -> Item:
 
 
 def _vnla(data: Dataset, root: Path) -> list[Path]:
+    """Tasks with rooms, and without: those of a data set that names none as they are, else made from the others."""
     teacher, files = VnlaTeacher(), []
-    for prefix, item in (("asknav", _asknav), ("noroom", _noroom)):
+    makers = {"asknav": _asknav, "noroom": _noroom} if data.config.rooms else {"noroom": _asknav}
+    for prefix, item in makers.items():
         home, words, numbers = root / "data" / prefix, Words(), itertools.count(1)
         for split in data.splits:
             made = (item(t, numbers, data, teacher) for t in data.tasks(split))
@@ -225,7 +227,8 @@ def _vnla(data: Dataset, root: Path) -> list[Path]:
     return [*files, _text(root / "data" / "region_label.txt", region_lines())]
 
 
-def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item:
+def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
+    """The task as it is."""
     place = data.place(task.world)
     return {**_item(task, next(numbers), place), **_vnla_fields(task, task.goal_nodes, place, teacher.plan(place))}
 

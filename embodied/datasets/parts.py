@@ -10,7 +10,7 @@ from embodied.tasks.find import Pool, find_pool, find_task
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 from embodied.tasks.vln import vln_task
-from embodied.tasks.vnla import vnla_pool, vnla_task
+from embodied.tasks.vnla import VnlaConfig, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 
 SIXTEENTHS = {"main": range(14), "val": range(14, 15), "test": range(15, 16)}
@@ -21,9 +21,19 @@ WORDING_OF = {"main": ("train_seen", "val", "test"), "val": ("train_unseen",), "
 
 
 def part_tasks(
-    kind: str, world: Place, routes: Sequence[Route], parts: Sequence[tuple[str, int]], *, seed: int, language: Language
+    kind: str,
+    world: Place,
+    routes: Sequence[Route],
+    parts: Sequence[tuple[str, int]],
+    *,
+    seed: int,
+    language: Language,
+    rooms: bool = True,
 ) -> dict[str, list[Task]]:
     """Up to `n` tasks of one house for each (part, n) of `parts`; fewer where its pool is smaller.
+
+    Args:
+      rooms: whether requests name the room (VNLA).
 
     Raises:
       ValueError: an unknown kind.
@@ -37,9 +47,9 @@ def part_tasks(
     elif kind == "hanna":
         pool, make = hanna_pool(world, seed=seed), lambda i: hanna_task(pool, i, seed=seed, language=language)
     elif kind == "vnla":
-        plan = VnlaTeacher().plan(world)
-        pool = vnla_pool(world, plan, seed=seed)
-        make = lambda i: vnla_task(pool, i, world, plan, seed=seed, language=language)
+        plan, config = VnlaTeacher().plan(world), VnlaConfig(by_room=rooms)
+        pool = vnla_pool(world, plan, seed=seed, config=config)
+        make = lambda i: vnla_task(pool, i, world, plan, seed=seed, language=language, config=config)
     else:
         raise ValueError(f"unknown kind of task {kind!r}")
     return {part: [make(i) for i in range(len(pool)) if i % 16 in SIXTEENTHS[part]][:n] for part, n in parts}

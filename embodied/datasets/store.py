@@ -23,7 +23,7 @@ from embodied.datasets.checks import (
 from embodied.datasets.scale import Scale, SplitPlan, scale
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
-from embodied.envs.make import environment_maker
+from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
 from embodied.interface import FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
@@ -208,6 +208,7 @@ class Dataset:
         language: Language | None = None,
         worlds: Mapping[str, Place] | None = None,
         hari: HariRules = AS_PRINTED,
+        vnla: str = AS_PUBLISHED,
     ) -> SplitData:
         """Everything that playing a split needs.
 
@@ -216,6 +217,7 @@ class Dataset:
           language: of VNLA's advisor.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
+          vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
 
         Raises:
           DatasetError: an unknown split, or files that were lost or changed.
@@ -230,8 +232,10 @@ class Dataset:
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
             hari=hari,
+            vnla=vnla,
         )
-        return SplitData(name, places, tuple(t for t in self.tasks(name) if t.world in places), make_env)
+        tasks = [t for t in self.tasks(name) if t.world in places]
+        return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla), make_env)
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""

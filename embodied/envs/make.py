@@ -12,10 +12,12 @@ from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
-from embodied.envs.vnla import VnlaEnv
-from embodied.interface import Language, Place, Route
+from embodied.envs.vnla import RULES, check_rules, fitted, teacher_of
+from embodied.interface import Language, Place, Route, Task
 from embodied.language.plain import PlainLanguage
-from embodied.teachers.vnla import VnlaTeacher
+
+AS_PUBLISHED = "indirect"
+"""VNLA as its program plays it: help is put into words."""
 
 
 def environment_maker(
@@ -27,6 +29,7 @@ def environment_maker(
     describer: Describer | None = None,
     language: Language | None = None,
     hari: HariRules = AS_PRINTED,
+    vnla: str = AS_PUBLISHED,
 ) -> Callable[[], HelpEnv]:
     """A maker of environments for a kind of task; all it makes share assistant and caches.
 
@@ -35,10 +38,12 @@ def environment_maker(
       describer: HARI's; frequent objects are counted over `worlds` where not given.
       language: of VNLA's advisor.
       hari: variants of HARI.
+      vnla: one of embodied.envs.vnla.RULES.
 
     Raises:
-      ValueError: an unknown kind.
+      ValueError: an unknown kind or rule of play, or a rule of VNLA for another kind.
     """
+    refuse_rules(kind, vnla)
     if kind in ("find", "vln"):
         moves = PanoramicMoves()
         return lambda: HelpEnv(worlds, moves=moves)
@@ -47,9 +52,9 @@ def environment_maker(
         moves = PanoramicMoves()
         return lambda: HannaEnv(worlds, anna, moves)
     if kind == "vnla":
-        teacher = VnlaTeacher()
+        teacher, rule = teacher_of(vnla), RULES[vnla]
         advisor = Advisor(teacher, language or PlainLanguage())
-        return lambda: VnlaEnv(worlds, advisor, teacher.moves)
+        return lambda: rule(worlds, advisor, teacher.moves)
     if kind == "hari":
         say = describer or Describer(frequent_classes(worlds.values()))
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
@@ -57,3 +62,18 @@ def environment_maker(
         moves = PanoramicMoves()
         return lambda: HariEnv(worlds, assistant, say, costs=hari.costs, moves=moves, dense_states=hari.dense_states)
     raise ValueError(f"unknown kind of task {kind!r}")
+
+
+def refuse_rules(kind: str, vnla: str) -> None:
+    """Raises ValueError for an unknown rule of VNLA, or one for another kind of task."""
+    check_rules(vnla)
+    if kind != "vnla" and vnla != AS_PUBLISHED:
+        raise ValueError(f"rules {vnla!r} are VNLA's, these tasks are of kind {kind!r}; leave the rules out")
+
+
+def tasks_under(kind: str, tasks: Sequence[Task], worlds: Mapping[str, Place], vnla: str) -> tuple[Task, ...]:
+    """The tasks with time enough under a rule of VNLA; as they are for other kinds and for the program's rule."""
+    if kind != "vnla" or vnla == AS_PUBLISHED:
+        return tuple(tasks)
+    teacher = teacher_of(vnla)
+    return tuple(fitted(t, worlds[t.world], vnla, teacher) for t in tasks)

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from embodied.action_spaces import WORDS, Reach, directions
 from embodied.envs.base import HelpEnv, required
 from embodied.geometry import wrap
-from embodied.interface import STEP, Action, Ask, Intention, Mode, Move, Observation, Pose, Reply, Situation, Stop
+from embodied.interface import (
+    STEP,
+    Action,
+    Ask,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Place,
+    Pose,
+    Reply,
+    Situation,
+    Stop,
+    Task,
+)
 from embodied.navigation.graph import nearest
+from embodied.teachers.vnla import GoalAwareTeacher, VnlaTeacher
 
 
 class VnlaEnv(HelpEnv):
@@ -39,7 +56,7 @@ class GoalAwareVnlaEnv(VnlaEnv):
     """VNLA with the program's 'forward' (docs/sources.md, S44): it prefers the next node of the optimal path.
 
     That tells the agent something about the goal whenever it goes forward, at test time too; it
-    is here for comparison with the published numbers. Its teacher is `stepwise_action`.
+    is here for comparison with the published numbers. Its teacher is GoalAwareTeacher.
     """
 
     def _reachable(self) -> Reach:
@@ -78,9 +95,21 @@ class DirectVnlaEnv(VnlaEnv):
         return super().step(action)
 
 
+class MuteDirectVnlaEnv(DirectVnlaEnv):
+    """Direct intervention that is not put into words: the agent reads its request throughout."""
+
+    def _replied(self, reply: Reply) -> None:
+        super()._replied(reply)
+        self.instruction = self.task.request
+
+
 class Algorithm6Env(HelpEnv):
     """I3L as Algorithm 6 prints it: asking costs a step, the instruction replaces the request,
-    and stopping in a sub-task goes back to the request (the operator (+) of 4.1.3 overwrites)."""
+    and stopping in a sub-task goes back to the request (the operator (+) of 4.1.3 overwrites).
+
+    A sub-task ends in the pose to which the described actions lead (`VnlaTeacher.reference`), which may be a turn
+    on the spot: its node alone does not say that anything was done.
+    """
 
     def _replied(self, reply: Reply) -> None:
         self.mode, self.subtask = Mode.SUB, required(reply.subtask, "sub-task in the reply")
@@ -95,3 +124,47 @@ class Algorithm6Env(HelpEnv):
         self.mode, self.instruction, self.subtask = Mode.MAIN, self.task.request, None  # line 13
         self.targets = self.task.goal_nodes
         self.time_on_task = 0
+
+
+RULES: Mapping[str, type[HelpEnv]] = {
+    "indirect": VnlaEnv,
+    "direct": DirectVnlaEnv,
+    "direct-mute": MuteDirectVnlaEnv,
+    "goal-aware": GoalAwareVnlaEnv,
+    "algorithm-6": Algorithm6Env,
+}
+"""Rules of play by the names that commands know them by; the first is the program's with help in words."""
+
+
+def teacher_of(rules: str) -> VnlaTeacher:
+    """The teacher of a rule of play.
+
+    Raises:
+      ValueError: an unknown rule.
+    """
+    check_rules(rules)
+    return GoalAwareTeacher() if rules == "goal-aware" else VnlaTeacher()
+
+
+def check_rules(rules: str) -> None:
+    """Raises ValueError for a rule that is none."""
+    if rules not in RULES:
+        raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES)}")
+
+
+def fitted(task: Task, world: Place, rules: str, teacher: VnlaTeacher) -> Task:
+    """The task with time enough under a rule of play (docs/sources.md, S111).
+
+    Algorithm 6 takes a step for every request and one to come back from every sub-task; the teacher of the goal-aware
+    rule may need more actions than ours. The budget is left as it is.
+    """
+    horizon = task.horizon
+    if rules == "algorithm-6":
+        horizon += 2 * math.ceil(task.budget or 0)
+    elif rules == "goal-aware":
+        horizon = max(horizon, len(teacher.words(world, task.start, task.goal_nodes, LONGEST)[0]))
+    return dataclasses.replace(task, horizon=horizon)
+
+
+LONGEST = 200
+"""Actions after which a teacher's walk is given up; no house is that large."""

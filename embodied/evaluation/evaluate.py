@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from embodied.envs.make import AS_PUBLISHED
+from embodied.envs.vnla import teacher_of
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
 from embodied.interface import Agent, Episode, SeenPlace, Task
@@ -22,7 +24,6 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
-from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import SplitData
@@ -40,7 +41,7 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
     },
     "vnla": {
         "random walk": RandomWalk,
-        "shortest": lambda: Shortest(VnlaTeacher()),
+        "shortest": lambda: Shortest(teacher_of(AS_PUBLISHED)),
         "listener, none": lambda: VnlaAsking(SubgoalListener(), "none"),
         "listener, first": lambda: VnlaAsking(SubgoalListener(), "first"),
         "listener, random": lambda: VnlaAsking(SubgoalListener(), "random"),
@@ -63,15 +64,18 @@ def agent_names(kind: str) -> list[str]:
     return [*AGENTS[kind], *LOOKING.get(kind, {})]
 
 
-def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None) -> Agent:
+def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None, rules: str = AS_PUBLISHED) -> Agent:
     """A fresh agent by name.
 
     Args:
       worlds: what agents that look around look at.
+      rules: of VNLA; the shortest way is that of their teacher.
 
     Raises:
       ValueError: unknown for this kind of task, or one that looks and was given no worlds.
     """
+    if (kind, name) == ("vnla", "shortest"):
+        return Shortest(teacher_of(rules))
     if name in AGENTS[kind]:
         return AGENTS[kind][name]()
     if name not in LOOKING.get(kind, {}):

@@ -24,6 +24,7 @@ from PIL import Image, ImageDraw
 from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import HariEnv
+from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
@@ -276,6 +277,10 @@ class StageSettings:
     worlds: Mapping[str, SeenPlace] | None = None
     """Worlds to play in; otherwise opened from `data`."""
     layout: Layout | None = None
+    rules: str = AS_PUBLISHED
+    """VNLA's rule of play, one of embodied.envs.vnla.RULES."""
+    rooms: bool = True
+    """Whether VNLA's requests in a generated flat name the room; those of a data set are as it was built."""
     wheels: bool = False
     """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
 
@@ -297,6 +302,8 @@ def set_stage(kind: str, **settings: Any) -> Stage:
         worlds=wanted.worlds,
         pictures=wanted.pictures,
         sees=seen,
+        rules=wanted.rules,
+        rooms=wanted.rooms,
     )
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or Layout(descriptions=kind == "hari")

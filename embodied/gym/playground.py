@@ -20,7 +20,7 @@ from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
-from embodied.envs.make import environment_maker
+from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, Route, SeenPlace, Task
@@ -56,12 +56,15 @@ def make_playground(
     worlds: Mapping[str, SeenPlace] | None = None,
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
+    rules: str = AS_PUBLISHED,
+    rooms: bool = True,
 ) -> Playground:
     """A split of a data set, or one flat generated from `seed` where `data` is None.
 
     Args:
       pictures: how the houses are drawn; as the data set's pictures are, or 'fast', where not given.
       sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
+      rules, rooms: VNLA's rule of play, and whether the requests in a generated flat name the room.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
@@ -69,16 +72,20 @@ def make_playground(
     catalogue = load_catalogue(cache)
     if data is None:
         drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
-        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds, drawn)
+        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds, drawn, rules=rules, rooms=rooms)
     else:
         whole = Dataset(data)
         if whole.kind != kind:
             raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
+        if rooms != whole.config.rooms:
+            raise ValueError(
+                f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
+            )
         if worlds is None:
             names = whole.names(split)
             drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
             worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-        chosen = whole.split(split, worlds=worlds)
+        chosen = whole.split(split, worlds=worlds, vnla=rules)
         tasks, make_env = chosen.tasks, chosen.make_env
     features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
     return Playground(worlds, tasks, make_env, features)
@@ -131,6 +138,9 @@ def _flat(
     catalogue: Catalogue,
     worlds: Mapping[str, SeenPlace] | None,
     pictures: PictureSettings,
+    *,
+    rules: str,
+    rooms: bool,
 ) -> tuple[Mapping[str, SeenPlace], tuple[Task, ...], Callable[[], HelpEnv]]:
     """One world (generated unless given), tasks in it, and a maker of environments.
 
@@ -152,5 +162,6 @@ def _flat(
         paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
         routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language)[part]
-    return worlds, tuple(tasks), environment_maker(kind, worlds, routes={name: routes})
+    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=rooms)[part]
+    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=rules)
+    return worlds, tasks_under(kind, tasks, worlds, rules), make_env

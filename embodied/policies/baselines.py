@@ -179,22 +179,27 @@ class PerfectInterpreter:
 class SubgoalListener:
     """VNLA: does what the advisor's sentence says, word by word; otherwise a monocular random walk.
 
-    The walk never stops by itself and prefers going forward, so what it reaches it owes to help.
+    The walk never stops by itself and prefers going forward, so what it reaches it owes to help. Under Algorithm 6
+    it goes back to the request when it has done what was said.
     """
 
     def act(
         self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
-        pending = memory or [("", ()) for _ in observations]
+        pending = memory or [("", (), False) for _ in observations]
         actions: Actions = []
         for i, o in enumerate(observations):
             if o is None:
                 actions.append(None)
                 continue
-            heard, words = pending[i]
+            heard, words, arrived = pending[i]
             if o.instruction != heard or o.time_on_task == 0:
                 heard, words = o.instruction, heard_subgoal(o.instruction)
-            pending[i] = (heard, words[1:])
+            if not words and (o.mode is Mode.SUB or arrived):  # Algorithm 6: back to the request, or done with it
+                words = ("stop",)
+            elif words[:1] == ("stop",):
+                arrived = True
+            pending[i] = (heard, words[1:], arrived)
             actions.append(_taken({words[0]: 1.0} if words else WANDER, o, rngs[i]))
         return actions, pending
 

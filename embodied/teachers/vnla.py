@@ -13,7 +13,22 @@ from scipy.sparse.csgraph import dijkstra
 
 from embodied.action_spaces import WORDS, MonocularMoves, directions
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEWS, Ask, Episode, Label, Move, Place, Pose, Situation, Stop, Thought
+from embodied.interface import (
+    STEP,
+    TURNS,
+    VIEWS,
+    Ask,
+    Episode,
+    Label,
+    Mode,
+    Move,
+    Place,
+    Pose,
+    Situation,
+    Stop,
+    Subtask,
+    Thought,
+)
 from embodied.navigation.graph import nearest
 
 if TYPE_CHECKING:
@@ -46,6 +61,7 @@ class MonocularPlan:
         there, weight = self.next[here, action], self.weight[here, action]
         self._backwards = csr_matrix((weight, (there, here)), shape=(states, states))
         self._cost: dict[tuple[int, ...], np.ndarray] = {}
+        self._cost_to: dict[Pose, np.ndarray] = {}
         self._counts: dict[tuple[int, ...], np.ndarray] = {}
 
     def cost(self, goals: tuple[int, ...]) -> np.ndarray:
@@ -57,11 +73,30 @@ class MonocularPlan:
 
     def action(self, pose: Pose, goals: tuple[int, ...]) -> int | None:
         """Index into WORDS of the best move; None at a goal (stop)."""
-        if pose.node in goals:
+        return None if pose.node in goals else self._descent(pose, self.cost(goals))
+
+    def action_to(self, pose: Pose, end: Pose) -> int | None:
+        """Index into WORDS of the best move towards a pose, its angles included; None in it.
+
+        On the way that `words` described it says the words themselves: what is best towards the end of a best way
+        is best towards its goals, and of equals both take the first.
+        """
+        if pose == end:
             return None
+        if end not in self._cost_to:
+            self._cost_to[end] = dijkstra(self._backwards, indices=state_of(end))
+        return self._descent(pose, self._cost_to[end])
+
+    def _descent(self, pose: Pose, cost: np.ndarray) -> int:
         state = state_of(pose)
-        total = self.weight[state] + self.cost(goals)[self.next[state]]
-        return int(np.argmin(np.round(total, 9)))
+        return int(np.argmin(np.round(self.weight[state] + cost[self.next[state]], 9)))
+
+    def after(self, pose: Pose, words: Sequence[str]) -> Pose:
+        """The pose that `words` lead to."""
+        for word in words:
+            if word != "stop":
+                pose = pose_of(int(self.next[state_of(pose), WORDS.index(word)]))
+        return pose
 
     def words(self, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
         """The next `most` teacher actions, ending with 'stop' if it comes, and the pose they lead to (4.1)."""
@@ -184,7 +219,11 @@ def _best(moves: np.ndarray) -> str:
 
 
 class VnlaTeacher:
-    """Reference moves of the monocular action space and, given a thought, whether to ask."""
+    """Reference moves of the monocular action space and, given a thought, whether to ask.
+
+    Inside a sub-task of Algorithm 6 its reference leads to the pose in which the described actions end, and stops
+    there (docs/sources.md, S110).
+    """
 
     def __init__(self, moves: MonocularMoves | None = None, rules: AskRules = AskRules()) -> None:
         self.moves, self.rules = moves or MonocularMoves(), rules
@@ -197,17 +236,28 @@ class VnlaTeacher:
             self._plans[name] = MonocularPlan(world, self.moves)
         return self._plans[name]
 
+    def words(self, world: Place, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
+        """Its next `most` actions towards the nearest goal, 'stop' included, and the pose they lead to (4.1)."""
+        return self.plan(world).words(pose, goals, most)
+
     def label(self, situation: Situation, thought: Thought | None = None) -> Label:
-        s = situation
-        action = self.plan(s.world).action(s.pose, s.targets)
-        move = Stop() if action is None else Move(action)
-        return Label(move, ask_reason(s, thought, self.rules) is not None)
+        return Label(self.reference(situation), ask_reason(situation, thought, self.rules) is not None)
+
+    def reference(self, situation: Situation) -> Move | Stop:
+        """The reference move."""
+        s, plan = situation, self.plan(situation.world)
+        if s.mode is Mode.SUB and s.subtask is not None and s.subtask.start is not None:
+            action = plan.action_to(s.pose, plan.after(s.subtask.start, s.subtask.words))
+        else:
+            action = plan.action(s.pose, s.targets)
+        return Stop() if action is None else Move(action)
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         """Labels of a finished episode; the thought at an Ask step is what its policy was about to do."""
         labels: list[Label] = []
         trail: list[int] = []
         time = requests = 0
+        subtask: Subtask | None = None
         for step in episode.steps:
             if len(trail) <= time:
                 trail.append(step.pose.node)
@@ -219,7 +269,7 @@ class VnlaTeacher:
                 pose=step.pose,
                 mode=step.mode,
                 targets=step.targets,
-                subtask=None,
+                subtask=subtask,
                 candidate_nodes=step.candidate_nodes,
                 candidates=candidates,
                 time=time,
@@ -230,6 +280,31 @@ class VnlaTeacher:
             label = self.label(situation, step.action.thought)
             asked = isinstance(step.action, Ask)
             labels.append(Label(None if asked else label.move, label.ask if step.can_ask else None))
+            subtask = subtask if step.reply is None else step.reply.subtask
             requests += asked
             time += not asked
         return tuple(labels)
+
+
+class GoalAwareTeacher(VnlaTeacher):
+    """The authors' teacher (docs/sources.md, S49), for the 'forward' that knows the goal (S44)."""
+
+    def words(self, world: Place, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
+        words: list[str] = []
+        while len(words) < most and (not words or words[-1] != "stop"):
+            words.append(stepwise_action(world.graph, pose, goals))
+            pose = self._after(world, pose, words[-1], goals)
+        return tuple(words), pose
+
+    def reference(self, situation: Situation) -> Move | Stop:
+        word = stepwise_action(situation.world.graph, situation.pose, situation.targets)
+        return Stop() if word == "stop" else Move(WORDS.index(word))
+
+    def _after(self, world: Place, pose: Pose, word: str, goals: Sequence[int]) -> Pose:
+        """The pose after a word of its own, which says 'forward' only where the next node of the way is ahead."""
+        if word == "stop":
+            return pose
+        if word == "forward":
+            goal = nearest(world.graph, pose.node, goals)
+            return Pose(int(world.graph.next_hop[pose.node, goal]), pose.turn, pose.tilt)
+        return self.moves.at(world, pose)[1][WORDS.index(word)]
