@@ -15,7 +15,7 @@ from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Choice, HariPolicy, policy_of
-from agents.hari.pretraining import Curriculum, pretrain, pretraining_success
+from agents.hari.pretraining import Curriculum, guided_share, pretrain, pretraining_success
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
@@ -27,7 +27,7 @@ from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
-from embodied.interface import Ask, Feature, FindObject, Move, Pose, Stop, Task
+from embodied.interface import Ask, Candidates, Feature, FindObject, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
@@ -232,6 +232,38 @@ def test_random_with_budgets_begins_with_the_goal_spends_no_more_and_keeps_its_m
     )
 
 
+# What is shared ---------------------------------------------------------------------------------
+
+
+def test_rows_say_what_stands_in_both_descriptions():
+    mug, far_mug, bed, kitchen = (
+        Feature("object", "mug", 1, 0, 2),
+        Feature("object", "mug", 1, 0, 3),
+        Feature("object", "bed", 0, 0, 1),
+        Feature("room", "kitchen"),
+    )
+    words = feature_words([(mug, bed, kitchen)])
+    stranger = Feature("object", "never seen", 1, 0, 2)
+    nothing = Candidates(np.zeros(0, np.float32), np.zeros(0, np.float32), np.zeros(0, int), np.zeros(0, bool))
+    pairs = [((far_mug, bed, stranger), (kitchen, mug, stranger)), ((mug,), (kitchen, mug))]
+    inputs = collate([percept(words, state, goal, nothing, 0) for state, goal in pairs])
+    assert inputs.state_shared.tolist() == [[0, 1, 0, 0], [0, 2, 0, 0]], "markers and unknown names are not shared"
+    assert inputs.goal_shared.tolist() == [[0, 0, 1, 0], [0, 0, 2, 0]]
+
+
+def test_the_shortest_path_takes_ever_fewer_steps():
+    config = dataclasses.replace(SMALL, iterations=100, guided=0.5)
+    assert [guided_share(config, u) for u in (0, 25, 50, 99)] == [1.0, 0.5, 0.0, 0.0]
+    assert guided_share(dataclasses.replace(config, guided=0.0), 0) == 0.0
+
+
+def test_a_walk_that_is_wholly_guided_takes_only_right_moves():
+    lessons = fork_lessons()
+    executor = new_executor(dataclasses.replace(SMALL, guided=1.0, iterations=10**9), words_of(fork_world()))
+    optimizer = torch.optim.Adam(executor.network.parameters(), 1e-4)
+    assert [lesson(executor, optimizer, lessons, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
+
+
 # Learning ---------------------------------------------------------------------------------------
 
 
@@ -300,7 +332,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     """Enumerated: GOAL (or SUB), DO, DONE costs 0.2; going without asking costs 1.1 on average."""
     assert best_costs() == pytest.approx(0.2)
     config = dataclasses.replace(
-        QUICK, cost=0.1, horizon=6, critic_iterations=10, iterations=90, entropy=0.01, batch=24
+        QUICK, cost=0.1, horizon=6, critic_iterations=10, iterations=150, entropy=0.01, batch=24
     )
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
     run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])

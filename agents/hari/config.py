@@ -26,6 +26,9 @@ class ExecutionConfig:
     """Updates of the weights."""
     horizon: int = 15
     """Most steps of a pre-training episode."""
+    guided: float = 0.0
+    """Share of the updates, the first ones, over which the shortest path takes ever fewer of the steps: DAgger's beta
+    falls linearly from 1 to 0 over them (docs/sources.md, S81)."""
     clip: float = 1.0
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
@@ -44,8 +47,11 @@ class ExecutionConfig:
         above_zero(self, "learning_rate", "clip", "checkpoint_minutes")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
-        if not (0 <= self.dropout < 1 and 0 <= self.cooldown <= 1):
-            raise ValueError(f"dropout {self.dropout} should be in [0, 1) and cooldown {self.cooldown} in [0, 1]")
+        if not (0 <= self.dropout < 1 and 0 <= self.cooldown <= 1 and 0 <= self.guided <= 1):
+            raise ValueError(
+                f"dropout {self.dropout} should be in [0, 1), cooldown {self.cooldown} and guided {self.guided} in "
+                "[0, 1]"
+            )
 
 
 @dataclass(frozen=True)
@@ -118,7 +124,7 @@ def above_zero(config: object, *names: str) -> None:
 
 EXECUTION_SCALES: dict[str, ExecutionConfig] = {
     "mini": ExecutionConfig(
-        hidden_size=128, heads=4, learning_rate=5e-4, iterations=4_000, cooldown=0.4, validate_every=250
+        hidden_size=128, heads=4, learning_rate=1e-3, iterations=4_000, guided=0.5, cooldown=0.4, validate_every=250
     ),
     "paper": ExecutionConfig(),
 }

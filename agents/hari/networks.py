@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
 from agents.hari.config import ExecutionConfig
+from agents.hari.transformer import Packing, Transformer
 from agents.hari.words import SIZES, Inputs
 
 INTENTIONS = ("cur", "goal", "sub", "do", "done")
@@ -16,6 +19,35 @@ DEPTHS = 4
 """Stack sizes that `knows_stack` tells apart; larger ones count as the largest."""
 SHOWN = 8
 """Probabilities of moves that the intention policy is shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Encoded:
+    """B descriptions as the encoder reads them."""
+
+    rows: Tensor
+    """(B, M, h)."""
+    present: Tensor
+    """(B, M) bool: False for padding."""
+
+    def __getitem__(self, which: list[int]) -> Encoded:
+        """Those of some of the B."""
+        return Encoded(self.rows[which], self.present[which])
+
+    def upto(self, width: int) -> Encoded:
+        """The same with no more than `width` rows, where the others are padding."""
+        return Encoded(self.rows[:, :width], self.present[:, :width])
+
+    def alone(self) -> list[Tensor]:
+        """B tensors (m, h) without padding."""
+        return [r[p] for r, p in zip(self.rows, self.present, strict=True)]
+
+    @classmethod
+    def together(cls, alone: Sequence[Tensor]) -> Encoded:
+        """What `alone` took apart, padded to the longest."""
+        lengths = torch.tensor([len(r) for r in alone])
+        rows = nn.utils.rnn.pad_sequence(list(alone), batch_first=True)
+        return cls(rows, torch.arange(rows.shape[1]) < lengths[:, None])
 
 
 class ExecutionNetwork(nn.Module):
@@ -38,10 +70,13 @@ class ExecutionNetwork(nn.Module):
             with torch.no_grad():
                 table.weight[0].zero_()
         self.angles = nn.Linear(4, h, bias=False)
-        self.encoder = _transformer(config)
-        self.decoder = _transformer(config)
+        self.encoder = Transformer(h, config.layers, config.heads, config.dropout)
+        self.decoder = Transformer(h, config.layers, config.heads, config.dropout)
         self.roles = nn.Parameter(torch.randn(3, h) * h**-0.5)
         """Which of the three a row is: the belief, of d^s, of d^g."""
+        self.shared = nn.Embedding(3, h)
+        """Whether a row's name, or all of it, stands in the other description, too (docs/sources.md, S80)."""
+        nn.init.normal_(self.shared.weight, std=h**-0.5)
         self.first = nn.Parameter(torch.zeros(h))
         """b^s_0."""
         self.query = nn.Linear(h, h)
@@ -52,43 +87,45 @@ class ExecutionNetwork(nn.Module):
         """(B, h): b^s_0."""
         return self.first.expand(batch, -1)
 
-    def forward(self, before: Tensor, inputs: Inputs) -> tuple[Tensor, Tensor]:
+    def forward(
+        self, before: Tensor, inputs: Inputs, state: Encoded | None = None, goal: Encoded | None = None
+    ) -> tuple[Tensor, Tensor]:
         """One step.
 
         Args:
           before: (B, h) b^s of the move before.
+          state: d^s as `encode` made it, where that has been done before; None encodes `inputs.state`.
+          goal: d^g likewise; both may be padded further than `inputs`.
 
         Returns:
           (B, h) b^s_t, and (B, C + 1) log-probabilities of the moves, stopping last; -inf where not allowed.
         """
         device = before.device
-        state, goal, moves = (torch.from_numpy(x).to(device) for x in (inputs.state, inputs.goal, inputs.moves))
-        state_rows, goal_rows = self.encode(state), self.encode(goal)  # (B, S, h), (B, G, h)
-        rows = torch.cat(
-            [(before + self.roles[0])[:, None], state_rows + self.roles[1], goal_rows + self.roles[2]], 1
-        )  # (B, 1 + S + G, h)
-        empty = torch.cat([torch.zeros_like(state[:, :1, 1]), state[..., 1], goal[..., 1]], 1) == 0
-        empty[:, 0] = False
-        belief = self.norm(self.decoder(rows, src_key_padding_mask=empty)[:, 0])  # (B, h)
-        keys = self.key(self.embed(moves) + self.angles(torch.from_numpy(inputs.angles).to(device)))  # (B, C + 1, h)
+        state = state or self.encode(torch.from_numpy(inputs.state).to(device))  # (B, S, h)
+        goal = (goal or self.encode(torch.from_numpy(inputs.goal).to(device))).upto(inputs.goal.shape[1])  # (B, G, h)
+        state_shared, goal_shared = (
+            self.shared(torch.from_numpy(x).to(device)) for x in (inputs.state_shared, inputs.goal_shared)
+        )
+        state_rows = state.rows + self.roles[1] + state_shared
+        goal_rows = goal.rows + self.roles[2] + goal_shared
+        rows = torch.cat([(before + self.roles[0])[:, None], state_rows, goal_rows], 1)  # (B, 1 + S + G, h)
+        there = torch.ones_like(state.present[:, :1])
+        packing = Packing.of(torch.cat([there, state.present, goal.present], 1))
+        belief = self.norm(self.decoder(packing.pack(rows), packing, firsts_only=True))  # (B, h)
+        moves, angles, allowed = (torch.from_numpy(x).to(device) for x in (inputs.moves, inputs.angles, inputs.allowed))
+        keys = self.key(self.embed(moves) + self.angles(angles))  # (B, C + 1, h)
         scores = torch.einsum("bh,bch->bc", self.query(belief), keys) / math.sqrt(keys.shape[-1])
-        allowed = torch.from_numpy(inputs.allowed).to(device)
         return belief, scores.masked_fill(~allowed, -torch.inf).log_softmax(-1)
 
-    def encode(self, rows: Tensor) -> Tensor:
-        """(B, M, 5) int64 of a description -> (B, M, h)."""
-        return self.encoder(self.embed(rows), src_key_padding_mask=rows[..., 1] == 0)
+    def encode(self, rows: Tensor) -> Encoded:
+        """(B, M, 5) int64 of descriptions, each of one row or more -> what the encoder makes of them."""
+        packing = Packing.of(rows[..., 1] != 0)
+        return Encoded(packing.pad(self.encoder(self.embed(packing.pack(rows)), packing)), packing.present)
 
     def embed(self, rows: Tensor) -> Tensor:
         """(..., 5) int64 -> (..., h): "sum all the embeddings into a single vector"."""
         parts = [table(rows[..., k + 1]) for k, table in enumerate(self.others)]
         return self.names(rows[..., 0]) + torch.stack(parts).sum(0)
-
-
-def _transformer(config: ExecutionConfig) -> nn.TransformerEncoder:
-    h = config.hidden_size
-    layer = nn.TransformerEncoderLayer(h, config.heads, 4 * h, config.dropout, batch_first=True, norm_first=True)
-    return nn.TransformerEncoder(layer, config.layers, nn.LayerNorm(h), enable_nested_tensor=False)
 
 
 class RecurrentHead(nn.Module):

@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from agents.hari.agent import Executor, HariAgent
-from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from agents.hari.words import collate, percept_of
-from embodied.interface import Action, Ask, Intention, Move, Observation, Situation, Stop, Thought
+from agents.hari.networks import INTENTIONS, Encoded, RecurrentHead, shown_probabilities
+from agents.hari.words import collate, padded, percept_of
+from embodied.interface import Action, Ask, Description, Intention, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action
 
 Observations = Sequence[Observation | None]
@@ -31,6 +31,8 @@ class Belief:
 
     carried: Tensor
     """(B, h) b^s of the last move."""
+    read: dict[tuple[str, Description], Tensor] = field(default_factory=dict, repr=False)
+    """('state' or 'goal', description) to (M, h): what the encoder made of it, once for all steps and agents."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +62,20 @@ def consider(executor: Executor, observations: Observations, memory: Belief | No
     """Run the execution policy, which learns no more, on every agent that has not ended."""
     memory = memory or Belief(executor.network.begin(len(observations)).clone())
     rows = [i for i, o in enumerate(observations) if o is not None]
-    inputs = collate([percept_of(executor.words, o) for o in observations if o is not None])
-    belief, log_moves = executor.network(memory.carried[rows], inputs)
+    seen = [o for o in observations if o is not None]
+    inputs = collate([percept_of(executor.words, o) for o in seen])
+    state = _read(executor, [("state", o.state_description) for o in seen], memory)
+    goal = _read(executor, [("goal", o.goal_descriptions[-1]) for o in seen], memory)
+    belief, log_moves = executor.network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
+
+
+def _read(executor: Executor, texts: Sequence[tuple[str, Description]], memory: Belief) -> Encoded:
+    """Descriptions as the encoder reads them; those that are new are read together, and kept."""
+    if new := [t for t in dict.fromkeys(texts) if t not in memory.read]:
+        rows = padded([executor.words.rows(description, what) for what, description in new])
+        memory.read.update(zip(new, executor.network.encode(torch.from_numpy(rows)).alone(), strict=True))
+    return Encoded.together([memory.read[t] for t in texts])
 
 
 def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
@@ -71,7 +84,7 @@ def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
     for k, i in enumerate(considered.rows):
         if isinstance(actions[i], Move):
             carried[i] = considered.belief[k]
-    return Belief(carried)
+    return Belief(carried, memory.read)
 
 
 def available(observation: Observation) -> np.ndarray:
@@ -135,9 +148,6 @@ class HariPolicy:
         considered, belief = consider(self.executor, observations, memory.belief if memory else None)
         moves = considered.best_moves
         return self._choose(observations, considered, moves, belief, memory, rngs)
-
-    def _pick(self, p: np.ndarray, rng: np.random.Generator) -> int:
-        return int(rng.choice(len(INTENTIONS), p=p)) if self.sample else int(p.argmax())
 
     def _choose(
         self,

@@ -23,7 +23,7 @@ from torch import Tensor
 
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig, as_dict
-from agents.hari.words import collate, percept
+from agents.hari.words import collate, padded, percept
 from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
 from agents.imitation.loop import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
 from assets.cache import write_json
@@ -121,7 +121,7 @@ def learn_once(
     walks = [_begin(lessons, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
     executor.network.train()
     with dropout_of(config.seed, update):
-        losses, right = _play(executor, lessons, walks, config.horizon)
+        losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
     for group in optimizer.param_groups:
         group["lr"] = falling_rate(config.learning_rate, update, config.iterations, config.cooldown)
@@ -134,11 +134,21 @@ def learn_once(
     return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}
 
 
+def guided_share(config: ExecutionConfig, update: int) -> float:
+    """DAgger's beta: the share of steps that the shortest path takes, falling linearly from 1 to 0."""
+    return max(0.0, 1 - update / (config.guided * config.iterations)) if config.guided else 0.0
+
+
 def _play(
-    executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int
+    executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int, beta: float
 ) -> tuple[list[Tensor], list[Tensor]]:
-    """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right."""
+    """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right.
+
+    Args:
+      beta: share of the steps that go where the shortest path goes instead.
+    """
     beliefs = executor.network.begin(len(walks))  # (B, h)
+    goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
     losses, right = [], []
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
@@ -152,7 +162,7 @@ def _play(
                 for i, d, (candidates, _) in zip(alive, seen, reach, strict=True)
             ]
         )
-        new, log_moves = executor.network(beliefs[alive], batch)  # (b, h), (b, C + 1)
+        new, log_moves = executor.network(beliefs[alive], batch, goal=goals[alive])  # (b, h), (b, C + 1)
         stop = log_moves.shape[1] - 1
         wanted = torch.tensor([_right(walks[i], poses, stop) for i, (_, poses) in zip(alive, reach, strict=True)])
         losses.append(-log_moves.gather(1, wanted[:, None])[:, 0])
@@ -160,7 +170,8 @@ def _play(
         beliefs = beliefs.index_put((torch.tensor(alive),), new)
         p = log_moves.detach().exp().double().numpy()
         for row, i in enumerate(alive):
-            _go(walks[i], int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum())), reach[row][1], stop)
+            drawn = int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum()))
+            _go(walks[i], int(wanted[row]) if walks[i].rng.random() < beta else drawn, reach[row][1], stop)
     return losses, right
 
 

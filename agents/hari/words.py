@@ -95,6 +95,10 @@ class Inputs:
     """(B, C + 1, 4) float32."""
     allowed: np.ndarray
     """(B, C + 1) bool."""
+    state_shared: np.ndarray
+    """(B, S) int64: 1 where a feature set's name stands in the other description, too, 2 where the whole set does."""
+    goal_shared: np.ndarray
+    """(B, G) int64, likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,16 +134,22 @@ def percept_of(words: FeatureWords, observation: Observation) -> PerceptRows:
 def collate(percepts: Sequence[PerceptRows]) -> Inputs:
     """Percepts of B agents side by side, padded; stopping moves to the last column of all."""
     most = max(len(p.moves) for p in percepts)
+    state, goal = padded([p.state for p in percepts]), padded([p.goal for p in percepts])
+    named = (state[:, :, None, 0] == goal[:, None, :, 0]) & (goal[:, None, :, 0] > UNKNOWN)  # (B, S, G)
+    same = named.astype(np.int64) + (named & (state[:, :, None] == goal[:, None]).all(-1))
     return Inputs(
-        _padded([p.state for p in percepts]),
-        _padded([p.goal for p in percepts]),
+        state,
+        goal,
         np.stack([_stop_last(p.moves, most) for p in percepts]),
         np.stack([_stop_last(p.angles, most) for p in percepts]),
         np.stack([_stop_last(p.allowed, most) for p in percepts]),
+        same.max(2),
+        same.max(1),
     )
 
 
-def _padded(rows: Sequence[np.ndarray]) -> np.ndarray:
+def padded(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """(B, M, 5) of B descriptions of up to M rows, zeros behind their ends."""
     out = np.zeros((len(rows), max(map(len, rows)), COLUMNS), dtype=np.int64)
     for i, r in enumerate(rows):
         out[i, : len(r)] = r
