@@ -21,7 +21,7 @@ from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, check, compose, radiosity, scalar, settings_of, solve
 from embodied.light.atlas import atlas_of, things_of
-from embodied.light.backend import array, drjit, find_llvm, mitsuba, variant_of
+from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, variant_of
 from embodied.light.colours import ColourMaps
 from embodied.light.cover import rasterise
 from embodied.light.denoise import cap_sparks, neighbours, smooth_sites
@@ -262,6 +262,21 @@ def test_arrays_without_llvm_mean_the_same():
     for ours, theirs in zip(made(scalar, scalar), made(mi, dr), strict=True):
         assert np.asarray(ours).dtype == np.asarray(theirs).dtype
         np.testing.assert_allclose(np.asarray(ours), np.asarray(theirs), atol=1e-5)
+
+
+def test_where_numpy_puts_its_arrays_no_kernel_is_compiled_for():
+    """Eight ways to lie in memory, one kernel: Dr.Jit compiles loads of aligned and of other addresses apart."""
+    dr, spots = drjit(), range(0, 64, 8)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for k in spots:
+            room = np.zeros(4096 + 64, np.uint8)[k:][:4096].view(np.float32)
+            room[:] = np.arange(1024)
+            out = floats(room) * 3.0 + 1.0
+            dr.eval(out)
+            np.testing.assert_array_equal(np.asarray(out), np.arange(1024) * 3.0 + 1.0)
+        made = [k["hash"] for k in dr.kernel_history() if "hash" in k]
+    assert len(made) == len(spots) and len(set(made)) == 1
 
 
 def test_houses_are_lit_without_llvm():

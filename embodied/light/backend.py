@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
 from embodied.light import scalar
@@ -126,11 +127,48 @@ def scene_of(corners: np.ndarray) -> RayScene:
     return scalar.ScalarScene(scene, mi) if device() == "scalar" else scene
 
 
+ALIGNED = 64
+"""Bytes: what Dr.Jit's widest loads want."""
+
+
+def floats(a: ArrayLike) -> Array:
+    """Numbers of any shape, flat on the device."""
+    return mitsuba().Float(_aligned(a, np.float32))
+
+
+def wholes(a: ArrayLike) -> Array:
+    """`floats` for whole numbers from 0 to 2**32 - 1."""
+    return mitsuba().UInt32(_aligned(a, np.uint32))
+
+
+def signed(a: ArrayLike) -> Array:
+    """`floats` for whole numbers with a sign."""
+    return mitsuba().Int32(_aligned(a, np.int32))
+
+
+def flags(a: ArrayLike) -> Array:
+    """`floats` for truth values."""
+    return mitsuba().Bool(_aligned(a, np.bool_))
+
+
+def _aligned(a: ArrayLike, kind: type) -> np.ndarray:
+    """The numbers (n,) at an address that is a multiple of `ALIGNED`.
+
+    Dr.Jit computes with NumPy's memory where that lies, and compiles a kernel anew for each way in which its inputs
+    are aligned or not: with chance addresses a bake compiled some eighty kernels that it had compiled before.
+    """
+    flat: np.ndarray = np.asarray(a).astype(kind, copy=False).ravel()
+    if flat.ctypes.data % ALIGNED == 0:
+        return flat
+    room = np.empty(flat.nbytes + ALIGNED, np.uint8)
+    out: np.ndarray = room[-room.ctypes.data % ALIGNED :][: flat.nbytes].view(kind)
+    out[:] = flat
+    return out
+
+
 def vector(a: np.ndarray) -> Array:
     """(n, 3) array as mi.Vector3f."""
-    mi = mitsuba()
-    a = np.asarray(a, np.float32)
-    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(a[:, k])) for k in range(3)))
+    return mitsuba().Vector3f(*(floats(a[:, k]) for k in range(3)))
 
 
 def array(v: Array) -> np.ndarray:

@@ -15,7 +15,7 @@ from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
 from embodied.light.atlas import Page
-from embodied.light.backend import array, drjit, mitsuba
+from embodied.light.backend import array, drjit, floats, mitsuba, wholes
 from embodied.light.cover import Cover
 from embodied.light.unwrap import areas_of
 
@@ -126,7 +126,6 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
     Args:
       scale: texels per luxel; maps are halved until they are no finer.
     """
-    mi = mitsuba()
     plain = linear(np.array([f.color[:3] for f in page.finishes], np.float32).reshape(-1, 3))[page.finish]
     first, width, height = (np.zeros(len(page.finish), np.uint32) for _ in range(3))
     maps, end = [np.zeros(1, np.uint32)], 1
@@ -142,8 +141,7 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
             first[which], height[which], width[which] = end, *image.shape
             maps.append(image.ravel())
             end += image.size
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
-    return Paints(flat(plain), flat(page.uv), *(mi.UInt32(a) for a in (first, width, height, np.concatenate(maps))))
+    return Paints(floats(plain), floats(page.uv), *(wholes(a) for a in (first, width, height, np.concatenate(maps))))
 
 
 def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
@@ -170,11 +168,10 @@ def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
 
 def albedo(page: Page, c: Cover, read: ColourMaps) -> np.ndarray:
     """(n, 3) float32 linear reflectance under each texel, kept inside [DARKEST, LIGHTEST]."""
-    mi = mitsuba()
     if not len(c.face):
         return np.zeros((0, 3), np.float32)
     paints = paints_of(page, c.shape[1] / page.width, read)
-    return array(colour_at(paints, mi.UInt32(c.face.astype(np.uint32)), mi.Float(c.b1), mi.Float(c.b2)))
+    return array(colour_at(paints, wholes(c.face), floats(c.b1), floats(c.b2)))
 
 
 def _levels(page: Page, faces: np.ndarray, shape: tuple[int, ...], scale: float) -> np.ndarray:

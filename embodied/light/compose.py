@@ -16,7 +16,19 @@ from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, Page
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, vector
+from embodied.light.backend import (
+    added_up,
+    array,
+    constant,
+    drjit,
+    flags,
+    floats,
+    fraction,
+    mitsuba,
+    number,
+    vector,
+    wholes,
+)
 from embodied.light.colours import ColourMaps, colour_at, linear, paints_of, shown
 from embodied.light.cover import Cover, Texels, cover, nearest, surface
 from embodied.light.emitters import Lamp, portals_of
@@ -145,7 +157,7 @@ def _painted(
     mi, dr = mitsuba(), drjit()
     if not len(c.index):
         return np.zeros(0, np.uint32), np.zeros(0, np.uint32)
-    face, b1, b2 = mi.UInt32(c.face.astype(np.uint32)), mi.Float(c.b1), mi.Float(c.b2)
+    face, b1, b2 = wholes(c.face), floats(c.b1), floats(c.b2)
     page = composer.solved.atlas.pages[number]
 
     def colours() -> np.ndarray:
@@ -154,11 +166,11 @@ def _painted(
         return np.array(codes)
 
     albedo = once(composer.memory, ("albedo", number), colours)
-    colour = _linear(mi.UInt32(albedo))
+    colour = _linear(wholes(albedo))
     read = _Bilinear(c, page)
     e = read(soft)
     if sun is not None:
-        e += mi.Color3f(*(constant(x) for x in composer.sun)) * mi.Float(sun)
+        e += mi.Color3f(*(constant(x) for x in composer.sun)) * floats(sun)
     radiance = colour * e
     if mirrors is not None:
         metal, tint, dull, sharp, blurred = mirrors
@@ -179,8 +191,8 @@ class _Bilinear:
         mi, dr = mitsuba(), drjit()
         row, column = np.divmod(c.index.astype(np.int32), np.int32(c.shape[1]))
         right, bottom, width, step = (number(x) for x in (page.width - 1, page.height - 1, page.width, page.fineness))
-        at = lambda a, last: dr.clip((mi.Float(a) + 0.5) / mi.Float(step) - 0.5, 0.0, mi.Float(last))
-        x, y = at(column.astype(np.float32), right), at(row.astype(np.float32), bottom)
+        at = lambda a, last: dr.clip((floats(a) + 0.5) / mi.Float(step) - 0.5, 0.0, mi.Float(last))
+        x, y = at(column, right), at(row, bottom)
         x0, y0 = mi.UInt32(x), mi.UInt32(y)
         x1, y1 = dr.minimum(x0 + 1, right), dr.minimum(y0 + 1, bottom)
         fx, fy = x - mi.Float(x0), y - mi.Float(y0)
@@ -191,7 +203,7 @@ class _Bilinear:
     def __call__(self, picture: np.ndarray) -> Array:
         mi, dr = mitsuba(), drjit()
         assert picture.shape[:2] == self._size
-        table, out = mi.Float(np.ascontiguousarray(picture, np.float32).ravel()), mi.Color3f(0.0)
+        table, out = floats(picture), mi.Color3f(0.0)
         for spot, weight in self._terms:
             out += dr.gather(mi.Color3f, table, spot) * weight
         return out
@@ -207,7 +219,7 @@ def _packed(colour: Array) -> Array:
 def _linear(codes: Array) -> Array:
     """The linear colour of packed sRGB."""
     mi, dr = mitsuba(), drjit()
-    table = mi.Float(linear(np.arange(256, dtype=np.float32) / 255))
+    table = floats(linear(np.arange(256, dtype=np.float32) / 255))
     return mi.Color3f(*(dr.gather(mi.Float, table, (codes >> shift) & 255) for shift in (0, 8, 16)))
 
 
@@ -241,7 +253,7 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirror
     if len(i := np.nonzero((~dull & (metal > 0))[c.face])[0]):
         sharp[i] = _mirrored(composer, page, c.face[i], surface(page, c, i), rough[c.face[i]], dull=False)
     tint = np.where((metal > 0) & (rough < 0.02), 0.85, 0.0).astype(np.float32)
-    return mi.Float(metal), mi.Float(tint), mi.Bool(dull), mi.Color3f(vector(sharp)), blurred
+    return floats(metal), floats(tint), flags(dull), mi.Color3f(vector(sharp)), blurred
 
 
 def _mirrored(
@@ -267,8 +279,8 @@ def _mirrored(
     seen, bright = composer.seen
     rays, width = DULL_RAYS if dull else SHARP_RAYS, np.square(rough) + AROUND * dull
     limit = (3.0 if dull else 8.0) * bright  # of a lamp's glint: few rays would find it
-    table = mi.Float(np.minimum(seen, limit).astype(np.float32).ravel())
-    spread_of, straight = mi.Float(width.astype(np.float32)), vector(bounced)
+    table = floats(np.minimum(seen, limit))
+    spread_of, straight = floats(width), vector(bounced)
 
     def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k) + 1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.light.arrays import RayScene
 from embodied.light.atlas import Page
-from embodied.light.backend import drjit, mitsuba, scene_of
+from embodied.light.backend import drjit, floats, mitsuba, scene_of
 from embodied.light.unwrap import face_normals
 
 OFFSETS = (
@@ -127,7 +127,7 @@ def _straight_down(
     if not len(spot):
         return np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)
     row, column = np.divmod(spot.astype(np.int32), np.int32(width))
-    x, y = (mi.Float((a + np.float32(0.5 + o)).astype(np.float32)) for a, o in zip((column, row), offset))
+    x, y = (floats(a + np.float32(0.5 + o)) for a, o in zip((column, row), offset))
     hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(x, y, 1.0), mi.Vector3f(0, 0, -1)), True)
     face = dr.select(hit.is_valid(), mi.Int32(hit.prim_index), -1)
     u, v = hit.prim_uv.x, hit.prim_uv.y

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from embodied.light.arrays import Array
 from embodied.light.atlas import Atlas
-from embodied.light.backend import array, constant, drjit, mitsuba, vector
+from embodied.light.backend import array, constant, drjit, floats, mitsuba, signed, vector, wholes
 from embodied.light.cover import Texels
 
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
@@ -47,15 +47,15 @@ def smooth_pages(
     grid = _Grid(atlas, luxels, chosen)
     if not len(grid.mine):
         return e
-    trust = mi.Float(np.where(good, 1.0, 1e-4).astype(np.float32))
+    trust = floats(np.where(good, 1.0, 1e-4))
     out = np.array(e, np.float32)
     noise, floor = np.zeros(len(e), np.float32), np.zeros(len(grid.mine), np.float32)
     if variance is not None:
         noise[grid.mine], floor = _relative_noise(grid, out, variance)
     for step, like in zip(steps, likeness):
-        values, noises = mi.Float(out.ravel()), mi.Float(noise)
+        values, noises = floats(out), floats(noise)
         own, own_noise = dr.gather(mi.Color3f, values, grid.own), dr.gather(mi.Float, noises, grid.own)
-        least = mi.Float(floor) + 1e-4
+        least = floats(floor) + 1e-4
         shade = dr.log(_brightness(own) + least)
         total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
         tight = 1 / (constant(like**2) + dr.square(NOISES * own_noise))
@@ -85,7 +85,7 @@ def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chos
     grid, out = _Grid(atlas, luxels, chosen), np.zeros(len(e), np.float32)
     if not len(grid.mine):
         return out
-    values = mi.Float(np.ascontiguousarray(e.mean(1), np.float32))
+    values = floats(e.mean(1))
     mean, square, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
         v = dr.gather(mi.Float, values, q, inside)
@@ -104,7 +104,7 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[n
     all missed is no shadow.
     """
     mi, dr = mitsuba(), drjit()
-    values, squares = mi.Float(e.mean(1)), mi.Float(np.asarray(variance, np.float32))
+    values, squares = floats(e.mean(1)), floats(variance)
     mean, spread, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
         mean += dr.gather(mi.Float, values, q, inside)
@@ -119,7 +119,6 @@ class _Grid:
     """Chosen luxels and, on the device, what lies around them on their page in the same plane."""
 
     def __init__(self, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> None:
-        mi = mitsuba()
         sizes = np.array([p.width * p.height for p in atlas.pages])
         base = np.cumsum(sizes) - sizes
         number = np.full(int(sizes.sum()), -1, np.int32)
@@ -128,17 +127,14 @@ class _Grid:
         self.mine = np.nonzero(chosen)[0]
         page = np.searchsorted(np.cumsum(sizes), flat[self.mine], side="right")
         widths = np.array([p.width for p in atlas.pages])[page]
-        i32 = lambda a: mi.Int32(np.ascontiguousarray(a, np.int32))
-        self._number, self._at, self._width = i32(number), i32(flat[self.mine]), i32(widths)
-        self._low, self._high = i32(base[page]), i32(base[page] + sizes[page] - 1)
-        self._column = i32((flat[self.mine] - base[page]) % widths)
+        self._number, self._at, self._width = signed(number), signed(flat[self.mine]), signed(widths)
+        self._low, self._high = signed(base[page]), signed(base[page] + sizes[page] - 1)
+        self._column = signed((flat[self.mine] - base[page]) % widths)
         position = np.concatenate([t.position for t in luxels])
         normal = np.concatenate([t.normal for t in luxels])
-        self._places, self._normals = (
-            mi.Float(np.ascontiguousarray(a, np.float32).ravel()) for a in (position, normal)
-        )
+        self._places, self._normals = (floats(a) for a in (position, normal))
         self._p, self._n = vector(position[self.mine]), vector(normal[self.mine])
-        self.own = mi.UInt32(np.ascontiguousarray(self.mine, np.uint32))
+        self.own = wholes(self.mine)
 
     def around(self, step: int) -> Iterator[tuple[int, int, Array, Array]]:
         """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
@@ -214,17 +210,16 @@ def smooth_sites(
     mi, dr = mitsuba(), drjit()
     if not len(e):
         return e
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
-    places, normals, trust = flat(position), flat(normal), flat(np.where(good, 1.0, 1e-4))
-    ids = [mi.UInt32(np.ascontiguousarray(near[:, j], np.uint32)) for j in range(near.shape[1])]
+    places, normals, trust = floats(position), floats(normal), floats(np.where(good, 1.0, 1e-4))
+    ids = [wholes(near[:, j]) for j in range(near.shape[1])]
     p, n = vector(position), vector(normal)
     reach = dr.norm(dr.gather(mi.Vector3f, places, ids[min(6, len(ids) - 1)]) - p) * 1.5 + 1e-4
     out = np.array(e, np.float32)
     bright = np.maximum(out.mean(1)[near].mean(1), 1e-5)
     noise = np.minimum(np.sqrt(variance[near].mean(1)) / bright, 1.5).astype(np.float32)
-    least = mi.Float((bright * np.minimum(noise, 1.0)).astype(np.float32)) + 1e-4
+    least = floats(bright * np.minimum(noise, 1.0)) + 1e-4
     for _ in range(passes):
-        values, noises = flat(out), flat(noise)
+        values, noises = floats(out), floats(noise)
         own = mi.Color3f(vector(out))
         shade, total, weight, squares = dr.log(_brightness(own) + least), mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
         tight = 1 / (constant(likeness**2) + dr.square(NOISES * noises))

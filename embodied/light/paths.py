@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import constant, drjit, mitsuba
+from embodied.light.backend import constant, drjit, flags, floats, mitsuba, wholes
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
 from embodied.light.sky import Outdoors
@@ -72,9 +72,7 @@ class Surfaces:
 
 def surfaces_of(lux: Luxels) -> Surfaces:
     """Upload; glow that lamps account for is left out."""
-    mi = mitsuba()
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
-    return Surfaces(flat(lux.albedo), flat(np.where(lux.sampled[:, None], 0.0, lux.glow)), flat(lux.normal))
+    return Surfaces(floats(lux.albedo), floats(np.where(lux.sampled[:, None], 0.0, lux.glow)), floats(lux.normal))
 
 
 def lights_of(
@@ -85,7 +83,6 @@ def lights_of(
     Args:
       without: the space without all that belongs to an owner: a bare bulb's own lamp does not stand in its way.
     """
-    mi = mitsuba()
     k = len(portals) + len(lamps)
     zero = np.zeros(3)
     spaces, index = [space], [0] * len(portals)
@@ -104,26 +101,25 @@ def lights_of(
         + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps]
     )
     fill = lambda a: a[np.arange(POINTS) % len(a)]
-    flat = lambda rows: mi.Float(np.ascontiguousarray(np.array(rows, np.float32).reshape(-1)))
     scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
         k,
         centre,
         power,
-        flat([p.corner for p in portals] + none),
-        flat([p.along for p in portals] + none),
-        flat([p.up for p in portals] + none),
-        flat([p.normal for p in portals] + none),
-        flat([p.area * radiosity.GLASS / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
-        flat([zero] * len(portals) + [x.radiance for x in lamps]),
-        flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
-        flat([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
-        flat([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
-        mi.Bool([False] * len(portals) + [not x.normals.any() for x in lamps]),
-        mi.Bool([False] * len(portals) + [True] * len(lamps)),
+        floats([p.corner for p in portals] + none),
+        floats([p.along for p in portals] + none),
+        floats([p.up for p in portals] + none),
+        floats([p.normal for p in portals] + none),
+        floats([p.area * radiosity.GLASS / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
+        floats([zero] * len(portals) + [x.radiance for x in lamps]),
+        floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
+        floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
+        floats([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
+        flags([False] * len(portals) + [not x.normals.any() for x in lamps]),
+        flags([False] * len(portals) + [True] * len(lamps)),
         tuple(spaces),
-        mi.UInt32(index or [0]),
+        wholes(index or [0]),
         scene,
         outdoors.sun_direction,
         outdoors.sun * radiosity.GLASS,
@@ -152,7 +148,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         weights.append(constant(max(power, 1e-6)) / (dr.squared_norm(far) + 0.3))
         whole += weights[-1]
     target, sum_, pick, chance, open_ = (
-        mi.Float(u[0]) * whole,
+        floats(u[0]) * whole,
         mi.Float(0.0),
         mi.UInt32(0),
         mi.Float(1.0),
@@ -164,7 +160,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         pick, chance = dr.select(here, i, pick), dr.select(here, w / whole, chance)
         open_ &= ~here
     dr.eval(pick, chance)
-    a, b = mi.Float(u[1]), mi.Float(u[2])
+    a, b = floats(u[1]), floats(u[2])
     at = lambda t: dr.gather(mi.Vector3f, t, pick)
     lamp, bare = dr.gather(mi.Bool, lights.lamp, pick), dr.gather(mi.Bool, lights.bare, pick)
     spot = pick * POINTS + dr.minimum(mi.UInt32(a * POINTS), POINTS - 1)
@@ -206,10 +202,10 @@ def irradiance(
         p = _turned(p, rng)
         total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)
         u = rng.random((4, p.n), np.float32)
-        side = dr.select(p.thin & (mi.Float(u[2]) < 0.5), -1.0, 1.0)
+        side = dr.select(p.thin & (floats(u[2]) < 0.5), -1.0, 1.0)
         out = p.face_normal * side
         d = mi.Frame3f(p.normal * side).to_world(
-            mi.warp.square_to_cosine_hemisphere(mi.Point2f(mi.Float(u[0]), mi.Float(u[1])))
+            mi.warp.square_to_cosine_hemisphere(mi.Point2f(floats(u[0]), floats(u[1])))
         )
         rise = dr.dot(d, out)
         d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
@@ -225,7 +221,7 @@ def irradiance(
         )
         if depth >= 2:
             keep = dr.clip(dr.max(throughput) * 1.5, 0.05, 0.95)
-            alive &= mi.Float(u[3]) < keep
+            alive &= floats(u[3]) < keep
             throughput = throughput / keep
         dr.eval(total, throughput, alive, q.position, q.normal, q.face_normal, q.thin)
         p = q
@@ -247,6 +243,5 @@ def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Poi
 
 
 def _turned(p: Points, rng: np.random.Generator) -> Points:
-    mi = mitsuba()
     turn = rng.random((2, p.n), np.float32)
-    return Points(p.n, p.position, p.normal, p.face_normal, p.thin, mi.Float(turn[0]), mi.Float(turn[1]))
+    return Points(p.n, p.position, p.normal, p.face_normal, p.thin, floats(turn[0]), floats(turn[1]))

@@ -17,7 +17,20 @@ import numpy as np
 from embodied.geometry import r2
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.atlas import Atlas
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, number, scene_of, vector
+from embodied.light.backend import (
+    added_up,
+    array,
+    constant,
+    drjit,
+    flags,
+    floats,
+    fraction,
+    mitsuba,
+    number,
+    scene_of,
+    vector,
+    wholes,
+)
 from embodied.light.cover import Texels, nearest
 from embodied.light.emitters import GLASS, Lamp, Portal
 from embodied.light.memory import Memory
@@ -53,9 +66,9 @@ def points_of(
         mi.Point3f(vector(position)),
         vector(normal),
         vector(face_normal),
-        mi.Bool(np.ascontiguousarray(thin)),
-        mi.Float(turn[0]),
-        mi.Float(turn[1]),
+        flags(thin),
+        floats(turn[0]),
+        floats(turn[1]),
     )
     dr.eval(p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
     return p
@@ -95,33 +108,30 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray | None = No
       luxels: what lies under each page at fineness 1.
       env: outdoor radiance picture (h, 2h, 3); black if None.
     """
-    mi = mitsuba()
     corners = np.concatenate([p.corners for p in atlas.pages])
     page = np.concatenate([np.full(len(p.corners), i) for i, p in enumerate(atlas.pages)])
     keep = np.nonzero(~np.array([p.glass for p in atlas.pages])[page])[0]
     xy = np.concatenate([p.luxels for p in atlas.pages])[keep]
     thin = np.concatenate([p.thin for p in atlas.pages])[keep]
     sizes = np.array([p.width * p.height for p in atlas.pages])
-    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     return Space(
         scene_of(corners[keep]),
         keep,
-        u32(page[keep]),
-        flat(xy),
-        flat(face_normals(corners[keep])),
-        mi.Bool(np.ascontiguousarray(thin)),
-        u32([p.width for p in atlas.pages]),
-        u32([p.height for p in atlas.pages]),
-        u32(np.cumsum(sizes) - sizes),
-        u32(nearest_luxel(atlas, luxels)),
-        flat(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3)) if env is None else _small(env)),
+        wholes(page[keep]),
+        floats(xy),
+        floats(face_normals(corners[keep])),
+        flags(thin),
+        wholes([p.width for p in atlas.pages]),
+        wholes([p.height for p in atlas.pages]),
+        wholes(np.cumsum(sizes) - sizes),
+        wholes(nearest_luxel(atlas, luxels)),
+        floats(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3)) if env is None else _small(env)),
     )
 
 
 def with_env(space: Space, env: np.ndarray) -> Space:
     """The same space below another sky (h, 2h, 3)."""
-    return replace(space, env=mitsuba().Float(np.ascontiguousarray(_small(env), np.float32).ravel()))
+    return replace(space, env=floats(_small(env)))
 
 
 def without(space: Space, atlas: Atlas, owner: str) -> Space:
@@ -203,9 +213,9 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
     """e (a Color3f) from one lamp."""
     mi, dr = mitsuba(), drjit()
     bare, count = not lamp.normals.any(), number(len(lamp.points))
-    at = mi.Float(np.ascontiguousarray(lamp.points, np.float32).ravel())
-    out = mi.Float(np.ascontiguousarray(lamp.normals, np.float32).ravel())
-    weights = mi.Float(np.ascontiguousarray(lamp.weights, np.float32))
+    at = floats(lamp.points)
+    out = floats(lamp.normals)
+    weights = floats(lamp.weights)
     strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
@@ -274,10 +284,9 @@ class Patches:
 def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
     """(n, 3) e from sunlit patches, the same ones for all points and so free of noise."""
     mi, dr = mitsuba(), drjit()
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     lift = np.where(patches.thin[:, None], 0.0, LIFT)
-    places, normals = flat(patches.position + patches.normal * lift), flat(patches.normal)
-    both, flux, extent = mi.Bool(np.ascontiguousarray(patches.thin)), flat(patches.flux), flat(patches.extent)
+    places, normals = floats(patches.position + patches.normal * lift), floats(patches.normal)
+    both, flux, extent = flags(patches.thin), floats(patches.flux), floats(patches.extent)
 
     def one(k: Array) -> tuple[Array, ...]:
         d = dr.gather(mi.Point3f, places, k) - p.position
@@ -313,7 +322,7 @@ def gather(
       variance of the mean brightness.
     """
     mi, dr = mitsuba(), drjit()
-    b = mi.Float(np.ascontiguousarray(radiosity, np.float32).ravel())
+    b = floats(radiosity)
     meet = _rays(space, p, first)
     none, black = dr.zeros(mi.Float, p.n), dr.zeros(mi.Color3f, p.n)
     if memory is None:

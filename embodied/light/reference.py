@@ -11,7 +11,7 @@ import numpy as np
 from embodied.house.house import House
 from embodied.light import paths, radiosity
 from embodied.light.arrays import Array, Ray, Triple
-from embodied.light.backend import array, drjit, mitsuba
+from embodied.light.backend import array, drjit, floats, mitsuba
 from embodied.light.files import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
@@ -138,9 +138,9 @@ class Tracer:
 
     def _traced(self, hit: Hit, ray: Ray, rng: np.random.Generator) -> Array:
         """e at first hits by path tracing."""
-        mi, world = mitsuba(), self._world
+        world = self._world
         n = len(np.asarray(hit.distance))
-        zero = mi.Float(np.zeros(n, np.float32))
+        zero = floats(np.zeros(n, np.float32))
         points = Points(n, hit.position, hit.normal, hit.normal, hit.thin, zero, zero)
         return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng)
 
@@ -156,10 +156,10 @@ class Tracer:
         n = len(np.asarray(hit.distance))
         u = rng.random((2, n), np.float32)
         a = dr.maximum(dr.square(rough), 1e-3)
-        u0 = mi.Float(u[0]) * 0.98  # the lobe's far tail is left out: one ray in fifty there is noise, not gloss
+        u0 = floats(u[0]) * 0.98  # the lobe's far tail is left out: one ray in fifty there is noise, not gloss
         cos = dr.sqrt((1 - u0) / (1 + (dr.square(a) - 1) * u0))
         sin = dr.sqrt(dr.maximum(1 - dr.square(cos), 0))
-        phi = dr.two_pi * mi.Float(u[1])
+        phi = dr.two_pi * floats(u[1])
         half = mi.Frame3f(hit.normal).to_world(mi.Vector3f(sin * dr.cos(phi), sin * dr.sin(phi), cos))
         c = dr.maximum(-dr.dot(ray.d, half), 0)
         d = ray.d + 2 * c * half
@@ -232,5 +232,5 @@ def _camera_rays(
     sx = ((x + jitter[0]) / w * 2 - 1) * t * w / h
     sy = (1 - (y + jitter[1]) / h * 2) * t
     v = lambda a: mi.Vector3f(*(float(k) for k in a))
-    d = v(f) + v(right) * mi.Float(sx.ravel().astype(np.float32)) + v(u) * mi.Float(sy.ravel().astype(np.float32))
+    d = v(f) + v(right) * floats(sx) + v(u) * floats(sy)
     return mi.Ray3f(mi.Point3f(*(float(k) for k in position)), dr.normalize(d))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from embodied.light.arrays import Array
-from embodied.light.backend import array, drjit, mitsuba, vector
+from embodied.light.backend import array, drjit, floats, mitsuba, vector, wholes
 from embodied.light.denoise import neighbours
 
 if TYPE_CHECKING:
@@ -95,20 +95,15 @@ class Spread:
     def __init__(self, sites: Sites, position: np.ndarray, normal: np.ndarray, good: np.ndarray) -> None:
         """`position` and `normal`, (n, 3), of all luxels; `good`, (k,) bool, sites whose light counts where there are
         any."""
-        flat = lambda a: mitsuba().Float(np.ascontiguousarray(a, np.float32).ravel())
         self._sites, self._position, self._normal = sites, position, normal
-        self._around = mitsuba().UInt32(np.ascontiguousarray(sites.around, np.uint32).ravel())
-        self._places, self._facing, self._reach = flat(sites.position), flat(sites.normal), flat(sites.spacing * REACH)
-        self._trust = flat(np.where(good, 1.0, 1e-3))
+        self._around = wholes(sites.around)
+        self._places, self._facing = floats(sites.position), floats(sites.normal)
+        self._reach, self._trust = floats(sites.spacing * REACH), floats(np.where(good, 1.0, 1e-3))
 
     def __call__(self, values: np.ndarray, i: np.ndarray | None = None) -> np.ndarray:
         """Values (k, 3) of sites at luxels `i` (all by default): (m, 3) float32."""
         mi, dr = mitsuba(), drjit()
-        table, total, weight = (
-            mi.Float(np.ascontiguousarray(values, np.float32).ravel()),
-            mi.Color3f(0.0),
-            mi.Float(0.0),
-        )
+        table, total, weight = (floats(values), mi.Color3f(0.0), mi.Float(0.0))
         for site, w in self._weights(i):
             total += dr.gather(mi.Color3f, table, site) * w
             weight += w
@@ -117,7 +112,7 @@ class Spread:
     def moments(self, values: np.ndarray, i: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Mean and standard deviation (m,) of numbers (k,) among the sites that luxels `i` take their light from."""
         mi, dr = mitsuba(), drjit()
-        table = mi.Float(np.ascontiguousarray(values, np.float32))
+        table = floats(values)
         total, squares, weight = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
         for site, w in self._weights(i):
             v = dr.gather(mi.Float, table, site)
@@ -132,7 +127,7 @@ class Spread:
     def _weights(self, which: np.ndarray | None) -> Iterator[tuple[Array, Array]]:
         mi, dr = mitsuba(), drjit()
         i: Any = slice(None) if which is None else which
-        own = mi.UInt32(np.ascontiguousarray(self._sites.own[i], np.uint32))
+        own = wholes(self._sites.own[i])
         p, n = vector(self._position[i]), vector(self._normal[i])
         reach = dr.gather(mi.Float, self._reach, own)
         for k in range(self._sites.around.shape[1]):

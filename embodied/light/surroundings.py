@@ -13,7 +13,7 @@ from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Atlas, atlas_of, things_of
-from embodied.light.backend import added_up, array, constant, drjit, fraction, mitsuba, scene_of, vector
+from embodied.light.backend import added_up, array, constant, drjit, floats, fraction, mitsuba, scene_of, vector
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.compose import spread
 from embodied.light.cover import Texels, cover, rasterise
@@ -86,7 +86,7 @@ def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndar
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
     rows = outdoors.picture.shape[0] // ENV_ROWS
     small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)
-    space = sky_alone(scene, mi.Float(small.ravel()))
+    space = sky_alone(scene, floats(small))
     hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
 
     def one(k: Array) -> tuple[Array, ...]:

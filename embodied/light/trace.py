@@ -10,7 +10,7 @@ import numpy as np
 from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import drjit, mitsuba, scene_of
+from embodied.light.backend import drjit, flags, floats, mitsuba, scene_of, wholes
 from embodied.light.colours import linear
 from embodied.light.emitters import Lamp, portals_of
 from embodied.light.files import Bake
@@ -125,9 +125,6 @@ def _pages_of(bake: Bake, own: int, sun: np.ndarray) -> _Pages:
 
 def world_of(bake: Bake, house: House) -> BakedScene:
     """Upload a bake."""
-    mi = mitsuba()
-    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     lit = bake.lit
     with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
         gloss = [z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
@@ -148,18 +145,18 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     space = Space(
         scene_of(corners),
         np.arange(len(corners)),
-        u32(page),
-        flat(xy),
-        flat(face_normals(corners.astype(np.float64))),
-        mi.Bool(thin),
-        u32(lw),
-        u32(lh),
-        u32(np.cumsum(lw * lh) - lw * lh),
-        u32(np.arange(int((lw * lh).sum()))),
-        flat(_coarse(sun.picture)),
+        wholes(page),
+        floats(xy),
+        floats(face_normals(corners.astype(np.float64))),
+        flags(thin),
+        wholes(lw),
+        wholes(lh),
+        wholes(np.cumsum(lw * lh) - lw * lh),
+        wholes(np.arange(int((lw * lh).sum()))),
+        floats(_coarse(sun.picture)),
     )
     dark = np.zeros_like(pages.coarse_glow)
-    surfaces = Surfaces(flat(pages.coarse_albedo), flat(dark if sampled else pages.coarse_glow), flat(dark))
+    surfaces = Surfaces(floats(pages.coarse_albedo), floats(dark if sampled else pages.coarse_glow), floats(dark))
     without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
     lights = lights_of(space, without, portals_of(house), _lamps(bake), sun)
     return BakedScene(
@@ -167,17 +164,17 @@ def world_of(bake: Bake, house: House) -> BakedScene:
         surfaces,
         lights,
         owner,
-        mi.Bool(outer),
-        flat(np.concatenate([g for _, g in solid]) / 255),
-        flat(uv),
-        u32(page),
-        u32(pages.sizes.ravel()),
-        u32(np.cumsum(texels) - texels),
-        flat(pages.albedo),
-        flat(pages.light),
-        flat(pages.glow) if pages.glow.any() else None,
-        flat(lit.pages[-1] / 255),
-        flat(sun.picture),
+        flags(outer),
+        floats(np.concatenate([g for _, g in solid]) / 255),
+        floats(uv),
+        wholes(page),
+        wholes(pages.sizes.ravel()),
+        wholes(np.cumsum(texels) - texels),
+        floats(pages.albedo),
+        floats(pages.light),
+        floats(pages.glow) if pages.glow.any() else None,
+        floats(lit.pages[-1] / 255),
+        floats(sun.picture),
         sun.picture.shape[0],
         bake.exposure,
         sun,
@@ -202,9 +199,6 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
     clear = [m for m in lit.meshes if m.alpha < 0.9 and len(m.faces)]
     if not clear:
         return None
-    mi = mitsuba()
-    u32 = lambda a: mi.UInt32(np.ascontiguousarray(a, np.uint32))
-    flat = lambda a: mi.Float(np.ascontiguousarray(a, np.float32).ravel())
     each = lambda value: np.concatenate([np.full(len(m.faces), value(m)) for m in clear])
     corners = np.concatenate([m.vertices[m.faces] for m in clear])
     used = {p: k for k, p in enumerate(sorted({m.page for m in clear}))}
@@ -213,14 +207,14 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
     texels = size.prod(1)
     return Panes(
         scene_of(corners),
-        flat(face_normals(corners.astype(np.float64))),
-        flat(np.concatenate([m.uv[m.faces] for m in clear])),
-        flat(each(lambda m: m.alpha)),
+        floats(face_normals(corners.astype(np.float64))),
+        floats(np.concatenate([m.uv[m.faces] for m in clear])),
+        floats(each(lambda m: m.alpha)),
         each(lambda m: number.get(m.owner, 0)).astype(np.int32),
-        u32(each(lambda m: used[m.page])),
-        u32(size.ravel()),
-        u32(np.cumsum(texels) - texels),
-        flat(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
+        wholes(each(lambda m: used[m.page])),
+        wholes(size.ravel()),
+        wholes(np.cumsum(texels) - texels),
+        floats(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
     )
 
 

@@ -21,7 +21,7 @@ from assets.closure import code_digest
 from assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, drjit, fraction, mitsuba, scene_of, vector
+from embodied.light.backend import added_up, drjit, floats, fraction, mitsuba, scene_of, vector
 
 T = TypeVar("T")
 APART = ("assets", "assets.data", "embodied", "embodied.light")
@@ -293,7 +293,7 @@ def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarr
     mi, dr = mitsuba(), drjit()
     scene, n, centre = scene_of(corners), vector(face_normals(corners)), vector(corners.mean(1))
     turn = np.random.default_rng(0).random((2, len(corners)), np.float32)
-    r0, r1 = mi.Float(turn[0]), mi.Float(turn[1])
+    r0, r1 = floats(turn[0]), floats(turn[1])
     reach = max(1e-5, 1e-4 * float(np.ptp(corners.reshape(-1, 3), axis=0).max()))
     shares = []
     for side in (1.0, -1.0):
