@@ -14,15 +14,16 @@ import torch
 from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
 from agents.hanna.run import split_of
-from agents.vision.run import encoder_of
-from assets.cache import write_json
+from agents.vision.config import Looked
+from agents.vision.run import encoder_of, pictures_of
+from assets.cache import digest, write_json
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, as_json, markdown, save
 from embodied.interface import Agent, Episode, Place
 from embodied.locks import locked
-from embodied.records import episodes_file, save_lines
+from embodied.records import episodes_file, fingerprint, save_lines
 
 Note = Callable[[str], None]
 Places = Mapping[str, Place]
@@ -38,6 +39,8 @@ def run_eval(
 ) -> int:
     """Tables 4.3 to 4.5 for one agent and the agents without learning, and why its episodes fail.
 
+    What it was made with goes to run.json, also how the pictures were drawn that the agent looked at.
+
     Args:
       watch: wraps the iterator over agent names (a progress bar).
 
@@ -48,10 +51,14 @@ def run_eval(
     data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
     rows: list[Row] = []
     extra: dict[str, object] = {}
+    looked = Looked()
     with locked(args.out) if args.out else contextlib.nullcontext():
         for split in args.split or ("test_unseen",):
             whole, bank = data.split(split), split_of(data, split, encoder, quality=args.quality).bank
-            judged = _asked_for({**_without_learning(), **hanna_policies(agent, bank)}, args.only)
+            learned = hanna_policies(agent, bank)
+            judged = _asked_for({**_without_learning(), **learned}, args.only)
+            drawn = {n: pictures_of(data, n, args.quality) for n in whole.worlds}
+            looked = Looked(tuple(learned), {**looked.pictures, **drawn})
 
             def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds: Places = whole.worlds) -> None:
                 if args.out:
@@ -64,6 +71,16 @@ def run_eval(
         if args.out:
             save(rows, args.out, "table")
             write_json(args.out / "behaviour.json", facts, indent=1)
+            about_run = fingerprint(
+                data=data.digest,
+                encoder=encoder.digest,
+                agent=digest(args.agent),
+                seed=args.seed,
+                tasks=args.tasks,
+                looking=looked.looking,
+                pictures={name: dataclasses.asdict(p) for name, p in looked.pictures.items()},
+            )
+            write_json(args.out / "run.json", about_run, indent=1)
     for text in (json.dumps(facts, indent=1),) if args.json else (markdown(rows, COLUMNS), json.dumps(extra, indent=1)):
         note(text)
     return 0

@@ -84,8 +84,8 @@ embodied.datasets <- embodied.locks assets.catalogue embodied.house embodied.nav
     embodied.interface embodied.action_spaces embodied.language embodied.records embodied.render embodied.mattersim
     embodied.teachers embodied.tasks embodied.world embodied.assistants embodied.envs
 embodied.bench <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.generate
-    embodied.interface embodied.language embodied.render embodied.light embodied.mattersim embodied.tasks
-    embodied.world embodied.assistants embodied.envs embodied.datasets embodied.gym
+    embodied.interface embodied.records embodied.language embodied.render embodied.light embodied.mattersim
+    embodied.tasks embodied.world embodied.assistants embodied.envs embodied.datasets embodied.gym
 embodied.evaluation <- embodied.navigation embodied.interface embodied.policies embodied.envs
     embodied.datasets
 embodied.gym <- assets.catalogue embodied.house embodied.generate embodied.interface embodied.language embodied.render

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import re
@@ -13,19 +14,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 
+from agents.vision import features
+from agents.vision.config import PLAIN
+from assets.cache import digest
 from assets.catalogue import load_catalogue
-from embodied.cli import main
+from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.metrics import spl, success
 from embodied.evaluation.rollout import play, rollout
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
+from embodied.interface import Pose
 from embodied.language import People
 from embodied.policies.baselines import RandomWalk, Shortest
+from embodied.render.panorama import Panorama
+from embodied.render.pictures import PictureSettings
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
-from viz.blueprint import episode_blueprint
+from viz import recording
+from viz.blueprint import episode_blueprint, sees_title
 from viz.recording import Pictures, camera_axes, record
 from viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
 from viz.video import camera_track, write_video
@@ -69,6 +78,43 @@ def test_the_expert_finds_everything_and_a_random_walker_little(world):
     lost = play(make, RandomWalk(), tasks, seed=0)
     assert all(success(e, world.graph) == 1.0 and spl(e, world.graph) == pytest.approx(1.0) for e in expert)
     assert np.mean([success(e, world.graph) for e in lost]) < 0.6
+
+
+def jpeg(image: rr.EncodedImage) -> str:
+    """Digest of a logged picture's bytes."""
+    return digest(bytes(image.blob.as_arrow_array().to_pylist()[0]))
+
+
+def test_the_recording_shows_the_panoramas_that_the_agents_features_come_from(shared_cache, tmp_path, monkeypatch):
+    """Of the trained agent in the demo; what people are shown beside it is drawn otherwise (here: at another size)."""
+    fed: list[Panorama] = []
+    poses: list[Pose] = []
+    logged: dict[str, list[str]] = {"agent/camera/image": [], "view/lit": []}
+    strip_of, log_sight, log = features.strip_of, recording.log_sight, rr.RecordingStream.log
+
+    def watched_log(stream, path, *parts, **more):
+        if path in logged:
+            logged[path].append(jpeg(parts[-1]))
+        log(stream, path, *parts, **more)
+
+    monkeypatch.setattr(features, "strip_of", lambda p: (fed.append(p), strip_of(p))[1])
+    monkeypatch.setattr(recording, "log_sight", lambda r, v, pose: (poses.append(pose), log_sight(r, v, pose))[1])
+    monkeypatch.setattr(rr.RecordingStream, "log", watched_log)
+    catalogue = load_catalogue(shared_cache)
+    args = argparse.Namespace(seed=2, task=0, cache=shared_cache, out=tmp_path)
+    house, graph, routes = demo.inhabited(generate_house(2, SMALL, catalogue), catalogue, args)
+    with open_world(house, catalogue, shared_cache, graph=graph, size=48) as world:
+        facts = demo.ask_for_help(args, world, routes, ())
+        people = [jpeg(recording.ahead(world.panorama(p.node), p, Pictures())) for p in poses]
+    agent = [jpeg(recording.ahead(fed[p.node], p, Pictures())) for p in poses]
+    assert len(fed) == len(graph.ids) and len(poses) == facts["steps"] + 1
+    assert logged == {"agent/camera/image": agent, "view/lit": people} and agent != people
+
+
+def test_the_picture_says_how_it_was_drawn_or_that_nobody_looks_at_it():
+    assert sees_title(PLAIN) == "What the agent sees: without light"
+    assert sees_title(PictureSettings(quality="normal")) == "What the agent sees: lit"
+    assert "looks at no pictures" in sees_title(None)
 
 
 def test_a_broken_recording_leaves_no_file(world, tmp_path):

@@ -8,10 +8,28 @@ from rerun.blueprint.encodings import TextLogColumn
 
 from embodied.house.house import House
 from embodied.interface import Ask, Episode
+from embodied.render.pictures import PictureSettings
+
+LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "glossy": "lit, with reflections"}
+"""How a house is drawn, for people."""
 
 
-def blueprint_of(house: House, episode: Episode) -> rrb.Blueprint:
-    """The layout for a finished episode: shows an assistant's image and probabilities where it has them."""
+def sees_title(seen: PictureSettings | None) -> str:
+    """Name of the picture along the agent's gaze: how it is drawn, or that the agent looks at none."""
+    if seen is None:
+        return "Ahead of the agent, which looks at no pictures"
+    return f"What the agent sees: {LIGHT.get(seen.quality, seen.quality)}"
+
+
+def blueprint_of(
+    house: House, episode: Episode, seen: PictureSettings | None = None, *, shown: bool = False
+) -> rrb.Blueprint:
+    """The layout for a finished episode: shows an assistant's image and probabilities where it has them.
+
+    Args:
+      seen: how the pictures are drawn that the agent looks at; None if it looks at none.
+      shown: the recording also holds pictures for people.
+    """
     asked = any(isinstance(s.action, Ask) for s in episode.steps)
     pictured = any(s.reply is not None and s.reply.image is not None for s in episode.steps)
     thought = any(s.action.thought is not None and s.action.thought.asks for s in episode.steps)
@@ -21,11 +39,20 @@ def blueprint_of(house: House, episode: Episode) -> rrb.Blueprint:
         target=pictured,
         probabilities=thought,
         stack=episode.task.kind == "hari",
+        sees=sees_title(seen),
+        lit=shown,
     )
 
 
 def episode_blueprint(
-    house: House, *, dialogue: bool = True, target: bool = False, probabilities: bool = False, stack: bool = False
+    house: House,
+    *,
+    dialogue: bool = True,
+    target: bool = False,
+    probabilities: bool = False,
+    stack: bool = False,
+    sees: str = "What the agent sees",
+    lit: bool = False,
 ) -> rrb.Blueprint:
     """The house in 3D on the left, what the agent sees and hears on the right, plots below.
 
@@ -35,11 +62,14 @@ def episode_blueprint(
       target: show the image that an assistant sent.
       probabilities: plot the policy's own probabilities.
       stack: show HARI's goals.
+      sees: name of the picture along the agent's gaze.
+      lit: show the same view as people are to see it.
     """
     world = _house_view(house)
-    sees = rrb.Spatial2DView(origin="/agent/camera/image", name="What the agent sees")
+    ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees)
     panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
-    looks = [sees, rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else [sees]
+    for_people = [rrb.Spatial2DView(origin="/view/lit", name="The same, lit, for you")] if lit else []
+    sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
     texts = [
         rrb.TextDocumentView(origin="/text/request", name="Request"),
         rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
@@ -52,8 +82,8 @@ def episode_blueprint(
     plots = _plots(probabilities)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
-        rrb.Horizontal(*looks),
-        panorama,
+        rrb.Horizontal(ahead, *(for_people or sent)),
+        rrb.Horizontal(panorama, *sent) if for_people and sent else panorama,
         rrb.Horizontal(*texts),
         *([said] if dialogue else []),
         row_shares=[5, 3, 2, *([3] if dialogue else [])],

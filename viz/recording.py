@@ -3,7 +3,7 @@
 Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
-  agent/path, agent/route  walked, spoken of       view/panorama, view/target
+  agent/path, agent/route  walked, spoken of       view/panorama, view/target, view/lit
   text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, probabilities     events   a log
 """
@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Sight, Step, Stop, Task
 from embodied.navigation.free_space import EYE
+from embodied.render.panorama import Panorama
 from embodied.world import World
 from viz.blueprint import blueprint_of
 from viz.house3d import light_meshes, lit_meshes, log_house
@@ -55,12 +56,31 @@ class Pictures:
     """JPEG quality, 1 to 100."""
 
 
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Where the pictures in a recording come from."""
+
+    seen: World
+    """The house as the agent sees it: its features come from these very panoramas, where it looks at any."""
+    shown: World | None
+    """The same house as people are to see it; None where that is no other."""
+    sizes: Pictures
+
+
+def views_of(world: World, eyes: World | None, sizes: Pictures = Pictures()) -> Views:
+    """Pictures as an agent with `eyes` sees them, or of `world` without; also of `world` if it is drawn otherwise."""
+    if eyes is None or eyes.pictures == world.pictures:
+        return Views(eyes or world, None, sizes)
+    return Views(eyes, world, sizes)
+
+
 def record(
     recording: rr.RecordingStream,
     world: World,
     task: Task,
     steps: Iterable[Step],
     *,
+    eyes: World | None = None,
     pictures: Pictures = Pictures(),
     with_house: bool = True,
 ) -> Iterator[Step]:
@@ -71,6 +91,7 @@ def record(
       world: the world of the task; its panoramas are drawn when a step needs them.
       task: what is being played.
       steps: the steps of one episode as they happen.
+      eyes: the world whose panoramas the agent looks at; None for an agent that looks at none.
       pictures: sizes of the pictures.
       with_house: False when the recording holds the house already.
 
@@ -80,32 +101,39 @@ def record(
     if with_house:
         log_world(recording, world)
     log_task(recording, world, task)
-    state = Story(task)
+    state, views = Story(task), views_of(world, eyes, pictures)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
-        log_step(recording, world, task, step, state, pictures)
+        log_step(recording, world, task, step, state, views)
         yield step
     if state.last is not None:
         recording.set_time("step", sequence=state.count)
-        log_end(recording, world, task, state, state.last.next_pose, pictures)
+        log_end(recording, world, task, state, views)
 
 
 def record_episode(
-    world: World, episode: Episode, sinks: Sinks, *, watch: Callable[[Sequence[Step]], Iterable[Step]] = iter
+    world: World,
+    episode: Episode,
+    sinks: Sinks,
+    *,
+    eyes: World | None = None,
+    watch: Callable[[Sequence[Step]], Iterable[Step]] = iter,
 ) -> None:
     """Record a finished episode of `world`, with the layout that suits it.
 
     Args:
+      eyes: the world whose panoramas the agent's features were made from; what it sees is drawn from them, and
+        said to be. None for an agent that looks at no pictures.
       watch: wraps the iterator over steps (a progress bar).
 
     Raises:
       OSError: the file could not be written to its end, or a viewer went away.
     """
     about = {name: str(value) for name, value in world.fingerprint.items()}
-    with open_recording(
-        sinks, blueprint_of(world.house, episode), name=episode.task.request, properties=about
-    ) as recording:
-        for _ in record(recording, world, episode.task, watch(episode.steps)):
+    seen = None if eyes is None else eyes.pictures
+    layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
+    with open_recording(sinks, layout, name=episode.task.request, properties=about) as recording:
+        for _ in record(recording, world, episode.task, watch(episode.steps), eyes=eyes):
             pass
 
 
@@ -172,11 +200,9 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         )
 
 
-def log_step(
-    recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, pictures: Pictures
-) -> None:
+def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, views: Views) -> None:
     """One step: what is seen before the action, then the action and the reply to it."""
-    log_sight(recording, world, step.pose.node, step.pose.yaw, step.pose.pitch, pictures)
+    log_sight(recording, views, step.pose)
     goal_distance = min(float(world.graph.distance[step.pose.node, g]) for g in task.goal_nodes)
     recording.log("plot/distance/goal", rr.Scalars(goal_distance))
     if step.targets and tuple(step.targets) != tuple(task.goal_nodes):
@@ -193,14 +219,14 @@ def log_step(
     recording.log("plot/requests", rr.Scalars(state.requests))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
     recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
-    log_aim(recording, world, state, pictures)
+    log_aim(recording, world, state, views)
 
 
-def log_end(
-    recording: rr.RecordingStream, world: World, task: Task, state: Story, end: Pose, pictures: Pictures
-) -> None:
-    """Where it ended, and whether that was right."""
-    log_sight(recording, world, end.node, end.yaw, end.pitch, pictures)
+def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Story, views: Views) -> None:
+    """Where it ended, and whether that was right; `state` has seen a step."""
+    assert state.last is not None
+    end = state.last.next_pose
+    log_sight(recording, views, end)
     log_path(recording, world, state.nodes)
     distance = min(float(world.graph.distance[end.node, g]) for g in task.goal_nodes)
     recording.log("plot/distance/goal", rr.Scalars(distance))
@@ -210,16 +236,15 @@ def log_end(
     recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
 
 
-def log_sight(
-    recording: rr.RecordingStream, world: World, node: int, yaw: float, pitch: float, pictures: Pictures
-) -> None:
+def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     """The agent's pose, what it sees ahead, and the panorama around it with its gaze in the middle."""
-    panorama = world.panorama(node)
-    height, width = pictures.view
-    view = panorama.view_rgb(yaw, pitch, VFOV, pictures.view)
+    world, sizes = views.seen, views.sizes
+    panorama = world.panorama(pose.node)
+    height, width = sizes.view
+    eye = world.graph.positions[pose.node]
     recording.log(
         "agent/camera",
-        rr.Transform3D(translation=world.graph.positions[node], quaternion=rr.Quaternion(xyzw=camera_turn(yaw, pitch))),
+        rr.Transform3D(translation=eye, quaternion=rr.Quaternion(xyzw=camera_turn(pose.yaw, pose.pitch))),
     )
     recording.log(
         "agent/camera/image",
@@ -231,18 +256,24 @@ def log_sight(
             image_plane_distance=0.6,
             color=PALETTE["agent"],
         ),
-        encoded(view, pictures.jpeg),
+        ahead(panorama, pose, sizes),
     )
-    equirect = panorama.equirect(pictures.panorama)
-    shift = round(yaw / (2 * np.pi) * equirect.shape[1])
-    recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), pictures.jpeg))
-    eye = world.graph.positions[node]
+    if views.shown is not None:
+        recording.log("view/lit", ahead(views.shown.panorama(pose.node), pose, sizes))
+    equirect = panorama.equirect(sizes.panorama)
+    shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])
+    recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), sizes.jpeg))
     recording.log(
         "agent/body",
         rr.Capsules3D(
             lengths=1.0, radii=0.2, translations=[on_floor(eye, HEIGHTS["body"])], colors=(*PALETTE["agent"], 200)
         ),
     )
+
+
+def ahead(panorama: Panorama, pose: Pose, sizes: Pictures) -> rr.EncodedImage:
+    """The first-person view from a panorama along the gaze."""
+    return encoded(panorama.view_rgb(pose.yaw, pose.pitch, VFOV, sizes.view), sizes.jpeg)
 
 
 def on_floor(eyes: np.ndarray, height: float) -> np.ndarray:
@@ -256,10 +287,11 @@ def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> N
     recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
 
 
-def log_aim(recording: rr.RecordingStream, world: World, state: Story, pictures: Pictures) -> None:
+def log_aim(recording: rr.RecordingStream, world: World, state: Story, views: Views) -> None:
     """The route that the agent was told and the picture of what it looks for, while they hold."""
     if state.image is not None:
-        recording.log("view/target", encoded(sight_picture(world, state.image, pictures.panorama), pictures.jpeg))
+        picture = sight_picture(views.seen, state.image, views.sizes.panorama)
+        recording.log("view/target", encoded(picture, views.sizes.jpeg))
     if state.route:
         nodes = list(state.route if len(state.route) > 1 else 2 * state.route)
         points = on_floor(world.graph.positions[nodes], HEIGHTS["route"])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from embodied.render.pictures import PictureSettings
 
@@ -18,6 +19,20 @@ def drawing(pictures: PictureSettings) -> str:
     lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
     other = () if pictures.backend == "classic" else (pictures.backend,)
     return "_".join([pictures.quality, *map(str, lit), *other, str(pictures.size)])
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What the agents of a judgement looked at; part of its run.json."""
+
+    looking: tuple[str, ...] = ()
+    """Rows whose agents look at pictures."""
+    pictures: Mapping[str, PictureSettings] = field(default_factory=dict)
+    """How those are drawn, by house."""
+
+    def by(self, agent: str, house: str) -> PictureSettings | None:
+        """How the pictures of `house` were drawn that `agent` looked at; None if it looked at none that are known."""
+        return self.pictures.get(house) if agent in self.looking else None
 
 
 @dataclass(frozen=True)

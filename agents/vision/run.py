@@ -121,7 +121,7 @@ def _strips_path(args: argparse.Namespace, name: str) -> Path:
 
 
 def _draw_strips(data: Dataset, name: str, args: argparse.Namespace) -> str:
-    with _drawn_world(data, name, args.cache, PLAIN) as world:
+    with drawn_world(data, name, args.cache, PLAIN) as world:
         look(world, all_classes(world.catalogue)).save(_strips_path(args, name))
     return name
 
@@ -190,14 +190,14 @@ def _make_features(unit: tuple[str, PictureSettings], folder: Path, encoder: Enc
     """The features of one house (name, how it is drawn) into the data set's folder; returns what was done."""
     torch.set_num_threads(threads)
     (name, pictures), data = unit, Dataset(folder)
-    with _drawn_world(data, name, cache, pictures) as world:
+    with drawn_world(data, name, cache, pictures) as world:
         panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
         return f"{name}: {len(world.graph.positions)} nodes, {pictures.quality} pictures of {pictures.size} pixels"
 
 
-def _drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings) -> World:
+def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings) -> World:
     """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone."""
     place, catalogue = data.place(name), load_catalogue(cache)
     if pictures == data.drawn_pictures(name):

@@ -2,8 +2,9 @@
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
 with help, seen with pixels; light compares the ways of drawing with a path tracer. Close other programs first: the
-numbers are only as good as the quiet. freeze measures nothing: it prints digests of houses, a lit flat,
-data sets, episodes and tables, and with --against what has changed since a file of them was written.
+numbers are only as good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets,
+episodes, tables and features in OUT/freeze and writes their digests; with --against it says of every part
+whether it is the same as in a file of them (docs/freeze.json), or differs and why that is meant.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--houses", type=whole(), default=1000, help="houses that memory loads and drops (default: %(default)s)"
     )
     parser.add_argument(
-        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="where light writes its pictures"
+        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="where light and freeze write"
     )
     parser.add_argument(
         "--against", type=any_path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
@@ -83,19 +84,19 @@ def light(args: argparse.Namespace, catalogue: Catalogue) -> int:
 
 
 def freeze(args: argparse.Namespace, catalogue: Catalogue) -> int:
-    """Digests of what must not change by accident; 1 where they differ from those of --against."""
-    import json
-
+    """Digests of what must not change by accident; 1 where they differ from those of --against without a reason."""
     from assets.cache import write_json
-    from embodied.bench.freeze import changes, digests
+    from embodied.bench.freeze import compare, load_frozen, make_products, summary
 
-    before = json.loads(args.against.read_text()) if args.against else None
-    found = digests(catalogue, args.cache, progress=note)
-    write_json(args.out / "digests.json", found, indent=1)
-    differ = [] if before is None else changes(before, found)
-    show(
-        args,
-        {"digests": found, "changed": differ},
-        "\n".join(differ) or f"{len(found)} digests in {args.out}/digests.json",
-    )
-    return 1 if differ else 0
+    before = load_frozen(args.against) if args.against else None  # refused before the work, if it is none
+    found = make_products(args.out / "freeze", catalogue, args.cache, progress=note)
+    write_json(args.out / "digests.json", {"digests": found}, indent=1)
+    if before is None:
+        show(args, {"digests": found}, f"{len(found)} digests in {args.out}/digests.json")
+        return 0
+    verdicts = compare(before, found)
+    facts = {"digests": found, "verdicts": [asdict(v) | {"wrong": v.wrong} for v in verdicts]}
+    wrong = sum(v.wrong for v in verdicts)
+    end = f"{wrong} parts differ without a reason" if wrong else "nothing differs without a reason"
+    show(args, facts, f"{summary(verdicts)}\n{end}")
+    return int(wrong > 0)

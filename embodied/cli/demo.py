@@ -137,7 +137,8 @@ def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, .
 def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent does a HANNA task in a house it has never seen; recorded to help.rrd.
 
-    Its features come from plainly drawn panoramas, the kind that its encoder learned from.
+    Its features come from panoramas drawn without light, the kind that its encoder learned from, and the
+    recording shows what it sees from the same panoramas.
     """
     from agents.failures import hanna_policies
     from agents.hanna.agent import load_agent
@@ -152,24 +153,31 @@ def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route]
     from embodied.world import open_world
 
     agent, encoder = load_agent(), load_encoder()
-    with open_world(world.house, world.catalogue, args.cache, PLAIN, graph=world.graph) as plain:
+    with open_world(world.house, world.catalogue, args.cache, PLAIN, graph=world.graph) as eyes:
         nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
-        features = encode_panoramas(encoder, (plain.panorama(n) for n in nodes))
-    bank = FeatureBank({world.name: features}, encoder.digest)
-    pool = hanna_pool(world, seed=args.seed)
-    task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
-    make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
-    episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
-    return recorded(world, episode, args.out / "help.rrd", viewers)
+        features = encode_panoramas(encoder, (eyes.panorama(n) for n in nodes))
+        bank = FeatureBank({world.name: features}, encoder.digest)
+        pool = hanna_pool(world, seed=args.seed)
+        task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
+        make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
+        episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
+        return recorded(world, episode, args.out / "help.rrd", viewers, eyes=eyes)
 
 
-def recorded(world: World, episode: Episode, path: Path, viewers: tuple[str, ...]) -> dict:
-    """Record an episode into the file `path` and to `viewers`; what is worth telling about it."""
+def recorded(
+    world: World, episode: Episode, path: Path, viewers: tuple[str, ...], *, eyes: World | None = None
+) -> dict:
+    """Record an episode into the file `path` and to `viewers`; what is worth telling about it.
+
+    Args:
+      eyes: the world whose panoramas the agent looked at; None where it looks at none.
+    """
     from embodied.evaluation.metrics import navigation_error, spl, success
     from viz.recording import record_episode
     from viz.sinks import Sinks
 
-    record_episode(world, episode, Sinks(path, viewers), watch=lambda steps: bar(steps, "recording", "step"))
+    watch = lambda steps: bar(steps, "recording", "step")
+    record_episode(world, episode, Sinks(path, viewers), eyes=eyes, watch=watch)
     return {
         "agent": episode.agent,
         "request": episode.task.request,

@@ -83,17 +83,19 @@ def run_hari(args: argparse.Namespace) -> int:
 
 
 def _recorder(args: argparse.Namespace) -> Callable[[int, Sequence[Episode]], None]:
-    """Writes the first validation episodes of each validation as Rerun recordings."""
-    from assets.catalogue import load_catalogue
+    """Writes the first validation episodes of each validation as Rerun recordings, with what the agent saw."""
+    from agents.vision.run import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
     from viz.recording import record_episode
     from viz.sinks import Sinks
 
-    data, catalogue = Dataset(args.data), load_catalogue(args.cache)
+    data = Dataset(args.data)
 
     def keep(update: int, episodes: Sequence[Episode]) -> None:
         for number, episode in enumerate(episodes[:WATCHED]):
-            with data.open_world(episode.task.world, catalogue, args.cache) as world:
-                record_episode(world, episode, Sinks(args.out / f"validation_{update:06d}_{number}.rrd"))
+            name = episode.task.world
+            with drawn_world(data, name, args.cache, pictures_of(data, name, args.quality)) as eyes:
+                file = args.out / f"validation_{update:06d}_{number}.rrd"
+                record_episode(eyes, episode, Sinks(file), eyes=eyes)
 
     return keep

@@ -3,13 +3,15 @@
 RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
 a viewer that runs already), or a folder that `embodied eval` or `judge` wrote: its episodes are
 listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
---data, the data set its houses come from).
+--data, the data set its houses come from). What the agent sees in it is drawn as it was for the agent.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
@@ -18,6 +20,7 @@ from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
+    from agents.vision.config import Looked
     from viz.report import Listed
 
 
@@ -91,8 +94,31 @@ def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
         catalogue, data = catalogue_of(args), Dataset(args.data)
         if f"{episode.task.world}/house.json" not in data.index.files:
             raise ValueError(f"{args.data} has no house {episode.task.world!r}; name the data set of the run")
-        with data.open_world(episode.task.world, catalogue, args.cache, quality=args.quality, size=384) as world:
-            record_episode(world, episode, Sinks(file, viewers), watch=lambda steps: bar(steps, "recording", "step"))
+        name = episode.task.world
+        seen = looked_at(args.folder).by(episode.agent, name)
+        with contextlib.ExitStack() as stack:
+            eyes = None
+            if seen is not None:
+                from agents.vision.run import drawn_world  # loads torch
+
+                eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
+            world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
+            watch = lambda steps: bar(steps, "recording", "step")
+            record_episode(world, episode, Sinks(file, viewers), eyes=eyes, watch=watch)
         note(f"recorded {episode.task.id}")
         show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
     return 0
+
+
+def looked_at(run: Path) -> Looked:
+    """What the agents of a run looked at; nothing where it does not say.
+
+    Raises:
+      RecordError: a damaged run.json.
+    """
+    from agents.vision.config import Looked
+    from embodied.records import from_plain, read_json
+
+    path = run / "run.json"
+    facts = read_json(path) if path.exists() else {}
+    return from_plain(Looked, {k: facts[k] for k in ("looking", "pictures") if k in facts}, str(path))
