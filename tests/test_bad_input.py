@@ -16,6 +16,7 @@ import zipfile
 import numpy as np
 import pytest
 from conftest import two_rooms
+from tqdm import tqdm
 
 import embodied
 from agents.hanna.training_config import TrainingConfig
@@ -228,6 +229,19 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
     assert cli.main(["doctor"]) == status
     err = capsys.readouterr().err.strip()
     assert message in err and "\n" not in err
+
+
+def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monkeypatch):
+    from embodied.cli import doctor
+
+    def fail(_):
+        for _ in tqdm(range(3), "panoramas", file=sys.stderr):
+            raise OSError(errno.ENOSPC, "No space left on device", "/x/a.pano")
+
+    monkeypatch.setattr(doctor, "run", fail)
+    assert cli.main(["doctor"]) == 2
+    *_, last, end = capsys.readouterr().err.split("\n")
+    assert last.startswith("error: /x/a.pano: No space left on device") and not end
 
 
 @pytest.mark.slow

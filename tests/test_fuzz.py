@@ -21,11 +21,21 @@ import torch
 from conftest import two_rooms
 from hand_data import build
 
+from agents.bandit import store
+from agents.bandit.config import BanditConfig
+from agents.bandit.network import Translator
+from agents.bandit.store import load_translator, save_weights
+from agents.bandit.training import Material
+from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
 from agents.hanna.agent import load_agent, new_agent, save_agent
 from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.training_config import SCALES
 from agents.hanna.vocabulary import build_vocabulary
+from agents.hari import agent as hari
+from agents.hari.config import ExecutionConfig, IntentionConfig
+from agents.hari.words import FeatureWords
 from agents.imitation.loop import Progress
+from agents.tensor_file import save_tensors
 from agents.vision.encoder import random_encoder
 from agents.vision.features import load_features, save_features
 from agents.vision.labels import HouseStrips
@@ -77,6 +87,7 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         shutil.copy(home / name, folder / name)
     _write_episodes(data, folder / "episodes.jsonl")
     _write_learned(folder)
+    _write_others(folder)
     _write_pictures(folder)
     whole = lambda _: _of(Dataset(data.folder))
     return {
@@ -91,6 +102,8 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         "houses/tasks.jsonl": Kind(home / "tasks_test_unseen.jsonl", whole, True),
         "episodes": Kind(folder / "episodes.jsonl", lambda p: [to_json(e) for e in load_lines(p, Episode)], False),
         "agent": Kind(folder / "agent.safetensors", lambda p: _weights(load_agent(p).network), True),
+        "hari agent": Kind(folder / "hari.safetensors", lambda p: _weights(hari.load_agent(p).actor), True),
+        "translator": Kind(folder / "translator.safetensors", lambda p: _weights(load_translator(p)[0]), True),
         "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
         "checkpoint": Kind(folder / "checkpoint.pt", _resumed, True),
         "panoramas": Kind(folder / "a.pano", _pictures, True),
@@ -136,6 +149,15 @@ def _write_learned(folder: Path) -> None:
     save_agent(agent, folder / "agent.safetensors")
     save_checkpoint(folder / "checkpoint.pt", agent, torch.optim.Adam(agent.network.parameters()), Progress(3))
     save_features(folder / "features.safetensors", np.ones((2, 36, 4)), random_encoder(seed=0), "house")
+
+
+def _write_others(folder: Path) -> None:
+    execution, intention = ExecutionConfig(hidden_size=8, heads=2), IntentionConfig(hidden_size=8)
+    executor = hari.new_executor(execution, FeatureWords(("action/go", "action/stop", "room/hall")))
+    hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
+    words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
+    material = Material(BanditConfig(hidden_size=8), {}, (words, words), "", "")
+    save_weights(Translator(4, 4, 8), material, folder / "translator.safetensors")
 
 
 def _weights(network: torch.nn.Module) -> list[float]:
@@ -229,6 +251,8 @@ KINDS = (
     "houses/tasks.jsonl",
     "episodes",
     "agent",
+    "hari agent",
+    "translator",
     "features",
     "checkpoint",
     "panoramas",
@@ -277,6 +301,28 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
             kind.read(kind.path)
     finally:
         kind.path.write_bytes(before)
+
+
+BESIDE = [
+    (hari.load_agent, hari.FORMAT, {}, "missing fields"),
+    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": "{"}, "as JSON"),
+    (hari.load_agent, hari.FORMAT, {"names": "[1]", "settings": '{"execution": {}}'}, r"names\[0\] should be str"),
+    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"wings": 2}}'}, "unknown fields"),
+    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"heads": 0}}'}, "at least 1"),
+    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {}}'}, "execution policy alone"),
+    (load_translator, store.FORMATS[0], {"lexicons": "[]"}, "missing fields"),
+    (load_translator, store.FORMATS[0], {"config": "[]", "lexicons": "[]"}, "should be an object"),
+    (load_translator, store.FORMATS[0], {"config": '{"units": "bytes"}', "lexicons": "[]"}, "units must be one of"),
+    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "7"}, "words of two languages"),
+    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "[1, 2]"}, "cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("read", "form", "about", "match"), BESIDE)
+def test_weights_beside_settings_that_cannot_be_are_refused(read, form, about, match, tmp_path):
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": form, **about})
+    with pytest.raises(ValueError, match=match):
+        read(tmp_path / "a.safetensors")
 
 
 @pytest.mark.parametrize("offset", [8, 10])

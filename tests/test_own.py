@@ -265,6 +265,28 @@ def test_an_impossible_glb_is_refused(tmp_path, name):
         load_catalogue(tmp_path, own=[own]).mesh("mine/box")
 
 
+def test_a_whole_picture_of_postscript_in_a_glb_starts_no_other_program(tmp_path, monkeypatch):
+    for name in ("check_call", "Popen"):
+        monkeypatch.setattr(subprocess, name, lambda *a, **k: pytest.fail(f"another program was started: {a}"))
+    buffer = io.BytesIO()
+    Image.new("RGB", (8, 8), "red").save(buffer, "EPS")
+    picture = buffer.getvalue()
+    size = len(TRIANGLE) + len(picture)
+    views = [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": len(picture)}]
+    header = triangle(
+        bufferViews=views,
+        buffers=[{"byteLength": size}],
+        images=[{"bufferView": 1, "mimeType": "image/png"}],
+        textures=[{"source": 0}],
+        materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        meshes=[{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 0}, "material": 0}]}],
+    )
+    own = write_own(tmp_path / "own", {"box": {"file": "box.glb", **MUG}})
+    (own / "box.glb").write_bytes(glb(header, TRIANGLE + picture))
+    with pytest.raises(MeshError, match="whole PNG or JPEG files"):
+        load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+
+
 def test_the_glb_that_the_others_are_broken_from_is_whole(tmp_path):
     own = write_own(tmp_path / "own", {"box": {"file": "box.GLB", **MUG}})
     (own / "box.GLB").write_bytes(glb(triangle(), TRIANGLE))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,19 @@ def test_serving_to_others_is_said_aloud(ports, capsys):
         assert listening(ports[0]) == {"00000000"}
         raise Enough
     assert "warning: everybody who reaches 0.0.0.0 can look at what is served" in capsys.readouterr().err
+
+
+def test_every_viewer_that_is_started_is_told_to_listen_on_the_loopback_address(ports, monkeypatch):
+    commands: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "run", lambda c, **_: (commands.append(c), subprocess.CompletedProcess(c, 0))[1])
+    monkeypatch.setattr(subprocess, "Popen", lambda c, **_: commands.append(c))
+    monkeypatch.setattr(sinks, "_wait_for", lambda *_: None)
+    monkeypatch.setenv("DISPLAY", ":7")
+    sinks.open_file(Path("a.rrd"), serve=True)
+    sinks.open_file(Path("a.rrd"))
+    with sinks.open_viewers(spawn=True):
+        pass
+    assert [c[c.index("--bind") + 1] for c in commands] == ["127.0.0.1"] * 3
 
 
 def test_an_address_of_another_machine_is_refused(ports):

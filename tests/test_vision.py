@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 import torch
 
-from agents.tensor_file import read_weights
+from agents.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import NETWORKS, PLAIN, VisionConfig, drawing
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
-from agents.vision.features import feature_path, load_bank, load_features, save_features
+from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from agents.vision.training import train_encoder, turned
@@ -288,6 +288,9 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
     (tmp_path / "flipped.safetensors").write_bytes(body)
     with pytest.raises(ValueError, match="do not fit its checksum.*embodied features"):
         load_features(tmp_path / "flipped.safetensors")
+    save_tensors(tmp_path / "whose.safetensors", {"features": torch.zeros(1, 36, 4)}, {"format": FORMAT})
+    with pytest.raises(ValueError, match="whose.safetensors: not a feature file"):
+        load_features(tmp_path / "whose.safetensors")
     bank = load_bank({"house": path})
     assert np.array_equal(bank.features(Sight("house", 2)), features[2].astype(np.float32))
     assert torch.equal(bank.gather([None, Sight("house", 1)])[0], torch.zeros(36, encoder.size))

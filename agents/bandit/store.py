@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
 from agents.bandit.words import Lexicon, lexicon_from_json
 from agents.tensor_file import load_tensors, put, save_tensors
+from embodied.records import from_json, from_plain, parse
 
 if TYPE_CHECKING:
     from agents.bandit.training import Material
@@ -19,6 +21,15 @@ if TYPE_CHECKING:
 FORMATS = ("embodied-bandit-2", "embodied-bandit-1")
 """The newest first; the older one has no checksum."""
 REMEDY = "delete it and train it again with `embodied study bandit`"
+
+
+@dataclass(frozen=True)
+class _About:
+    """What stands beside the weights in a file, as text."""
+
+    format: str
+    config: str
+    lexicons: str
 
 
 def save_weights(network: nn.Module, m: Material, path: Path) -> None:
@@ -47,8 +58,15 @@ def load_translator(path: Path) -> tuple[Translator, tuple[Lexicon, Lexicon], Ba
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
     tensors, about = load_tensors(path, FORMATS, REMEDY)
-    config = BanditConfig(**json.loads(about["config"]))
-    source, target = (lexicon_from_json(body) for body in json.loads(about["lexicons"]))
+    told = from_plain(_About, about, str(path))
+    config = from_json(BanditConfig, told.config)
+    lexicons = parse(told.lexicons, "two lexicons")
+    if not isinstance(lexicons, list) or len(lexicons) != 2:
+        raise ValueError(f"{path} should hold the words of two languages; {REMEDY}")
+    try:
+        source, target = map(lexicon_from_json, lexicons)
+    except (KeyError, TypeError, AttributeError, ValueError) as e:
+        raise ValueError(f"{path} holds words of a language that cannot be read ({e!r}); {REMEDY}") from e
     translator = Translator(len(source), len(target), config.hidden_size)
     put(translator, tensors, path)
     return translator, (source, target), config

@@ -36,9 +36,8 @@ def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
       CheckpointError: truncated, of another version, or of a run with other settings, another
         vocabulary or another encoder.
     """
-    body = read_checkpoint(Path(path), FORMAT)
-    if lost := sorted({"encoder", "vocabulary", "config", "network", "optimizer", "progress"} - set(body)):
-        raise CheckpointError(f"{path}: {lost} are missing; delete it to begin again")
+    fields = ("encoder", "vocabulary", "config", "network", "optimizer", "progress")
+    body = read_checkpoint(Path(path), FORMAT, fields)
     if body["encoder"] != agent.encoder_digest:
         raise CheckpointError(
             f"{path}: this run learned from encoder {body['encoder'][:12]}, the data set has features of "

@@ -13,9 +13,37 @@ from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.words import FeatureWords
 from agents.tensor_file import load_tensors, save_tensors
+from embodied.records import from_plain, parse
 
 FORMAT, OLD_FORMAT = "embodied-hari-2", "embodied-hari-1"
 """The older one has no checksum."""
+
+
+@dataclass(frozen=True)
+class Configs:
+    """Settings of the policies in a file."""
+
+    execution: ExecutionConfig
+    intention: IntentionConfig | None = None
+    """None for an execution policy alone."""
+
+
+@dataclass(frozen=True)
+class HariSettings:
+    """What stands beside the weights in a file."""
+
+    settings: Configs
+    names: tuple[str, ...]
+    """The words that the policies know."""
+
+
+@dataclass(frozen=True)
+class _About:
+    """The same as the file holds it: JSON as text."""
+
+    format: str
+    settings: str
+    names: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +96,8 @@ def load_executor(path: Path) -> Executor:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, settings, words = _load(Path(path))
-    executor = new_executor(ExecutionConfig(**settings["execution"]), words)
+    tensors, told = _load(Path(path))
+    executor = new_executor(told.settings.execution, FeatureWords(told.names))
     _fill(executor.network, tensors, "execution", path)
     executor.network.eval()
     return executor
@@ -81,13 +109,14 @@ def load_agent(path: Path) -> HariAgent:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.
     """
-    tensors, settings, _ = _load(Path(path))
-    if "intention" not in settings:
+    tensors, told = _load(Path(path))
+    config = told.settings.intention
+    if config is None:
         raise ValueError(
             f"{path} holds an execution policy alone; teach it to ask: "
             f"`embodied train hari intention --execution {path}`"
         )
-    executor, config = load_executor(path), IntentionConfig(**settings["intention"])
+    executor = load_executor(path)
     actor, _ = new_heads(config, executor.config.hidden_size)
     _fill(actor, tensors, "actor", path)
     actor.eval()
@@ -102,9 +131,11 @@ def _save(
     save_tensors(Path(path), tensors, about)
 
 
-def _load(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, dict], FeatureWords]:
+def _load(path: Path) -> tuple[dict[str, torch.Tensor], HariSettings]:
     tensors, about = load_tensors(path, (FORMAT, OLD_FORMAT), "train it again with `embodied train hari`")
-    return tensors, json.loads(about["settings"]), FeatureWords(tuple(json.loads(about["names"])))
+    told = from_plain(_About, about, str(path))
+    body = {"names": parse(told.names, "a list of names"), "settings": parse(told.settings, "settings")}
+    return tensors, from_plain(HariSettings, body, str(path))
 
 
 def _fill(module: nn.Module, tensors: dict[str, torch.Tensor], name: str, path: Path) -> None:

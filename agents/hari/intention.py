@@ -132,7 +132,8 @@ class IntentionRun:
         """Where the run of `path` is; the beginning where there is none."""
         if not path.exists():
             return Progress(best=-math.inf)
-        body = read_checkpoint(path, FORMAT)
+        parts = ("actor", "critic", "actor optimizer", "critic optimizer")
+        body = read_checkpoint(path, FORMAT, ("settings", "progress", *parts))
         refuse_changes(path, body["settings"], self._settings, MAY_CHANGE)
         self.agent.actor.load_state_dict(body["actor"])
         self.critic.load_state_dict(body["critic"])

@@ -262,7 +262,7 @@ def _save(path: Path, executor: Executor, optimizer: torch.optim.Optimizer, prog
 def _restore(path: Path, executor: Executor, optimizer: torch.optim.Optimizer) -> Progress:
     if not path.exists():
         return Progress()
-    body = read_checkpoint(path, FORMAT)
+    body = read_checkpoint(path, FORMAT, ("settings", "network", "optimizer", "progress"))
     refuse_changes(path, body["settings"], as_dict(executor.config) | {"names": list(executor.words.names)}, MAY_CHANGE)
     executor.network.load_state_dict(body["network"])
     optimizer.load_state_dict(body["optimizer"])

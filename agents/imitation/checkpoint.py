@@ -29,11 +29,14 @@ def write_checkpoint(path: Path, kind: str, body: Mapping[str, object]) -> None:
     write_bytes(Path(path), whole.getvalue())
 
 
-def read_checkpoint(path: Path, kind: str) -> dict[str, Any]:
+def read_checkpoint(path: Path, kind: str, fields: Collection[str] = ()) -> dict[str, Any]:
     """What `write_checkpoint` wrote.
 
+    Args:
+      fields: what it should hold.
+
     Raises:
-      CheckpointError: truncated, changed, or of another kind or version.
+      CheckpointError: truncated, changed, of another kind or version, or without a field.
     """
     wrong = None
     try:
@@ -53,6 +56,8 @@ def read_checkpoint(path: Path, kind: str) -> dict[str, Any]:
     if not isinstance(body, dict) or body.get("format") != kind:
         found = body.get("format") if isinstance(body, dict) else type(body).__name__
         raise CheckpointError(f"{path}: format {found!r}, this version reads {kind!r}; begin a new run")
+    if lost := sorted({*fields} - set(body)):
+        raise CheckpointError(f"{path}: {lost} are missing; delete it to begin again")
     return body
 
 
