@@ -118,11 +118,12 @@ agents.study <- embodied.interface embodied.records embodied.datasets embodied.e
     agents.hanna agents.failures agents.judging embodied.locks
 viz.sinks <-
 viz.house3d <- embodied.scene
-viz.blueprint <- embodied.house embodied.interface
+viz.blueprint <- embodied.house embodied.interface embodied.render
 viz.story <- embodied.interface
 viz.video <- embodied.interface
 viz.report <- embodied.interface embodied.records
-viz.recording <- embodied.interface viz.house3d viz.story embodied.world viz.sinks embodied.navigation viz.blueprint
+viz.recording <- embodied.interface embodied.render viz.house3d viz.story embodied.world viz.sinks embodied.navigation
+    viz.blueprint
 """
 """Every room (a module or folder of a package) and the rooms that it imports, GROUND apart, for type checkers only or
 late, too; from below to above, by package. A new arrow is a decision: it belongs here, and no circle may come of it."""

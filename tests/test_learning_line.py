@@ -19,11 +19,13 @@ from agents.hanna.training_config import SCALES
 from agents.judging import run_eval
 from agents.shipped import WEIGHTS
 from agents.study import Setting, run_study
+from agents.vision.config import PLAIN
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
 from embodied.cli import learning
 from embodied.cli.options import chosen
+from embodied.cli.view import looked_at
 from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
@@ -117,6 +119,14 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
     behaviour = json.loads((tmp_path / "table" / "behaviour.json").read_text(), parse_constant=pytest.fail)
     assert 0 <= behaviour["behaviour"]["test_unseen"]["request share"] <= 1
     assert len(list((tmp_path / "table").glob("episodes_*.jsonl"))) == table.count("| test_unseen |")
+    looked, (name,) = looked_at(tmp_path / "table"), data.names("test_unseen")
+    assert looked.by("learned", name) == looked.by("learned, no ask", name) == PLAIN, "recordings show what it saw"
+    assert (
+        looked.by("shortest", name)
+        is looked.by("learned", "elsewhere")
+        is looked_at(tmp_path).by("learned", "")
+        is None
+    )
 
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
