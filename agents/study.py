@@ -236,7 +236,7 @@ TABLES: Mapping[str, Table] = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class StudySetting:
     """What all agents of a study share."""
 
     data: Path
@@ -259,7 +259,7 @@ class Setting:
         return self.out / "agents" / variant.replace(" ", "_")
 
 
-def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
     """Train what is missing, judge, and write the tables as Markdown, CSV and JSON, and the learning curves;
     returns the Markdown files.
 
@@ -284,7 +284,7 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
         return {name: _write(setting, name, table, judged) for name, table in tables.items()}
 
 
-def _possible(table: Table, setting: Setting, houses: int) -> Table:
+def _possible(table: Table, setting: StudySetting, houses: int) -> Table:
     """The table without agents that learn from as many training houses as there are, or more."""
     fewer = tuple(
         line for line in table.lines if not line.variant or setting.config_of(line.variant).training_houses < houses
@@ -292,7 +292,7 @@ def _possible(table: Table, setting: Setting, houses: int) -> Table:
     return dataclasses.replace(table, lines=fewer)
 
 
-def _train(setting: Setting, variant: str, note: Note | None) -> str:
+def _train(setting: StudySetting, variant: str, note: Note | None) -> str:
     torch.set_num_threads(setting.threads)
     data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant)
     config = setting.config_of(variant)
@@ -320,7 +320,7 @@ def _validations(folder: Path) -> list[dict[str, float]]:
 class _Judge:
     """Plays each (agent, split) once, however many tables ask for it."""
 
-    def __init__(self, setting: Setting, data: Dataset, note: Note) -> None:
+    def __init__(self, setting: StudySetting, data: Dataset, note: Note) -> None:
         self.setting, self.data, self.note = setting, data, note
         self.encoder: Encoder = load_encoder(setting.encoder)
         self.behaviour: dict[tuple[str, str], dict] = {}
@@ -358,7 +358,7 @@ class _Judge:
         return hanna_policies(self._agents[line.variant], self._banks[split])[line.played]
 
 
-def _write(setting: Setting, name: str, table: Table, judged: _Judge) -> Path:
+def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Path:
     """One study's files; the figures go with the tables they belong to."""
     rows = [
         dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
@@ -386,7 +386,7 @@ def _write(setting: Setting, name: str, table: Table, judged: _Judge) -> Path:
     return path
 
 
-def side_by_side(setting: Setting, name: str, table: Table, rows: Sequence[Row]) -> str:
+def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row]) -> str:
     """The table with the dissertation's numbers in brackets, and what it was made with."""
     heads = [f"{column} {split}" for split in table.splits for column in table.columns]
     text = [

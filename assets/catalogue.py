@@ -23,7 +23,7 @@ from assets.importing.importer import import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own, source_digest
 from assets.importing.packs import find_packs, pack_of
 from assets.importing.sh3f import open_pack
-from assets.records import Asset, Finish, MeshPart, Recipe
+from assets.records import Asset, Finish, ImportRecipe, MeshPart
 from assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
 
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
@@ -38,7 +38,7 @@ class Catalogue:
     def __init__(
         self,
         assets: Mapping[str, Asset],
-        recipes: Mapping[str, Recipe],
+        recipes: Mapping[str, ImportRecipe],
         cache: Path,
         packs: Sequence[Path] = (),
         own: Mapping[str, OwnModel] = MappingProxyType({}),

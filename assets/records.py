@@ -148,7 +148,7 @@ class Asset:
 
 
 @dataclass(frozen=True)
-class Recipe:
+class ImportRecipe:
     """All that decides what an import gives, beside the pack itself."""
 
     key: str

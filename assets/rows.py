@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from assets.records import ROOM_KINDS, SUPPORTS, Asset, Recipe, SupportSurface
+from assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
 
 Row = dict[str, Any]
 """One JSON object of a table."""
@@ -173,7 +173,7 @@ def objects(where: str, name: str, value: object) -> Mapping[str, Row]:
 
 def read_models(
     where: str, rows: Mapping[str, Row], classes: Mapping[str, Row], licences: Mapping[str, str]
-) -> tuple[dict[str, Asset], dict[str, Recipe]]:
+) -> tuple[dict[str, Asset], dict[str, ImportRecipe]]:
     """The assets of catalogue rows by key over the classes they name, and how to import each.
 
     Args:
@@ -254,8 +254,8 @@ def _variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
     return out
 
 
-def _recipe(asset: Asset, row: Row) -> Recipe:
-    return Recipe(
+def _recipe(asset: Asset, row: Row) -> ImportRecipe:
+    return ImportRecipe(
         asset.key,
         asset.size,
         yaw=float(row.get("yaw", 0.0)),

@@ -121,9 +121,9 @@ class World:
                 raise ValueError(f"world {self.name!r} was opened without pictures; open it with another quality")
             painter = None
             if self.lit is not None and self.pictures.backend == "filament":
-                from embodied.render.filament import Painter  # late: loads Vulkan
+                from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
-                painter = Painter(self.house, self.catalogue, self.lit)
+                painter = FilamentPainter(self.house, self.catalogue, self.lit)
             self._renderer = Renderer(
                 self.house, self.catalogue, size=self.pictures.size, lit=self.lit, painter=painter
             )

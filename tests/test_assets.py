@@ -18,7 +18,7 @@ from assets.importing.obj import MeshError, parse_obj
 from assets.importing.packs import find_packs
 from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from assets.importing.support_surfaces import contact, find_surfaces
-from assets.records import ROOM_KINDS, SUPPORTS, Recipe, bounds
+from assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, bounds
 from assets.rows import DATA, CatalogueError
 
 SOME = (
@@ -196,7 +196,9 @@ def test_front_and_up_follow_sweet_home_3d():
     marker = "v 0 0 1\nv 1 0 1\nv 0 2 1\nv 0 0 0\nf 1 2 3\nf 1 3 4\nf 4 2 1"
     parts = [
         p
-        for p, _ in finish_parts(read_obj({"m.obj": marker.encode()}.__getitem__, "m.obj", "m"), Recipe("m", (1, 1, 2)))
+        for p, _ in finish_parts(
+            read_obj({"m.obj": marker.encode()}.__getitem__, "m.obj", "m"), ImportRecipe("m", (1, 1, 2))
+        )
     ]
     low, high = bounds(parts)
     top = parts[0].vertices[parts[0].vertices[:, 2].argmax()]

@@ -18,7 +18,7 @@ from agents.bandit.corpus import CorpusError, Pair, Sizes
 from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
-from agents.bandit.study import Job, Setting, across_seeds, distinct, run_study
+from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct, run_study
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, drawn_with, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
@@ -337,7 +337,7 @@ def test_diverging_says_so_and_keeps_the_checkpoint(data, trained, tmp_path):
 
 def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
     config = dataclasses.replace(TOY, pretraining_passes=1, critic_passes=1)
-    setting = Setting(data, tmp_path, config, seeds=2)
+    setting = BanditStudySetting(data, tmp_path, config, seeds=2)
     said = []
     path = run_study(setting, ["3.2"], note=said.append)["3.2"]
     text = path.read_text()

@@ -11,7 +11,7 @@ from handmade import HandCatalogue, furnished, painted
 
 from embodied.render import filament
 from embodied.render.classic import Renderer
-from embodied.render.filament import Painter
+from embodied.render.filament import FilamentPainter
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import owners
 
@@ -45,7 +45,7 @@ def test_back_ends_agree(house, lit):
     catalogue = HandCatalogue()
     with Renderer(house, catalogue, size=64, lit=lit) as classic:
         a = classic.panorama(EYE)
-    with Renderer(house, catalogue, size=64, lit=lit, painter=Painter(house, catalogue, lit)) as other:
+    with Renderer(house, catalogue, size=64, lit=lit, painter=FilamentPainter(house, catalogue, lit)) as other:
         b = other.panorama(EYE)
     assert np.array_equal(a.ids, b.ids) and np.array_equal(a.depth, b.depth)
     assert np.median(np.abs(a.rgb.astype(int) - b.rgb)) <= 6
@@ -59,7 +59,9 @@ def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
     )
     shots = []
     for pages in (lit, shiny):
-        with Renderer(house, HandCatalogue(), size=96, lit=pages, painter=Painter(house, HandCatalogue(), pages)) as r:
+        with Renderer(
+            house, HandCatalogue(), size=96, lit=pages, painter=FilamentPainter(house, HandCatalogue(), pages)
+        ) as r:
             shots.append(r.view(EYE, 0.6, -0.5, 1.2, (96, 96)))
     floors = np.array([i + 1 for i, o in enumerate(lit.owners or owners(house)) if "/floor" in o])
     on_floor = np.isin(shots[0].ids, floors)

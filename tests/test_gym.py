@@ -18,7 +18,7 @@ from hand_worlds import grid_world
 import embodied.gym.env
 from embodied.envs.base import ActionError
 from embodied.gym.registration import IDS
-from embodied.gym.spaces import Layout, Numbers, decode, number, text_of, word_number, words
+from embodied.gym.spaces import Numbers, SpaceLayout, decode, number, text_of, word_number, words
 from embodied.interface import Ask, Intention, Move, Stop
 from embodied.teachers.shortest import shortest_action
 
@@ -129,7 +129,7 @@ def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
 
 
 def test_actions_have_numbers():
-    layout = Layout()
+    layout = SpaceLayout()
     for action in (Move(3), Stop(), Ask(), Ask(Intention.SUB)):
         assert decode(number(action, layout), layout) == action
 
@@ -143,7 +143,7 @@ def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
         while not done:
             s = inner.situation
             action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
-            _, reward, done, _, info = env.step(number(action, Layout()))
+            _, reward, done, _, info = env.step(number(action, SpaceLayout()))
             total, n = total + reward, n + 1
         assert info["success"] == 1 and info["spl"] == pytest.approx(1)
         assert total == pytest.approx(1 - 0.01 * n + (start if shaping else 0))
@@ -152,8 +152,8 @@ def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
 def test_haris_reward_is_minus_its_cost(tmp):
     env = make("hari", tmp)
     o, _ = env.reset(seed=0)
-    assert env.step(number(Ask(Intention.CUR), Layout()))[1] == pytest.approx(-0.01)
-    assert env.step(number(Stop(), Layout()))[1] <= -4
+    assert env.step(number(Ask(Intention.CUR), SpaceLayout()))[1] == pytest.approx(-0.01)
+    assert env.step(number(Stop(), SpaceLayout()))[1] <= -4
     assert o["goals"].shape == (3, 21, 5)
 
 
@@ -165,8 +165,8 @@ def test_the_picture_shows_view_plan_and_words(tmp):
 
 
 def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
-    env = make("find", tmp, layout=Layout(candidates=1))
-    with pytest.raises(ValueError, match="enlarge Layout"):
+    env = make("find", tmp, layout=SpaceLayout(candidates=1))
+    with pytest.raises(ValueError, match="enlarge SpaceLayout"):
         env.reset(seed=0)
 
 

@@ -20,7 +20,7 @@ from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv, refuse_too_many
 from embodied.gym.eyes import FAR, AllEyes, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
-from embodied.gym.spaces import Layout, number
+from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world
@@ -49,7 +49,7 @@ def tasks_in(world) -> list[Task]:
 
 
 def env_of(world, eyes) -> HelpGymEnv:
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, layout=Layout())
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, layout=SpaceLayout())
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_the_view_turns_with_the_agent(world):
     env = env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb",), view))
     env.reset(seed=0, options={"task": 0})
     column = [p.node for p in env._env._reach[1]].index(1)
-    o, *_ = env.step(number(Move(column), Layout()))
+    o, *_ = env.step(number(Move(column), SpaceLayout()))
     pose = env._env.pose
     assert pose.node == 1 and pose.turn != 0
     seen = world.panorama(1).view_rgb(pose.yaw, pose.pitch, view.vfov, (32, 32))
@@ -99,7 +99,7 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
     assert np.array_equal(o["features"], expected)
     assert not o["target_features"].any() and not o["target_rgb"].any(), "this kind of task has no target image"
     o["features"][:] = 0
-    assert env.step(number(Stop(), Layout()))[0]["features"].any(), "what is handed out is a copy"
+    assert env.step(number(Stop(), SpaceLayout()))[0]["features"].any(), "what is handed out is a copy"
 
 
 def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world):

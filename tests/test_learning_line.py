@@ -18,7 +18,7 @@ from agents.hanna.run import run_train_hanna, split_of, vocabulary_of
 from agents.hanna.training_config import SCALES
 from agents.judging import run_eval
 from agents.shipped import WEIGHTS
-from agents.study import Setting, run_study
+from agents.study import StudySetting, run_study
 from agents.vision.config import PLAIN
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
@@ -164,7 +164,7 @@ def study(data, tmp_path):
         )
     config = chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
     config = dataclasses.replace(config, iterations=2)
-    return Setting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
+    return StudySetting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
 
 
 def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study):

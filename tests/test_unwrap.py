@@ -11,7 +11,7 @@ from handmade import box_mesh
 
 from assets.records import Finish, MeshPart
 from embodied.light import cover
-from embodied.light.atlas import Page, Thing, coarsened
+from embodied.light.atlas import Page, UnwrappedThing, coarsened
 from embodied.light.cover import rasterise
 from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
 
@@ -66,7 +66,7 @@ def test_packed_rectangles_do_not_overlap():
 def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
     def some(name, fineness, side):
         flat = SimpleNamespace(size=np.array([side, side]))
-        return Thing(name, "room", "object", flat, (), fineness, False)
+        return UnwrappedThing(name, "room", "object", flat, (), fineness, False)
 
     things = [
         some("floor", 5, 10),

@@ -20,7 +20,7 @@ SPAN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Encoded:
+class EncodedSentences:
     """B source sentences, read."""
 
     states: Tensor
@@ -30,8 +30,8 @@ class Encoded:
     mask: Tensor
     """(B, S) bool, False on padding."""
 
-    def select(self, rows: Tensor) -> Encoded:
-        return Encoded(self.states[rows], self.keys[rows], self.mask[rows])
+    def select(self, rows: Tensor) -> EncodedSentences:
+        return EncodedSentences(self.states[rows], self.keys[rows], self.mask[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +61,16 @@ class EncoderDecoder(nn.Module):
         self.attend = nn.Linear(size, size, bias=False)
         self.combine = nn.Linear(2 * size, size, bias=False)
 
-    def encode(self, source: Tensor) -> tuple[Encoded, Decoding]:
+    def encode(self, source: Tensor) -> tuple[EncodedSentences, Decoding]:
         """Read (B, S) int64 numbers; the decoder starts where the encoder ended, Phi(x)."""
         lengths = (source != PAD_NUMBER).sum(1)
         packed = nn.utils.rnn.pack_padded_sequence(self.source(source), lengths, batch_first=True, enforce_sorted=False)
         states, (hidden, cell) = self.encoder(packed)
         states, _ = nn.utils.rnn.pad_packed_sequence(states, batch_first=True, total_length=source.shape[1])
-        encoded = Encoded(states, self.attend(states), source != PAD_NUMBER)
+        encoded = EncodedSentences(states, self.attend(states), source != PAD_NUMBER)
         return encoded, Decoding(hidden[0], cell[0], torch.zeros_like(hidden[0]))
 
-    def step(self, encoded: Encoded, now: Decoding, word_gates: Tensor) -> Decoding:
+    def step(self, encoded: EncodedSentences, now: Decoding, word_gates: Tensor) -> Decoding:
         """One step of Eq A.5; `word_gates` (B, 4h) is what the word before adds to the LSTM's gates."""
         gates = word_gates + self.gates(torch.cat([now.output, now.hidden], -1))  # A.5, with input feeding
         enter, forget, leave, content = gates.chunk(4, -1)

@@ -11,12 +11,12 @@ from torch import nn
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
-from agents.bandit.words import Lexicon, lexicon_from_json
+from agents.bandit.words import WordNumbers, lexicon_from_json
 from agents.tensor_file import load_tensors, put, save_tensors
 from embodied.records import from_json, from_plain, parse
 
 if TYPE_CHECKING:
-    from agents.bandit.training import Material
+    from agents.bandit.training import NumberedCorpus
 
 FORMATS = ("embodied-bandit-2", "embodied-bandit-1")
 """The newest first; the older one has no checksum."""
@@ -32,7 +32,7 @@ class _About:
     lexicons: str
 
 
-def save_weights(network: nn.Module, m: Material, path: Path) -> None:
+def save_weights(network: nn.Module, m: NumberedCorpus, path: Path) -> None:
     """Write weights, settings and words, atomically."""
     about = {
         "format": FORMATS[0],
@@ -51,7 +51,7 @@ def load_weights(network: nn.Module, path: Path) -> None:
     put(network, load_tensors(path, FORMATS, REMEDY)[0], path)
 
 
-def load_translator(path: Path) -> tuple[Translator, tuple[Lexicon, Lexicon], BanditConfig]:
+def load_translator(path: Path) -> tuple[Translator, tuple[WordNumbers, WordNumbers], BanditConfig]:
     """A trained translator with its words and settings.
 
     Raises:

@@ -43,7 +43,7 @@ PRINTED: Mapping[tuple[str, str], Sequence[str]] = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class BanditStudySetting:
     """What all runs of a study share."""
 
     data: Path
@@ -91,7 +91,9 @@ def sweep_jobs(sweeps: Mapping[str, Sequence[float]] = SWEEPS) -> list[Job]:
 STUDIES: Mapping[str, Callable[[], list[Job]]] = {"3.2": table_jobs, "3.4": curve_jobs, "3.5": sweep_jobs}
 
 
-def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+def run_study(
+    setting: BanditStudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print
+) -> dict[str, Path]:
     """Run what is missing and write tables and figures; returns the Markdown files.
 
     Results do not depend on `workers`.
@@ -121,35 +123,35 @@ def distinct(jobs: Sequence[Job]) -> list[Job]:
     return list(longest.values())
 
 
-def report(setting: Setting, names: Sequence[str]) -> dict[str, Path]:
+def report(setting: BanditStudySetting, names: Sequence[str]) -> dict[str, Path]:
     """Write the tables and figures of runs that are there; sweeps show the settings that all seeds have."""
     return {name: {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps}[name](setting) for name in names}
 
 
-def history(setting: Setting, seed: int, job: Job) -> list[dict[str, float]]:
+def history(setting: BanditStudySetting, seed: int, job: Job) -> list[dict[str, float]]:
     """What each finished pass of a run gave; nothing if it has not all its passes."""
     path = folder_of(setting, seed, job) / "result.json"
     found = json.loads(path.read_text())["history"] if path.exists() else []
     return found[: job.passes] if len(found) >= job.passes else []
 
 
-def done(setting: Setting, *jobs: Job) -> list[int]:
+def done(setting: BanditStudySetting, *jobs: Job) -> list[int]:
     """The seeds that have all these runs."""
     return [s for s in setting.repeats if all(history(setting, s, job) for job in jobs)]
 
 
-def gains(setting: Setting, job: Job, column: str, turn: int = 0) -> list[float]:
+def gains(setting: BanditStudySetting, job: Job, column: str, turn: int = 0) -> list[float]:
     """Difference to the reference model in a pass, of each seed that has both."""
     base = Job(job.reference, "reference")
     seeds = done(setting, job, base)
     return [history(setting, s, job)[turn][column] - history(setting, s, base)[0][column] for s in seeds]
 
 
-def folder_of(setting: Setting, seed: int, job: Job) -> Path:
+def folder_of(setting: BanditStudySetting, seed: int, job: Job) -> Path:
     return setting.out / f"seed_{seed}" / job.reference / job.name
 
 
-def _prepare(setting: Setting, seed: int, references: Sequence[str], note: Note) -> int:
+def _prepare(setting: BanditStudySetting, seed: int, references: Sequence[str], note: Note) -> int:
     torch.set_num_threads(setting.threads)
     m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
     pretrain(m, home / "pretrain", note=note)
@@ -158,7 +160,7 @@ def _prepare(setting: Setting, seed: int, references: Sequence[str], note: Note)
     return seed
 
 
-def _run(setting: Setting, seed: int, job: Job, note: Note) -> str:
+def _run(setting: BanditStudySetting, seed: int, job: Job, note: Note) -> str:
     if not history(setting, seed, job):
         torch.set_num_threads(setting.threads)
         m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
@@ -176,7 +178,7 @@ def _run(setting: Setting, seed: int, job: Job, note: Note) -> str:
     return f"seed {seed}, {job.reference}, {job.name}: {SENTENCE} {last[SENTENCE]:.2f}, {HELD_OUT} {last[HELD_OUT]:.2f}"
 
 
-def _write_table(setting: Setting) -> Path:
+def _write_table(setting: BanditStudySetting) -> Path:
     lines = [
         "# Table 3.2: translation scores and their improvement by one round of ratings",
         "",
@@ -201,7 +203,7 @@ def _write_table(setting: Setting) -> Path:
     return _markdown(setting, "table_3.2.md", lines)
 
 
-def _write_curves(setting: Setting) -> Path:
+def _write_curves(setting: BanditStudySetting) -> Path:
     job = Job("full", "a2c", passes=PASSES)
     if not gains(setting, job, SENTENCE):
         raise ValueError(f"{setting.out}: no seed has the {PASSES} passes of Figure 3.4 yet; run it without --report")
@@ -220,7 +222,7 @@ def _write_curves(setting: Setting) -> Path:
     return _markdown(setting, "figure_3.4.md", [*lines, "", printed])
 
 
-def _write_sweeps(setting: Setting) -> Path:
+def _write_sweeps(setting: BanditStudySetting) -> Path:
     """Every setting that some seed has; those that are missing are named."""
     columns = (SENTENCE, HELD_OUT)
     clean = Job("full", "a2c")
@@ -258,7 +260,7 @@ def _write_sweeps(setting: Setting) -> Path:
     return _markdown(setting, "figure_3.5.md", lines + (["", f"Not run yet: {', '.join(missing)}."] if missing else []))
 
 
-def _clean_gains(setting: Setting, job: Job) -> list[float]:
+def _clean_gains(setting: BanditStudySetting, job: Job) -> list[float]:
     """What the clean rater gave the seeds that have `job`."""
     base, clean = Job(job.reference, "reference"), Job(job.reference, "a2c")
     seeds = done(setting, job, base, clean)
@@ -270,7 +272,7 @@ def shown(e: Estimate) -> str:
     return f"{e.mean:.2f}" if math.isnan(e.half) else f"{e.mean:.2f} ± {e.half:.2f}"
 
 
-def _markdown(setting: Setting, name: str, lines: Sequence[str]) -> Path:
+def _markdown(setting: BanditStudySetting, name: str, lines: Sequence[str]) -> Path:
     c = setting.config
     splits = (
         json.loads((setting.data / "corpus.json").read_text())["splits"]

@@ -28,7 +28,7 @@ from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.runs import Run
 from agents.bandit.store import load_weights, save_weights
 from agents.bandit.translate import Numbered, batches, decode, drawn_with, greedy, numbered, padded, perplexity
-from agents.bandit.words import BUILDERS, Lexicon
+from agents.bandit.words import BUILDERS, WordNumbers
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
 from agents.imitation.loop import Note
 from embodied.locks import locked
@@ -56,12 +56,12 @@ _PRETRAINING = (
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class NumberedCorpus:
     """A corpus in numbers, ready to be learned from."""
 
     config: BanditConfig
     splits: Mapping[str, Numbered]
-    lexicons: tuple[Lexicon, Lexicon]
+    lexicons: tuple[WordNumbers, WordNumbers]
     digest: str
     """Of the sets for pre-training and judging."""
     bandit_digest: str
@@ -89,7 +89,7 @@ class Material:
         return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
 
 
-def material(folder: Path, config: BanditConfig) -> Material:
+def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
     """Read a corpus folder; words are those of its supervised set.
 
     Raises:
@@ -101,12 +101,12 @@ def material(folder: Path, config: BanditConfig) -> Material:
     source = build([a for a, _ in corpus["supervised"]], config.source_words)
     target = build([b for _, b in corpus["supervised"]], config.target_words)
     splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
-    return Material(
+    return NumberedCorpus(
         config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,))
     )
 
 
-def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
     """Supervised pre-training (3.1.5.2); writes weak.safetensors and full.safetensors into `folder`.
 
     Differs from the text in what 'full' is: not the tenth pass but the one of lowest dev perplexity,
@@ -143,7 +143,7 @@ def pretrain(m: Material, folder: Path, *, note: Note = print) -> list[dict[str,
     return _passes(run, m, data, "pretrain", config.pretraining_passes, step, finish, note)
 
 
-def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
     """Teach a critic what ratings the translator in `reference` gets (Eq 3.7); writes critic.safetensors.
 
     Ratings are unperturbed here, as in the text (3.1.5.1).
@@ -173,7 +173,7 @@ def teach_critic(m: Material, reference: Path, folder: Path, *, note: Note = pri
 
 
 def bandit(
-    m: Material,
+    m: NumberedCorpus,
     reference: Path,
     critic_file: Path,
     folder: Path,
@@ -259,7 +259,7 @@ def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> T
 
 
 def sampled(
-    translator: Translator, m: Material, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
+    translator: Translator, m: NumberedCorpus, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
 ) -> list[list[int]]:
     """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners draw alike."""
     longest = m.config.longest
@@ -267,12 +267,12 @@ def sampled(
     return decode(translator, rows(data.source, chosen), drawn_with(uniforms), longest)
 
 
-def scores_of(said: Sequence[Sequence[int]], m: Material, data: Numbered, chosen: np.ndarray) -> list[float]:
+def scores_of(said: Sequence[Sequence[int]], m: NumberedCorpus, data: Numbered, chosen: np.ndarray) -> list[float]:
     """What a perfect rater would say: smoothed sentence BLEU of the words against the reference."""
     return [sentence_bleu(m.lexicons[1].decode(s), data.references[i]) for s, i in zip(said, chosen, strict=True)]
 
 
-def judged(translator: Translator, m: Material, split: str) -> float:
+def judged(translator: Translator, m: NumberedCorpus, split: str) -> float:
     """Corpus BLEU of greedy translations (A.6), 0 to 100."""
     data = m.splits[split]
     return corpus_bleu(greedy(translator, data, m.lexicons[1], m.config.longest), data.references)
@@ -287,7 +287,7 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
 
 
 def _passes(
-    run: Run, m: Material, data: Numbered, purpose: str, passes: int, step: Step, finish: Finish, note: Note
+    run: Run, m: NumberedCorpus, data: Numbered, purpose: str, passes: int, step: Step, finish: Finish, note: Note
 ) -> list[dict[str, float]]:
     """Go on with `run` until it has had so many passes over `data`; returns what `finish` said of each.
 

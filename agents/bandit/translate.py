@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from agents.bandit.network import Translator
-from agents.bandit.words import END_NUMBER, PAD_NUMBER, Lexicon
+from agents.bandit.words import END_NUMBER, PAD_NUMBER, WordNumbers
 
 Choice = Callable[[Tensor, Tensor, int], Tensor]
 """(logits (k, V), rows (k,) of the batch, step) to chosen words (k,)."""
@@ -32,7 +32,9 @@ class Numbered:
         return len(self.source)
 
 
-def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Lexicon, target: Lexicon) -> Numbered:
+def numbered(
+    pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: WordNumbers, target: WordNumbers
+) -> Numbered:
     """`pairs` in the numbers of two lexicons."""
     return Numbered(
         [source.encode(a) for a, _ in pairs], [target.encode(b) for _, b in pairs], [tuple(b) for _, b in pairs]
@@ -107,7 +109,7 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
 
 
 def greedy(
-    translator: Translator, data: Numbered, lexicon: Lexicon, longest: int, batch: int = 128
+    translator: Translator, data: Numbered, lexicon: WordNumbers, longest: int, batch: int = 128
 ) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
     found: list[tuple[str, ...]] = [()] * len(data)

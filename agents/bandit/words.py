@@ -16,7 +16,7 @@ PAD_NUMBER, UNKNOWN_NUMBER, END_NUMBER = 0, 1, 2
 """Numbers of PAD, UNKNOWN and END; END also stands before the first word of a translation."""
 
 
-class Lexicon(Protocol):
+class WordNumbers(Protocol):
     """Turns the words of a sentence into numbers, and numbers into words."""
 
     def __len__(self) -> int: ...
@@ -109,14 +109,14 @@ def build_pieces(sentences: Iterable[Sequence[str]], most: int) -> Pieces:
     return Pieces(buffer.getvalue())
 
 
-BUILDERS: Mapping[str, Callable[[Iterable[Sequence[str]], int], Lexicon]] = {
+BUILDERS: Mapping[str, Callable[[Iterable[Sequence[str]], int], WordNumbers]] = {
     "words": build_words,
     "pieces": build_pieces,
 }
 
 
-def lexicon_from_json(body: dict[str, Any]) -> Lexicon:
-    """What a Lexicon's `to_json` wrote."""
+def lexicon_from_json(body: dict[str, Any]) -> WordNumbers:
+    """What the `to_json` of WordNumbers wrote."""
     if body["kind"] == "words":
         return Words(Vocabulary(tuple(body["words"])))
     return Pieces(bytes.fromhex(body["model"]))

@@ -10,7 +10,7 @@ from embodied.interface import Observation
 from embodied.policies import baselines
 
 
-class AskRule(Protocol):
+class HannaAskRule(Protocol):
     def __call__(
         self, probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator
     ) -> bool:
@@ -29,7 +29,7 @@ def ask_sampled(probability: float, observation: Observation, last_asked: int, *
     return bool(rng.random() < probability)
 
 
-def ask_above(threshold: float) -> AskRule:
+def ask_above(threshold: float) -> HannaAskRule:
     """Ask where the network's probability exceeds `threshold`: for evaluation."""
     return lambda probability, observation, last_asked, *, rng: probability > threshold
 
@@ -38,12 +38,12 @@ ask_greedily = ask_above(0.5)
 """Ask where the network finds it more likely than not."""
 
 
-def heuristic(rule: baselines.AskRule) -> AskRule:
+def heuristic(rule: baselines.AskRule) -> HannaAskRule:
     """A rule that does not listen to the network."""
     return lambda probability, observation, last_asked, *, rng: rule(observation, last_asked, rng=rng)
 
 
-RULES: dict[str, tuple[AskRule, AskRule]] = {
+RULES: dict[str, tuple[HannaAskRule, HannaAskRule]] = {
     "learned": (ask_sampled, ask_greedily),
     "never": (heuristic(baselines.never_ask),) * 2,
     "random": (heuristic(baselines.ask_at_random),) * 2,

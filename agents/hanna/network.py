@@ -29,7 +29,7 @@ SHORT = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
+class NetworkMemory:
     """What one network carries from step to step, for B agents. Keys and values are projected."""
 
     text_keys: Tensor
@@ -55,9 +55,9 @@ class Memory:
     similar_mask: Tensor
     """(B, n - 1) bool, which entries but the newest SIMATTEND may consider."""
 
-    def select(self, rows: Tensor) -> Memory:
+    def select(self, rows: Tensor) -> NetworkMemory:
         """The memory of some agents, in the order of `rows` (k,)."""
-        return Memory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+        return NetworkMemory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +97,14 @@ class StateNetwork(nn.Module):
         self.intra_feed = FeedForward(h, c.dropout)
         self.gate = nn.Linear(2 * h, h)
 
-    def start(self, batch: int, length: int) -> Memory:
+    def start(self, batch: int, length: int) -> NetworkMemory:
         """The memory of `batch` agents before their first step, for instructions of `length` words."""
         like = self.inter_in.weight
         zero = like.new_zeros(batch, self.config.hidden_size)
         seen = torch.ones(batch, 1, dtype=torch.bool, device=like.device)
         inter_keys, inter_values = self.inter_attend.empty(batch, like)
         intra_keys, intra_values = self.intra_attend.empty(batch, like)
-        return Memory(
+        return NetworkMemory(
             text_keys=zero[:, None].expand(-1, length, -1),
             text_values=zero[:, None].expand(-1, length, -1),
             text_mask=seen.expand(-1, length),
@@ -122,8 +122,8 @@ class StateNetwork(nn.Module):
         )
 
     def forward(
-        self, m: Memory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor, similar: Tensor
-    ) -> tuple[Tensor, Memory]:
+        self, m: NetworkMemory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor, similar: Tensor
+    ) -> tuple[Tensor, NetworkMemory]:
         """One step.
 
         Args:
@@ -180,7 +180,7 @@ class StateNetwork(nn.Module):
             similar_mask=similar_mask,
         )
 
-    def _read(self, m: Memory, percept: Percept) -> Memory:
+    def _read(self, m: NetworkMemory, percept: Percept) -> NetworkMemory:
         """M^text read anew for the agents whose instruction changed (D.5).
 
         Short and long instructions are encoded apart, because padding costs as much as words.
@@ -200,7 +200,7 @@ class StateNetwork(nn.Module):
         return dataclasses.replace(m, text_keys=keys, text_values=values, text_mask=percept.tokens != 0)
 
     @staticmethod
-    def _reset(m: Memory, who: Tensor) -> Memory:
+    def _reset(m: NetworkMemory, who: Tensor) -> NetworkMemory:
         """Inter-task state, memory and local time back to zero for the agents in `who` (B,)."""
         keep = ~who[:, None]
         opening = torch.arange(m.inter_mask.shape[1], device=who.device) == 0
@@ -232,11 +232,13 @@ class HannaNetwork(nn.Module):
         # An agent that asks at every second step hears a new text each time and learns to walk by none.
         self.ask_out.bias.data = torch.tensor([1.0, -1.0])  # one request in eight chances (docs/sources.md, S30)
 
-    def start(self, batch: int, length: int) -> tuple[Memory, Memory]:
+    def start(self, batch: int, length: int) -> tuple[NetworkMemory, NetworkMemory]:
         """Memories of both networks before the first step of `batch` agents."""
         return self.navigation.start(batch, length), self.help.start(batch, length)
 
-    def forward(self, memory: tuple[Memory, Memory], percept: Percept) -> tuple[Scores, tuple[Memory, Memory]]:
+    def forward(
+        self, memory: tuple[NetworkMemory, NetworkMemory], percept: Percept
+    ) -> tuple[Scores, tuple[NetworkMemory, NetworkMemory]]:
         """One step of B agents; no gradient flows from asking into navigation."""
         delta = target_similarity(percept.current, percept.target)  # (B, 36)
         everywhere = torch.ones_like(percept.new_task)

@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.hanna.asking import RULES, AskRule, ask_greedily, ask_sampled
+from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
@@ -97,7 +97,7 @@ class HannaPolicy:
     vocabulary: Vocabulary
     bank: FeatureBank
     choose: Chooser = choose_likeliest
-    ask_rule: AskRule = ask_greedily
+    ask_rule: HannaAskRule = ask_greedily
     instruction_length: int = 50
     turn_to_agent: bool = True
     """Rows of views begin at the agent's own heading. The authors' program keeps them absolute
@@ -248,7 +248,10 @@ def thought_of(moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | 
 
 
 def for_training(
-    policy: HannaPolicy, ask_rule: AskRule = ask_sampled, environment_dropout: float = 0.0, guided_asking: float = 0.0
+    policy: HannaPolicy,
+    ask_rule: HannaAskRule = ask_sampled,
+    environment_dropout: float = 0.0,
+    guided_asking: float = 0.0,
 ) -> HannaPolicy:
     """The same networks, sampling their actions and keeping what they said."""
     return dataclasses.replace(

@@ -113,7 +113,7 @@ def _train(
         write_json(folder / "settings.json", json.loads(config.to_json()), indent=1)
     guided = config.guided_asking if config.ask_rule == "learned" else 0.0
     learner = for_training(agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided)
-    report = Report(folder, config.iterations, progress, note)
+    report = TrainingLog(folder, config.iterations, progress, note)
     began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
 
     def now() -> Progress:
@@ -241,7 +241,7 @@ def validate(
     split: Split,
     progress: Progress,
     folder: Path,
-    report: Report,
+    report: TrainingLog,
     seconds: float,
     on_validation: Callable[[int, Sequence[Episode]], None] | None,
 ) -> Progress:
@@ -275,7 +275,7 @@ def validate(
     return progress
 
 
-class Report:
+class TrainingLog:
     """Owns the progress line, validation.jsonl and TensorBoard's scalars of one session."""
 
     EVERY = 20

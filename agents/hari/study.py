@@ -60,7 +60,7 @@ PRINTED: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class HariStudySetting:
     """What all runs of a study share."""
 
     data: Path
@@ -94,7 +94,9 @@ TABLES: Mapping[str, Sequence[str]] = {
 """Table or figure to the variants it needs."""
 
 
-def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+def run_study(
+    setting: HariStudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print
+) -> dict[str, Path]:
     """Train and judge what is missing and write tables and figures; returns the Markdown files.
 
     Results do not depend on `workers`.
@@ -112,7 +114,7 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
     parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
     for line in parallel(joblib.delayed(_run)(setting, executor, v, s, note) for v, s in jobs):
         note(line)
-    writers: Mapping[str, Callable[[Setting], Path]] = {
+    writers: Mapping[str, Callable[[HariStudySetting], Path]] = {
         "4.7": lambda x: _write_table(x, "4.7", [*RULE_ROWS, *TABLES["4.7"]], "test"),
         "4.8": lambda x: _write_table(x, "4.8", TABLES["4.8"], "val"),
         "figure 4.5": _write_behaviour,
@@ -121,7 +123,7 @@ def run_study(setting: Setting, names: Sequence[str], *, workers: int = 1, note:
     return {name: writers[name](setting) for name in names}
 
 
-def _run(setting: Setting, executor: Path, variant: str, seed: int, note: Note) -> str:
+def _run(setting: HariStudySetting, executor: Path, variant: str, seed: int, note: Note) -> str:
     """Train one intention policy and judge it on validation and test splits, unless that is done."""
     torch.set_num_threads(setting.threads)
     data, folder = hari_data(setting.data), setting.folder(variant, seed)
@@ -143,7 +145,7 @@ def _run(setting: Setting, executor: Path, variant: str, seed: int, note: Note) 
     return f"{variant}, seed {seed}: trained and judged"
 
 
-def rows_of(setting: Setting, name: str, split: str) -> list[dict[str, float]]:
+def rows_of(setting: HariStudySetting, name: str, split: str) -> list[dict[str, float]]:
     """The means of one row of a table on one split, per seed."""
     variant = "learned" if name in RULE_ROWS else name
     row = name if name in RULE_ROWS else "learned"
@@ -155,12 +157,12 @@ def rows_of(setting: Setting, name: str, split: str) -> list[dict[str, float]]:
     return found
 
 
-def estimates(setting: Setting, name: str, split: str, column: str) -> Estimate:
+def estimates(setting: HariStudySetting, name: str, split: str, column: str) -> Estimate:
     """A number of a row over seeds, with Student's interval."""
     return across_seeds([r[column] for r in rows_of(setting, name, split)])
 
 
-def _write_table(setting: Setting, table: str, names: Sequence[str], when: str) -> Path:
+def _write_table(setting: HariStudySetting, table: str, names: Sequence[str], when: str) -> Path:
     """Success per condition, and actions over all of them, beside what the dissertation prints."""
     splits = [f"{when}_{c}" for c in CONDITIONS]
     heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
@@ -176,7 +178,7 @@ def _write_table(setting: Setting, table: str, names: Sequence[str], when: str) 
     return path
 
 
-def _write_behaviour(setting: Setting) -> Path:
+def _write_behaviour(setting: HariStudySetting) -> Path:
     """Figure 4.5: which requests are made in which condition, and when."""
     per_condition = {
         c: {a: estimates(setting, "learned", f"val_{c}", a) for a in ("CUR", "GOAL", "SUB")} for c in CONDITIONS
@@ -204,7 +206,7 @@ def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> np.ndarray:
     return counts
 
 
-def _write_costs(setting: Setting) -> Path:
+def _write_costs(setting: HariStudySetting) -> Path:
     """Figure 4.6: success and actions against the cost of an action, for several horizons."""
     variant = lambda c, h: "learned" if (c, h) == (0.01, 30) else f"cost {c:g}, H {h}"
     success = {

@@ -23,9 +23,9 @@ from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.closure import code_digest
 from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
-from assets.importing.obj import Material, MeshError, libraries, parse_mtl, parse_obj
+from assets.importing.obj import MeshError, MtlMaterial, libraries, parse_mtl, parse_obj
 from assets.importing.sh3f import Pack, PackError
-from assets.records import Finish, MeshPart, Recipe, bounds
+from assets.records import Finish, ImportRecipe, MeshPart, bounds
 
 READER = "assets.importing.own"
 """The module that imports models of all formats: its code is part of every cache key."""
@@ -59,14 +59,16 @@ class RawPart:
     image: Image.Image | None = None
 
 
-def import_model(pack: Pack, recipe: Recipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
+def import_model(pack: Pack, recipe: ImportRecipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
     """The parts of a library's model (the OBJ entry `obj`, that of the recipe's key if None), from
     the cache if it is there and sound."""
     obj = obj or pack.entries[recipe.model or recipe.key].model
     return cached(recipe, pack.digest, cache, lambda: read_obj(pack.read, obj, f"{pack.path.name}: {obj}"))
 
 
-def cached(recipe: Recipe, source: str, cache: Path, read: Callable[[], tuple[RawPart, ...]]) -> tuple[MeshPart, ...]:
+def cached(
+    recipe: ImportRecipe, source: str, cache: Path, read: Callable[[], tuple[RawPart, ...]]
+) -> tuple[MeshPart, ...]:
     """The finished parts of `recipe`; `read` and the import run only when the cache lacks them.
 
     Args:
@@ -95,13 +97,13 @@ def read_obj(read: Reader, name: str, where: str, remedy: str = "install the pac
     """
     folder = PurePosixPath(name).parent
     obj = parse_obj(read(name).decode("latin-1"), where)
-    materials: dict[str, Material] = {}
+    materials: dict[str, MtlMaterial] = {}
     for library in obj.libraries:
         materials |= parse_mtl((_read_if_there(read, str(folder / library)) or b"").decode("latin-1"))
     images: dict[str, Image.Image | None] = {}
     parts = []
     for group in obj.groups:
-        material = materials.get(group.material, Material(group.material))
+        material = materials.get(group.material, MtlMaterial(group.material))
         image = None
         if material.texture and (group.uv_corners >= 0).all():
             if material.texture not in images:
@@ -136,7 +138,7 @@ def _read_if_there(read: Reader, name: str) -> bytes | None:
         return None
 
 
-def finish_parts(raw: tuple[RawPart, ...], recipe: Recipe) -> list[tuple[MeshPart, Image.Image | None]]:
+def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[MeshPart, Image.Image | None]]:
     """Sized, turned, welded, decimated and shaded parts with their texture images.
 
     Raises:
@@ -179,7 +181,7 @@ def _looking(part: RawPart, looks: dict[str, str]) -> RawPart:
     return replace(part, finish=finish, image=part.image if keep else None, uv=part.uv if keep else None)
 
 
-def _placed(raw: tuple[RawPart, ...], recipe: Recipe) -> list[np.ndarray]:
+def _placed(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[np.ndarray]:
     """Vertices of each part in the asset frame, metres, the bounding box at its real size."""
     turn = np.array(recipe.rotation, dtype=np.float64).reshape(3, 3).T
     turned = [p.vertices @ turn for p in raw]
@@ -200,7 +202,7 @@ def _placed(raw: tuple[RawPart, ...], recipe: Recipe) -> list[np.ndarray]:
 
 
 def _part(
-    part: RawPart, points: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, recipe: Recipe
+    part: RawPart, points: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, recipe: ImportRecipe
 ) -> tuple[MeshPart, Image.Image | None]:
     vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
     finish = part.finish

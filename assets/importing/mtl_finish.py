@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assets.importing.obj import Material
+from assets.importing.obj import MtlMaterial
 from assets.records import Finish
 
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
@@ -28,7 +28,7 @@ WHITEST = 0.92
 """Largest sRGB value kept: white paint reflects about 0.83 of the light, never all of it."""
 
 
-def finish_of(material: Material, has_texture: bool) -> Finish:
+def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
     """The Finish of an MTL material, its texture apart.
 
     Roughness follows Blinn-Phong's exponent n by alpha = sqrt(2 / (n + 2)) (Walter et al. 2007,

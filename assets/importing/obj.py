@@ -23,7 +23,7 @@ class MeshError(ValueError):
 
 
 @dataclass(frozen=True)
-class Material:
+class MtlMaterial:
     """What an MTL file says about one material; colours are sRGB in [0, 1]."""
 
     name: str
@@ -99,9 +99,9 @@ def libraries(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(rest.strip() for head, _, rest in found if head == "mtllib"))
 
 
-def parse_mtl(text: str) -> dict[str, Material]:
+def parse_mtl(text: str) -> dict[str, MtlMaterial]:
     """The materials of an MTL file by name; lines it does not know are ignored."""
-    materials: dict[str, Material] = {}
+    materials: dict[str, MtlMaterial] = {}
     name = None
     for line in text.splitlines():
         words = line.split()
@@ -110,7 +110,7 @@ def parse_mtl(text: str) -> dict[str, Material]:
         head, rest = words[0], words[1:]
         if head == "newmtl":
             name = line.split(None, 1)[1].strip() if rest else ""
-            materials[name] = Material(name)
+            materials[name] = MtlMaterial(name)
         elif name is not None and (change := _material_field(head, rest, line)):
             materials[name] = dataclasses.replace(materials[name], **change)
     return materials

@@ -12,7 +12,7 @@ from assets.importing.importer import RawPart, Reader, cached, import_model, obj
 from assets.importing.mtl_finish import corrected
 from assets.importing.obj import MeshError
 from assets.importing.sh3f import MAX_ENTRY, open_pack
-from assets.records import Asset, Finish, MeshPart, Recipe
+from assets.records import Asset, Finish, ImportRecipe, MeshPart
 from assets.rows import (
     FIELDS,
     TEXT,
@@ -52,7 +52,7 @@ class OwnModel:
 
 def read_own(
     folder: Path, classes: Mapping[str, Row]
-) -> tuple[dict[str, Asset], dict[str, Recipe], dict[str, OwnModel]]:
+) -> tuple[dict[str, Asset], dict[str, ImportRecipe], dict[str, OwnModel]]:
     """The assets of a user's folder, with their recipes and files by key; docs/assets.md has the format.
 
     Args:
@@ -84,7 +84,7 @@ def read_own(
     return assets, recipes, own
 
 
-def import_own(model: OwnModel, recipe: Recipe, cache: Path) -> tuple[MeshPart, ...]:
+def import_own(model: OwnModel, recipe: ImportRecipe, cache: Path) -> tuple[MeshPart, ...]:
     """The finished parts of a user's model, cached like those of a pack.
 
     Raises:
@@ -141,7 +141,7 @@ def _reader(path: Path) -> Reader:
     return read
 
 
-def _check_looks(where: str, recipe: Recipe) -> None:
+def _check_looks(where: str, recipe: ImportRecipe) -> None:
     for material, words in recipe.looks:
         try:
             corrected(Finish(), words)

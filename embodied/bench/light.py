@@ -26,7 +26,7 @@ from embodied.light.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
-from embodied.render.filament import Painter
+from embodied.render.filament import FilamentPainter
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -64,7 +64,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Report:
+class LightReport:
     """What `embodied bench light` shows."""
 
     facts: dict
@@ -73,7 +73,7 @@ class Report:
 
 def compare(
     catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
-) -> Report:
+) -> LightReport:
     """Draw VIEWS rooms of each of HOUSES houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Args:
@@ -101,7 +101,7 @@ def compare(
         out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes()
     )
     write_json(out / "light.json", facts, indent=1)
-    return Report(facts, table(facts))
+    return LightReport(facts, table(facts))
 
 
 def viewpoints(
@@ -141,7 +141,7 @@ def draw(
     for way in WAYS:
         if way in DRAWN:
             lit = None if way == "unlit" else baked.get(way, baked[BAKES[-1]]).lit
-            painter = Painter(house, catalogue, baked[BAKES[-1]].lit) if way == "filament" else None
+            painter = FilamentPainter(house, catalogue, baked[BAKES[-1]].lit) if way == "filament" else None
             with Renderer(house, catalogue, lit=lit, painter=painter) as r:
                 for room, eye, yaw in views:
                     rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb

@@ -16,7 +16,7 @@ from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv, in_step
 from embodied.gym.eyes import Eyes, PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.spaces import Layout
+from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
@@ -69,7 +69,7 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
 
 
 def _env(world: World, tasks: list[Task], eyes: Eyes) -> HelpGymEnv:
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, eyes, layout=Layout())
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, eyes, layout=SpaceLayout())
 
 
 def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
@@ -77,7 +77,7 @@ def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
     rng = stream(seed, "bench", "walk")
     o, _ = env.reset(seed=seed)
     for _ in range(steps):
-        possible = np.flatnonzero(o["action_mask"][: Layout().candidates])
+        possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
         o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
         if terminated or truncated:
             o, _ = env.reset()
@@ -94,7 +94,7 @@ def _draw(env: HelpGymEnv, world: World, steps: int, seed: int) -> None:
     rng = stream(seed, "bench", "walk")
     o, _ = env.reset(seed=seed)
     for _ in range(steps):
-        possible = np.flatnonzero(o["action_mask"][: Layout().candidates])
+        possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
         o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
         pose = env._env.pose
         world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))

@@ -38,10 +38,10 @@ def run(args: argparse.Namespace) -> int:
 
 def run_hanna(args: argparse.Namespace) -> list[Path]:
     from agents.hanna.training_config import SCALES
-    from agents.study import Setting, run_study
+    from agents.study import StudySetting, run_study
     from embodied.cli.options import chosen
 
-    setting = Setting(
+    setting = StudySetting(
         args.data,
         args.encoder,
         args.out,
@@ -56,10 +56,10 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
 
 def run_hari(args: argparse.Namespace) -> list[Path]:
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
-    from agents.hari.study import Setting, run_study
+    from agents.hari.study import HariStudySetting, run_study
     from embodied.cli.options import chosen
 
-    setting = Setting(
+    setting = HariStudySetting(
         args.data,
         args.out,
         EXECUTION_SCALES[args.scale],
@@ -74,12 +74,12 @@ def run_hari(args: argparse.Namespace) -> list[Path]:
 
 def run_bandit(args: argparse.Namespace) -> list[Path]:
     from agents.bandit.config import SCALES
-    from agents.bandit.study import Setting, report, run_study
+    from agents.bandit.study import BanditStudySetting, report, run_study
     from embodied.cli.options import chosen
 
     if args.seeds < 1 or args.workers < 1:
         raise ValueError(f"--seeds and --workers should be at least 1, got {args.seeds} and {args.workers}")
-    setting = Setting(args.data, args.out, chosen(args, SCALES[args.scale]), args.seeds, args.threads)
+    setting = BanditStudySetting(args.data, args.out, chosen(args, SCALES[args.scale]), args.seeds, args.threads)
     if args.report:
         return list(report(setting, args.tables).values())
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())

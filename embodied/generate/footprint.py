@@ -80,7 +80,7 @@ class Cap:
 
 
 @dataclass(frozen=True)
-class Run:
+class Stretch:
     """A stretch along the spine: the axis it runs along, where on it it starts, in which sense, and how long it is."""
 
     axis: str
@@ -135,7 +135,7 @@ class Wing:
 
 
 @dataclass(frozen=True)
-class Cross:
+class CrossShape:
     """A bar along x with a wing below it and one above, decimetres."""
 
     bar: Wing
@@ -199,8 +199,8 @@ def _flat(area: float, rng: np.random.Generator) -> Footprint:
     top, bottom = int(rng.integers(35, 44)), int(rng.integers(20, 29))
     length = round(area * 100 / (top + bottom))
     strips = (
-        Run("x", 0, 1, length).strip(bottom, 1, top, rank=0.0, band=0, u_band=0),
-        Run("x", 0, 1, length).strip(bottom, -1, bottom, rank=0.0, band=0, u_band=0),
+        Stretch("x", 0, 1, length).strip(bottom, 1, top, rank=0.0, band=0, u_band=0),
+        Stretch("x", 0, 1, length).strip(bottom, -1, bottom, rank=0.0, band=0, u_band=0),
     )
     return Footprint(shape="rectangle", strips=strips, bands=(), caps=(), corridor=0)
 
@@ -226,15 +226,17 @@ def _one_wing(
     if length - left - right < 35:
         right = 0
     left, right = (0 if w and w < 30 else w for w in (left, right))
-    strips = [Run("x", left, 1, length - left - right).strip(bottom + corridor, 1, top, rank=left, band=0, u_band=0)]
+    strips = [
+        Stretch("x", left, 1, length - left - right).strip(bottom + corridor, 1, top, rank=left, band=0, u_band=0)
+    ]
     edges = [left]
     for x0, x1, _ in bumps:
         edges += [x0, x1]
     edges = sorted({*(min(max(e, left), length - right) for e in edges), length - right})
     for x0, x1 in itertools.pairwise(edges):
         extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
-        strips.append(Run("x", x0, 1, x1 - x0).strip(bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
-    band = Run("x", left, 1, length - left - right).corridor(bottom, bottom + corridor, (left == 0, right == 0))
+        strips.append(Stretch("x", x0, 1, x1 - x0).strip(bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
+    band = Stretch("x", left, 1, length - left - right).corridor(bottom, bottom + corridor, (left == 0, right == 0))
     caps = []
     if left:
         caps.append(Cap(band=0, at_start=True, axis="y", rect=(0, 0, left, depth), passage=(bottom, bottom + corridor)))
@@ -303,23 +305,25 @@ def _l_or_t(
     cap = _cap_length(rng.uniform(0.18, 0.26), area, (24, 60), bar.depth, xb) if rng.random() < 0.6 else 0
     foot = _cap_length(rng.uniform(0.08, 0.14), area, (18, 34), wing.depth, drop) if rng.random() < 0.4 else 0
     end = xb + corridor if shape == "L" else long
-    band_a = Run("x", cap, 1, end - cap).corridor(bottom, bottom + corridor, (cap == 0, shape == "T"))
-    band_b = Run("y", bottom, -1, drop + bottom - foot).corridor(xb, xb + corridor, (False, foot == 0))
-    a_top = Run("x", cap, 1, long - cap).strip(bottom + corridor, 1, top, rank=cap, band=0, u_band=0)
-    a_left = Run("x", cap, 1, xb - cap).strip(bottom, -1, bottom, rank=cap, band=0, u_band=0)
-    b_left = Run("y", 0, -1, drop - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom)
+    band_a = Stretch("x", cap, 1, end - cap).corridor(bottom, bottom + corridor, (cap == 0, shape == "T"))
+    band_b = Stretch("y", bottom, -1, drop + bottom - foot).corridor(xb, xb + corridor, (False, foot == 0))
+    a_top = Stretch("x", cap, 1, long - cap).strip(bottom + corridor, 1, top, rank=cap, band=0, u_band=0)
+    a_left = Stretch("x", cap, 1, xb - cap).strip(bottom, -1, bottom, rank=cap, band=0, u_band=0)
+    b_left = Stretch("y", 0, -1, drop - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom)
     strips: tuple[Strip, ...]
     if shape == "L":
         length = drop + bottom + corridor - foot
-        b_right = Run("y", bottom + corridor, -1, length).strip(
+        b_right = Stretch("y", bottom + corridor, -1, length).strip(
             xb + corridor, 1, right, rank=xb, band=1, u_band=-corridor
         )
         strips = (a_top, a_left, b_left, b_right)
     else:
-        a_right = Run("x", xb + corridor, 1, long - xb - corridor).strip(
+        a_right = Stretch("x", xb + corridor, 1, long - xb - corridor).strip(
             bottom, -1, bottom, rank=xb, band=0, u_band=xb + corridor - cap
         )
-        b_right = Run("y", 0, -1, drop - foot).strip(xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom)
+        b_right = Stretch("y", 0, -1, drop - foot).strip(
+            xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom
+        )
         strips = (a_top, a_left, a_right, b_left, b_right)
     caps = []
     if cap:
@@ -346,17 +350,17 @@ def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]
     (left, right), fall = (private[0].first, private[0].second), private[1]
     xa = out
     xb = long - right - corridor
-    band_p = Run("y", -drop, 1, drop + bottom).corridor(xa, xa + corridor, (True, False))
-    band_a = Run("x", xa, 1, xb + corridor - xa).corridor(bottom, bottom + corridor, (False, False))
-    band_q = Run("y", bottom, -1, fall + bottom).corridor(xb, xb + corridor, (False, True))
+    band_p = Stretch("y", -drop, 1, drop + bottom).corridor(xa, xa + corridor, (True, False))
+    band_a = Stretch("x", xa, 1, xb + corridor - xa).corridor(bottom, bottom + corridor, (False, False))
+    band_q = Stretch("y", bottom, -1, fall + bottom).corridor(xb, xb + corridor, (False, True))
     far = drop + bottom
     strips = (
-        Run("y", -drop, 1, drop + bottom + corridor).strip(xa, -1, out, rank=0.0, band=0, u_band=0),
-        Run("y", -drop, 1, drop).strip(xa + corridor, 1, inner, rank=0.0, band=0, u_band=0),
-        Run("x", 0, 1, long).strip(bottom + corridor, 1, top, rank=far - xa, band=1, u_band=-xa),
-        Run("x", xa + corridor, 1, xb - xa - corridor).strip(bottom, -1, bottom, rank=far, band=1, u_band=corridor),
-        Run("y", 0, -1, fall).strip(xb, -1, left, rank=far + xb - xa + bottom, band=2, u_band=bottom),
-        Run("y", bottom + corridor, -1, fall + bottom + corridor).strip(
+        Stretch("y", -drop, 1, drop + bottom + corridor).strip(xa, -1, out, rank=0.0, band=0, u_band=0),
+        Stretch("y", -drop, 1, drop).strip(xa + corridor, 1, inner, rank=0.0, band=0, u_band=0),
+        Stretch("x", 0, 1, long).strip(bottom + corridor, 1, top, rank=far - xa, band=1, u_band=-xa),
+        Stretch("x", xa + corridor, 1, xb - xa - corridor).strip(bottom, -1, bottom, rank=far, band=1, u_band=corridor),
+        Stretch("y", 0, -1, fall).strip(xb, -1, left, rank=far + xb - xa + bottom, band=2, u_band=bottom),
+        Stretch("y", bottom + corridor, -1, fall + bottom + corridor).strip(
             xb + corridor, 1, right, rank=far + xb - xa, band=2, u_band=-corridor
         ),
     )
@@ -390,7 +394,9 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     foot = _cap_length(rng.uniform(0.06, 0.1), area, usual, wing, below) if rng.random() < 0.5 else 0
     head = _cap_length(rng.uniform(0.08, 0.12), area, usual, rise, above) if rng.random() < 0.8 else 0
     return _cross(
-        Cross(bar=bar, long=long, south=south, x_below=x_below, below=below, north=north, x_above=x_above, above=above),
+        CrossShape(
+            bar=bar, long=long, south=south, x_below=x_below, below=below, north=north, x_above=x_above, above=above
+        ),
         day,
         night,
         foot,
@@ -398,26 +404,26 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     )
 
 
-def _cross(c: Cross, day: int, night: int, foot: int, head: int) -> Footprint:
+def _cross(c: CrossShape, day: int, night: int, foot: int, head: int) -> Footprint:
     """The footprint of a cross with rooms of these lengths, 0 for none, across its left, right, lower and upper end."""
     corridor, deep, left, west = c.bar.corridor, c.bar.depth, c.south.first, c.north.first
     top, bottom = c.bar.first, c.bar.second
     roof, stop, xb, xc = bottom + corridor, c.long - night, c.x_below + left, c.x_above + west
     beyond_b, beyond_c = xb + corridor, xc + corridor
     strips = (
-        Run("x", day, 1, xc - day).strip(roof, 1, top, rank=day, band=0, u_band=0),
-        Run("x", beyond_c, 1, stop - beyond_c).strip(roof, 1, top, rank=xc, band=0, u_band=beyond_c - day),
-        Run("x", day, 1, xb - day).strip(bottom, -1, bottom, rank=day, band=0, u_band=0),
-        Run("x", beyond_b, 1, stop - beyond_b).strip(bottom, -1, bottom, rank=xb, band=0, u_band=beyond_b - day),
-        Run("y", 0, -1, c.below - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom),
-        Run("y", 0, -1, c.below - foot).strip(beyond_b, 1, c.south.second, rank=xb + bottom, band=1, u_band=bottom),
-        Run("y", deep, 1, c.above - head).strip(xc, -1, west, rank=0.4 * xc, band=2, u_band=top),
-        Run("y", deep, 1, c.above - head).strip(beyond_c, 1, c.north.second, rank=0.4 * xc, band=2, u_band=top),
+        Stretch("x", day, 1, xc - day).strip(roof, 1, top, rank=day, band=0, u_band=0),
+        Stretch("x", beyond_c, 1, stop - beyond_c).strip(roof, 1, top, rank=xc, band=0, u_band=beyond_c - day),
+        Stretch("x", day, 1, xb - day).strip(bottom, -1, bottom, rank=day, band=0, u_band=0),
+        Stretch("x", beyond_b, 1, stop - beyond_b).strip(bottom, -1, bottom, rank=xb, band=0, u_band=beyond_b - day),
+        Stretch("y", 0, -1, c.below - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom),
+        Stretch("y", 0, -1, c.below - foot).strip(beyond_b, 1, c.south.second, rank=xb + bottom, band=1, u_band=bottom),
+        Stretch("y", deep, 1, c.above - head).strip(xc, -1, west, rank=0.4 * xc, band=2, u_band=top),
+        Stretch("y", deep, 1, c.above - head).strip(beyond_c, 1, c.north.second, rank=0.4 * xc, band=2, u_band=top),
     )
     bands = (
-        Run("x", day, 1, stop - day).corridor(bottom, roof, (day == 0, night == 0)),
-        Run("y", bottom, -1, bottom + c.below - foot).corridor(xb, beyond_b, (False, foot == 0)),
-        Run("y", roof, 1, top + c.above - head).corridor(xc, beyond_c, (False, head == 0)),
+        Stretch("x", day, 1, stop - day).corridor(bottom, roof, (day == 0, night == 0)),
+        Stretch("y", bottom, -1, bottom + c.below - foot).corridor(xb, beyond_b, (False, foot == 0)),
+        Stretch("y", roof, 1, top + c.above - head).corridor(xc, beyond_c, (False, head == 0)),
     )
     caps = []
     if day:

@@ -39,14 +39,14 @@ from embodied.gym.eyes import (
 )
 from embodied.gym.playground import Playground, make_playground
 from embodied.gym.semantic_features import FeatureTable
-from embodied.gym.spaces import Layout, action_space, decode, encode, observation_space
+from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.render.pictures import PictureSettings
 from embodied.world import World
 
 STEP_COST = 0.01
-LAYOUT = Layout()
+LAYOUT = SpaceLayout()
 VIEW = (480, 640)
 """Height and width of the rendered view, pixels."""
 VIEW_ANGLE = np.radians(78.0)
@@ -73,7 +73,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         tasks: Sequence[Task],
         eyes: Eyes,
         *,
-        layout: Layout = LAYOUT,
+        layout: SpaceLayout = LAYOUT,
         shaping: bool = False,
         strict: bool = False,
         patience: int = 20,
@@ -202,7 +202,7 @@ class Stage:
     make_env: Callable[[], HelpEnv]
     tasks: Sequence[Task]
     eyes: Eyes
-    layout: Layout
+    layout: SpaceLayout
 
 
 def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGymEnv:
@@ -276,7 +276,7 @@ class StageSettings:
     """The features; those of the installed default encoder where not given."""
     worlds: Mapping[str, SeenPlace] | None = None
     """Worlds to play in; otherwise opened from `data`."""
-    layout: Layout | None = None
+    layout: SpaceLayout | None = None
     rules: str = AS_PUBLISHED
     """VNLA's rule of play, one of embodied.envs.vnla.RULES."""
     rooms: bool = True
@@ -306,7 +306,7 @@ def set_stage(kind: str, **settings: Any) -> Stage:
         rooms=wanted.rooms,
     )
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
-    layout = wanted.layout or Layout(descriptions=kind == "hari")
+    layout = wanted.layout or SpaceLayout(descriptions=kind == "hari")
     return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout)
 
 

@@ -28,7 +28,7 @@ LARGE = 1e6
 
 
 @dataclass(frozen=True)
-class Layout:
+class SpaceLayout:
     """Sizes of the spaces; what does not fit is an error, not a silent cut (text apart)."""
 
     candidates: int = 16
@@ -48,11 +48,11 @@ class Layout:
         return self.candidates + 1 + len(INTENTIONS)
 
 
-def action_space(layout: Layout) -> spaces.Discrete:
+def action_space(layout: SpaceLayout) -> spaces.Discrete:
     return spaces.Discrete(layout.actions)
 
 
-def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
+def observation_space(layout: SpaceLayout, eyes: Eyes) -> spaces.Dict:
     """Everything an Observation holds, padded with zeros, and what the eyes see."""
     whole: dict[str, Any] = {
         **eyes.spaces(),
@@ -71,7 +71,7 @@ def observation_space(layout: Layout, eyes: Eyes) -> spaces.Dict:
     return spaces.Dict(whole)
 
 
-def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, Any]:
+def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
@@ -83,7 +83,9 @@ def encode(o: Observation, eyes: Eyes, layout: Layout) -> dict[str, Any]:
     """
     n = len(o.candidates)
     if n > layout.candidates:
-        raise ValueError(f"{n} candidates at one pose, the layout holds {layout.candidates}; enlarge Layout.candidates")
+        raise ValueError(
+            f"{n} candidates at one pose, the layout holds {layout.candidates}; enlarge SpaceLayout.candidates"
+        )
     candidates = np.zeros((layout.candidates, 4), dtype=np.float32)
     c = o.candidates
     candidates[:n] = np.stack([np.sin(c.bearing), np.cos(c.bearing), np.sin(c.slope), np.cos(c.slope)], axis=1)
@@ -125,7 +127,7 @@ def text_of(codes: np.ndarray) -> str:
     return bytes(np.asarray(codes, dtype=np.uint8)).rstrip(b"\0").decode("ascii", "replace")
 
 
-def action_mask(o: Observation, layout: Layout) -> np.ndarray:
+def action_mask(o: Observation, layout: SpaceLayout) -> np.ndarray:
     """(actions,) int8: 1 where the action is possible."""
     mask = np.zeros(layout.actions, dtype=np.int8)
     mask[: len(o.candidates)] = o.candidates.allowed
@@ -135,7 +137,7 @@ def action_mask(o: Observation, layout: Layout) -> np.ndarray:
     return mask
 
 
-def decode(action: int, layout: Layout) -> Action:
+def decode(action: int, layout: SpaceLayout) -> Action:
     """The record behind an action's number.
 
     Raises:
@@ -153,7 +155,7 @@ def decode(action: int, layout: Layout) -> Action:
     return Ask(INTENTIONS[int(action) - layout.candidates - 1])
 
 
-def number(action: Action, layout: Layout) -> int:
+def number(action: Action, layout: SpaceLayout) -> int:
     """The number of an action; inverse of `decode`."""
     if isinstance(action, Move):
         return action.candidate
@@ -217,12 +219,12 @@ def word_number(word: str) -> int:
     return len(known) + 1 + _stable(word) % OWN_WORDS
 
 
-def _description_space(layout: Layout) -> spaces.Box:
+def _description_space(layout: SpaceLayout) -> spaces.Box:
     """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
     return spaces.Box(0, LARGE, (layout.features, 5), np.float32)
 
 
-def _description(description: Description, layout: Layout) -> np.ndarray:
+def _description(description: Description, layout: SpaceLayout) -> np.ndarray:
     rows = np.zeros((layout.features, 5), dtype=np.float32)
     for i, f in enumerate(description[: layout.features]):
         rows[i] = _feature(f)

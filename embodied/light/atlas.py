@@ -20,7 +20,7 @@ SHELL = ("wall", "floor", "ceiling")
 
 
 @dataclass(frozen=True, eq=False)
-class Thing:
+class UnwrappedThing:
     """Everything of one owner, unwrapped, in world coordinates."""
 
     owner: str
@@ -79,7 +79,7 @@ def things_of(
     finest: int = 8,
     sharpness: float = 1.0,
     progress: Callable[[int, int], None] = lambda i, n: None,
-) -> tuple[Thing, ...]:
+) -> tuple[UnwrappedThing, ...]:
     """Group parts by owner and unwrap each; furniture from the cache.
 
     Args:
@@ -104,7 +104,7 @@ def things_of(
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
             things.append(
-                Thing(
+                UnwrappedThing(
                     owner,
                     room,
                     kind,
@@ -117,7 +117,7 @@ def things_of(
     return tuple(things)
 
 
-def coarsened(things: Sequence[Thing], most: float) -> tuple[Thing, ...]:
+def coarsened(things: Sequence[UnwrappedThing], most: float) -> tuple[UnwrappedThing, ...]:
     """The same things with at most `most` texels, if it takes no more than this: the largest floors lose a fifth
     of their fineness first, then the largest patterned pieces a quarter. Mirrors (over 5 texels per luxel) stay
     sharp."""
@@ -134,7 +134,7 @@ def coarsened(things: Sequence[Thing], most: float) -> tuple[Thing, ...]:
     return tuple(out)
 
 
-def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000) -> Atlas:
+def atlas_of(things: Sequence[UnwrappedThing], widest: int = 4096, most: int = 3_000_000) -> Atlas:
     """Lay the things of a house out on pages, by room and fineness.
 
     Args:
@@ -145,7 +145,7 @@ def atlas_of(things: Sequence[Thing], widest: int = 4096, most: int = 3_000_000)
     owners = tuple(dict.fromkeys(t.owner for t in things))
     number = {o: i for i, o in enumerate(owners)}
     first = {t.owner: t for t in reversed(things)}
-    shelves: dict[tuple, list[Thing]] = {}
+    shelves: dict[tuple, list[UnwrappedThing]] = {}
     for t in things:
         shelves.setdefault((t.room, t.fineness, t.glass), []).append(t)
     pages = []
@@ -208,7 +208,9 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     return 1 if side > 80 * sharpness else 2
 
 
-def _page(things: Sequence[Thing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]) -> Page:
+def _page(
+    things: Sequence[UnwrappedThing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]
+) -> Page:
     finishes: list[Finish] = []
     known: dict[Finish, int] = {}
     which, owner, luxels = [], [], []

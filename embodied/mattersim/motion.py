@@ -1,4 +1,4 @@
-"""How agents move and turn: in steps of 30 degrees (`Views`), or freely (`Angles`). Both hold a batch of poses."""
+"""How agents move and turn: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`). Both hold a batch of poses."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, Bearings, Lookout, ViewPoint
+from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, Bearings, NavigableLocations, ViewPoint
 
 
 class Motion(Protocol):
     """A batch of poses."""
 
-    lookout: Lookout
+    lookout: NavigableLocations
 
     @property
     def started(self) -> bool:
@@ -72,10 +72,10 @@ def counted_steps(change: float) -> float:
     return change
 
 
-class Views:
+class DiscreteViews:
     """Discretized: a pose is row * 36 + viewIndex."""
 
-    def __init__(self, lookout: Lookout, steps: Callable[[float], float]) -> None:
+    def __init__(self, lookout: NavigableLocations, steps: Callable[[float], float]) -> None:
         """Args:
         steps: turns a requested change into steps of 30 degrees, `sign_steps` or `counted_steps`.
         """
@@ -147,7 +147,7 @@ def _tilted(at: int, steps: float) -> int:
 class Angles:
     """Continuous: any heading, elevations within limits. Vectorised over the batch; locations are found when wanted."""
 
-    def __init__(self, lookout: Lookout, limits: tuple[float, float]) -> None:
+    def __init__(self, lookout: NavigableLocations, limits: tuple[float, float]) -> None:
         """Args:
         limits: lowest and highest elevation, radians.
         """

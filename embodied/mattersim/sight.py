@@ -90,7 +90,7 @@ def bearings(
     return Bearings(sort(neighbours), keep.sum(1), sort(rel_heading), sort(rel_elevation), sort(graphs.distance[rows]))
 
 
-class Lookout:
+class NavigableLocations:
     """Navigable locations as the programs read them. Those of discretized poses are kept, since they recur."""
 
     def __init__(self, graphs: Graphs, half_field: float | None) -> None:
@@ -137,6 +137,6 @@ class Lookout:
 
 
 @functools.lru_cache(maxsize=64)
-def lookout(graphs: Graphs, half_field: float | None) -> Lookout:
-    """The Lookout of a graph and a camera, shared by all simulators that have them."""
-    return Lookout(graphs, half_field)
+def lookout(graphs: Graphs, half_field: float | None) -> NavigableLocations:
+    """The navigable locations of a graph and a camera, shared by all simulators that have them."""
+    return NavigableLocations(graphs, half_field)

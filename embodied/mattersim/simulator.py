@@ -15,7 +15,7 @@ import numpy as np
 
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
-from embodied.mattersim.motion import Angles, Motion, Views, counted_steps, sign_steps
+from embodied.mattersim.motion import Angles, DiscreteViews, Motion, counted_steps, sign_steps
 from embodied.mattersim.pictures import Skyboxes
 from embodied.mattersim.sight import ViewPoint, lookout
 
@@ -266,7 +266,7 @@ class Simulator:
 
     def _new_motion(self) -> Motion:
         look = lookout(self._graphs, self._half_field())
-        return Views(look, self._steps) if self._discrete else Angles(look, self._limits)
+        return DiscreteViews(look, self._steps) if self._discrete else Angles(look, self._limits)
 
     def _watch(self) -> None:
         """Apply a changed camera from the next action on."""

@@ -173,16 +173,16 @@ def closed_rooms(room_of_cell: np.ndarray, reach: np.ndarray, rooms: int) -> lis
     return [k for k in range(rooms) if reached[k] == 0 or reached[k] < ENTERED * free[k]]
 
 
-def reachable(house: House, storey: int) -> tuple[Grid, np.ndarray, np.ndarray]:
+def reachable(house: House, storey: int) -> tuple[FreeCells, np.ndarray, np.ndarray]:
     """The storey's grid, the room index of each cell (-1 for none), and which cells are joined to the most rooms."""
     space = walkable(house, storey)
     shapely.prepare(space)
-    grid = Grid(space)
+    grid = FreeCells(space)
     room_of_cell = _rooms_of_cells(grid, [r for r in house.rooms if r.storey == storey])
     return grid, room_of_cell, _largest_reach(grid, room_of_cell)
 
 
-def _rooms_of_cells(grid: Grid, rooms: Sequence[Room]) -> np.ndarray:
+def _rooms_of_cells(grid: FreeCells, rooms: Sequence[Room]) -> np.ndarray:
     """(n,) index of the room each cell lies in; cells inside a wall's doorway belong to the nearest room."""
     room_of_cell = np.full(len(grid.xy), -1)
     for k, r in enumerate(rooms):
@@ -192,7 +192,7 @@ def _rooms_of_cells(grid: Grid, rooms: Sequence[Room]) -> np.ndarray:
     return room_of_cell
 
 
-def _largest_reach(grid: Grid, room_of_cell: np.ndarray) -> np.ndarray:
+def _largest_reach(grid: FreeCells, room_of_cell: np.ndarray) -> np.ndarray:
     """(n,) bool: the connected cells that enter the most rooms."""
     if len(grid.xy) == 0:
         raise HouseError("the house has no free floor at all; remove furniture")
@@ -202,7 +202,7 @@ def _largest_reach(grid: Grid, room_of_cell: np.ndarray) -> np.ndarray:
     return label == best
 
 
-class Grid:
+class FreeCells:
     """Cell centres inside the free space and how far each is from its border."""
 
     def __init__(self, space: shapely.Geometry) -> None:
@@ -243,7 +243,7 @@ class Grid:
 
 
 def _spread(
-    space: shapely.Geometry, grid: Grid, room_of_cell: np.ndarray, rooms: Sequence[Room], spacing: float
+    space: shapely.Geometry, grid: FreeCells, room_of_cell: np.ndarray, rooms: Sequence[Room], spacing: float
 ) -> list[int]:
     """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see more."""
     chosen: list[int] = []
@@ -270,7 +270,7 @@ def _spread(
     return chosen
 
 
-def _seen(space: shapely.Geometry, grid: Grid, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
+def _seen(space: shapely.Geometry, grid: FreeCells, cells: np.ndarray, chosen: list[int], spacing: float) -> np.ndarray:
     """(n,) how many chosen viewpoints, not too near, each cell sees."""
     if not chosen:
         return np.zeros(len(cells))
@@ -282,7 +282,7 @@ def _seen(space: shapely.Geometry, grid: Grid, cells: np.ndarray, chosen: list[i
 
 
 def _thinned(
-    space: shapely.Geometry, grid: Grid, room_of_cell: np.ndarray, nodes: list[int], spacing: float
+    space: shapely.Geometry, grid: FreeCells, room_of_cell: np.ndarray, nodes: list[int], spacing: float
 ) -> list[int]:
     """The nodes without those that crowd another one and that neither their room nor the graph needs."""
     xy = grid.xy[nodes]
@@ -314,7 +314,13 @@ def _visible_pairs(space: shapely.Polygon, xy: np.ndarray, longest: float) -> np
 
 
 def _join(
-    house: House, storey: int, space: shapely.Geometry, grid: Grid, reach: np.ndarray, nodes: list[int], spacing: float
+    house: House,
+    storey: int,
+    space: shapely.Geometry,
+    grid: FreeCells,
+    reach: np.ndarray,
+    nodes: list[int],
+    spacing: float,
 ) -> list[int]:
     """Add viewpoints, in doorways first and then along the cheapest ways, until all are connected."""
     ids = {r.id for r in house.rooms if r.storey == storey}
@@ -354,7 +360,7 @@ def _components(space: shapely.Geometry, xy: np.ndarray, longest: float) -> np.n
     return connected_components(csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(xy), len(xy))), directed=False)[1]
 
 
-def _bridge(space: shapely.Geometry, grid: Grid, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
+def _bridge(space: shapely.Geometry, grid: FreeCells, nodes: list[int], label: np.ndarray, spacing: float) -> list[int]:
     """New cells along the cheapest way from the smallest component to the nearest other node."""
     sizes = np.bincount(label)
     small = int(np.argmin(sizes))

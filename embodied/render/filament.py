@@ -58,7 +58,7 @@ class VulkanError(UnableError):
     """Filament cannot draw here; says what to do."""
 
 
-class Painter:
+class FilamentPainter:
     """Draws the colours of one lit house. Owns its meshes and textures on the graphics side until `close`."""
 
     def __init__(self, house: House, catalogue: Catalogue, lit: LitPages) -> None:

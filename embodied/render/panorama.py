@@ -93,7 +93,7 @@ class Panorama:
         """(height, 2 height) int32, in the layout of `equirect`."""
         return self._ids(equirect_grid(self.size, height))
 
-    def through(self, grid: Grid, channel: str) -> np.ndarray:
+    def through(self, grid: PixelGrid, channel: str) -> np.ndarray:
         """One channel, 'rgb', 'depth' or 'ids', of the picture that a grid describes; see `view` for units.
 
         Raises:
@@ -137,14 +137,14 @@ class Panorama:
         """(6 s, s): the bits of the ids as float32, which OpenCV can copy from place to place."""
         return np.ascontiguousarray(self.ids, dtype=np.int32).view(np.float32).reshape(6 * self.size, self.size)
 
-    def _rgb(self, grid: Grid) -> np.ndarray:
+    def _rgb(self, grid: PixelGrid) -> np.ndarray:
         rgba = cv2.remap(self._padded_rgba, grid.x, grid.y, cv2.INTER_LINEAR)
         return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
-    def _ids(self, grid: Grid) -> np.ndarray:
+    def _ids(self, grid: PixelGrid) -> np.ndarray:
         return cv2.remap(self._ids_as_floats, grid.nearest, None, cv2.INTER_NEAREST).view(np.int32)
 
-    def _depth(self, grid: Grid) -> np.ndarray:
+    def _depth(self, grid: PixelGrid) -> np.ndarray:
         nearest, other, mixed = _scratch(grid.x.shape, threading.get_ident())
         smooth = cv2.remap(self._padded_nearness, grid.x, grid.y, cv2.INTER_LINEAR)
         cv2.remap(self._nearness, grid.nearest, None, cv2.INTER_NEAREST, dst=nearest)
@@ -163,7 +163,7 @@ def _scratch(shape: tuple[int, int], thread: int) -> tuple[np.ndarray, np.ndarra
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class PixelGrid:
     """Where the pixels of a picture lie on the faces. (h, w) arrays."""
 
     x: np.ndarray
@@ -189,20 +189,20 @@ class Pad:
 
 
 @functools.lru_cache(maxsize=96)
-def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> Grid:
+def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> PixelGrid:
     """The grid of an upright perspective picture on faces of side `s`."""
     return _grid(s, *_pinhole_rays(yaw, pitch, vfov, height, width))
 
 
 @functools.lru_cache(maxsize=4)
-def grid36(s: int, size: int) -> Grid:
+def grid36(s: int, size: int) -> PixelGrid:
     """The 36 views of `Panorama.views36`, below each other."""
     rays = [_pinhole_rays(yaw, pitch, VFOV36, size, size) for yaw, pitch in zip(VIEW_YAWS, VIEW_PITCHES, strict=True)]
     return _grid(s, np.concatenate([r[0] for r in rays]), np.concatenate([r[1] for r in rays]))
 
 
 @functools.lru_cache(maxsize=4)
-def equirect_grid(s: int, height: int) -> Grid:
+def equirect_grid(s: int, height: int) -> PixelGrid:
     """The grid of an equirectangular picture of (height, 2 height) pixels."""
     yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
     pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
@@ -225,14 +225,14 @@ def _pinhole_rays(yaw: float, pitch: float, vfov: float, height: int, width: int
     return rays / lengths[..., None], 1.0 / lengths
 
 
-def _grid(s: int, rays: np.ndarray, cosines: np.ndarray) -> Grid:
+def _grid(s: int, rays: np.ndarray, cosines: np.ndarray) -> PixelGrid:
     """Where unit `rays` (h, w, 3) meet the faces; cosines (h, w) turn ray lengths into depths of the picture."""
     face, u, v, along = _face_coordinates(rays)
     x, y = (u + 1) / 2 * s - 0.5, (v + 1) / 2 * s - 0.5
     map_x, map_y = (x + 1).astype(np.float32), (y + 1 + face * (s + 2)).astype(np.float32)
     column, row = np.clip(np.rint(x), 0, s - 1), np.clip(np.rint(y), 0, s - 1) + face * s
     nearest = np.stack([column, row], axis=-1).astype(np.int16)
-    return Grid(map_x, map_y, nearest, (cosines / along).astype(np.float32))
+    return PixelGrid(map_x, map_y, nearest, (cosines / along).astype(np.float32))
 
 
 def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -52,7 +52,7 @@ DENSITY = 300.0
 
 
 @dataclass(frozen=True)
-class Box:
+class CollisionBox:
     """An upright box; turned about z by `yaw` radians."""
 
     centre: tuple[float, float, float]
@@ -63,7 +63,7 @@ class Box:
 
 def kept_boxes(
     asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path
-) -> tuple[Box, ...]:
+) -> tuple[CollisionBox, ...]:
     """`object_boxes`, kept on disk under what they depend on; a file that makes no sense is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
@@ -71,7 +71,7 @@ def kept_boxes(
     try:
         rows = np.array(json.loads(path.read_text()), float).reshape(-1, 7)
         if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
-            return tuple(Box(tuple(r[:3]), tuple(r[3:6]), r[6]) for r in rows.tolist())
+            return tuple(CollisionBox(tuple(r[:3]), tuple(r[3:6]), r[6]) for r in rows.tolist())
     except (OSError, ValueError, TypeError):
         path.unlink(missing_ok=True)
     boxes = object_boxes(asset, parts, size)
@@ -85,7 +85,7 @@ def boxes_code() -> str:
     return code_digest(__name__, without=APART)
 
 
-def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[Box, ...]:
+def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[CollisionBox, ...]:
     """Boxes that cover an object and leave the space under tables and over its support surfaces free.
 
     Args:
@@ -236,17 +236,17 @@ def _grow(filled: np.ndarray, x: int, y: int, z: int) -> tuple[slice, slice, sli
     return slice(x, x1), slice(y, y1), slice(z, z1)
 
 
-def _box(low: np.ndarray, high: np.ndarray, least: np.ndarray | None = None) -> Box:
+def _box(low: np.ndarray, high: np.ndarray, least: np.ndarray | None = None) -> CollisionBox:
     """The box between two corners, thickened downwards where too thin, but not below `least`."""
     half = np.maximum((high - low) / 2, THINNEST)
     centre = (low + high) / 2
     centre[2] = high[2] - half[2]
     if least is not None:
         centre[2] = max(centre[2], least[2] + half[2])
-    return Box(tuple(centre.tolist()), tuple(half.tolist()))
+    return CollisionBox(tuple(centre.tolist()), tuple(half.tolist()))
 
 
-def bounding_box(vertices: np.ndarray) -> Box:
+def bounding_box(vertices: np.ndarray) -> CollisionBox:
     """The box around `vertices` (n, 3), in their own frame."""
     return _box(vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float))
 
@@ -256,7 +256,7 @@ def density_of(asset: Asset) -> float:
     return next((d for word, d in DENSITIES if any(word in m for m in asset.materials)), DENSITY)
 
 
-def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[Box, ...]:
+def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[CollisionBox, ...]:
     """Boxes under the floor of `room`; oblique rooms are covered by boxes up to half a metre beyond."""
     polygon, top = shapely.Polygon(room.polygon), house.storey_of(room).elevation
     xs, ys = (sorted({round(c[i], 6) for c in room.polygon}) for i in (0, 1))
@@ -268,7 +268,7 @@ def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[Box, 
     return tuple(boxes)
 
 
-def wall_boxes(house: House, room: Room, edge: int) -> tuple[Box, ...]:
+def wall_boxes(house: House, room: Room, edge: int) -> tuple[CollisionBox, ...]:
     """Boxes of the wall along polygon edge `edge` of `room`, on the room's side of its centre line."""
     storey = house.storey_of(room)
     a, b = (np.array(room.polygon[i % len(room.polygon)]) for i in (edge, edge + 1))
@@ -294,5 +294,5 @@ def wall_boxes(house: House, room: Room, edge: int) -> tuple[Box, ...]:
         if s1 - s0 > 1e-3 and z1 - z0 > 1e-3:
             middle = a + along * (s0 + s1) / 2 + inward * thickness / 2
             centre = (float(middle[0]), float(middle[1]), storey.elevation + (z0 + z1) / 2)
-            boxes.append(Box(centre, ((s1 - s0) / 2, thickness / 2, (z1 - z0) / 2), yaw))
+            boxes.append(CollisionBox(centre, ((s1 - s0) / 2, thickness / 2, (z1 - z0) / 2), yaw))
     return tuple(boxes)

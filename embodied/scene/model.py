@@ -391,7 +391,7 @@ def _add_collisions(
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
         for i in range(len(room.polygon)):
             _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
-    known: dict[tuple, tuple[collision.Box, ...]] = {}
+    known: dict[tuple, tuple[collision.CollisionBox, ...]] = {}
     for p in house.placements:
         if is_underfoot(p):
             continue
@@ -418,7 +418,7 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
             )
 
 
-def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.Box, ...]:
+def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.CollisionBox, ...]:
     """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
     asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
     cache = getattr(catalogue, "cache", None)
@@ -432,7 +432,7 @@ def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.Box, 
 def _add_boxes(
     body: mujoco.MjsBody,
     owner: str,
-    boxes: Sequence[collision.Box],
+    boxes: Sequence[collision.CollisionBox],
     *,
     density: float = 1000.0,
     frame: mujoco.MjsFrame | None = None,

@@ -68,12 +68,12 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     Raises:
       ValueError: the pool has no such task.
     """
-    limits = Limits(radius=0.0, horizon=config.horizon)
+    limits = TaskLimits(radius=0.0, horizon=config.horizon)
     return task_of_pair("find", pool, index, seed=seed, language=language, limits=limits)
 
 
 @dataclass(frozen=True)
-class Limits:
+class TaskLimits:
     """Task.radius, horizon and budget."""
 
     radius: float
@@ -81,7 +81,7 @@ class Limits:
     budget: float | None = None
 
 
-def task_of_pair(kind: str, pool: Pool, index: int, *, seed: int, language: Language, limits: Limits) -> Task:
+def task_of_pair(kind: str, pool: Pool, index: int, *, seed: int, language: Language, limits: TaskLimits) -> Task:
     """Pair `index` of the pool as a task of a kind, in words.
 
     Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.interface import Language, Place, Task
-from embodied.tasks.find import Limits, Pool, build_pool, task_of_pair
+from embodied.tasks.find import Pool, TaskLimits, build_pool, task_of_pair
 from embodied.tasks.goals import find_instances, goal_classes
 
 
@@ -35,5 +35,5 @@ def hanna_task(pool: Pool, index: int, *, seed: int, language: Language, config:
     Raises:
       ValueError: the pool has no such task.
     """
-    limits = Limits(config.radius, config.horizon)
+    limits = TaskLimits(config.radius, config.horizon)
     return task_of_pair("hanna", pool, index, seed=seed, language=language, limits=limits)

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from embodied.interface import Language, Place, Task
-from embodied.tasks.find import Limits, Pool, build_pool, task_of_pair
+from embodied.tasks.find import Pool, TaskLimits, build_pool, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances
 
 
@@ -43,5 +43,5 @@ def hari_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     Raises:
       ValueError: the pool has no such task.
     """
-    limits = Limits(radius=0.0, horizon=config.horizon)
+    limits = TaskLimits(radius=0.0, horizon=config.horizon)
     return task_of_pair("hari", pool, index, seed=seed, language=language, limits=limits)

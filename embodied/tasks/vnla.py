@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.interface import TURNS, VIEWS, FindObject, Language, Place, Task
-from embodied.tasks.find import Limits, Pool, build_pool, draw, task_of_pair
+from embodied.tasks.find import Pool, TaskLimits, build_pool, draw, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
 
@@ -87,7 +87,7 @@ def vnla_task(
         key = room_kind(world, start.node), goal.room_kind or goal.object_class
         horizon = max(horizon, limits.get(key, config.most_actions))
     budget = config.help_ratio * horizon / config.help_steps
-    mine = Limits(config.radius, horizon, budget)
+    mine = TaskLimits(config.radius, horizon, budget)
     return task_of_pair("vnla", pool, index, seed=seed, language=language, limits=mine)
 
 

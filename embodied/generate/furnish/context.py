@@ -12,7 +12,7 @@ import numpy as np
 from assets.records import Asset
 from embodied.generate.furnish.arrange import WALL_GAP, Item, ScoredPose, Thing, pack, wall_poses
 from embodied.generate.furnish.space import RoomSpace, Wall
-from embodied.generate.furnish.stock import Limits, Stock
+from embodied.generate.furnish.stock import AssetLimits, Stock
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Context:
         """True with this probability; draws one number."""
         return bool(self.rng.random() < probability)
 
-    def pick(self, role: str, **limits: Unpack[Limits]) -> Asset | None:
+    def pick(self, role: str, **limits: Unpack[AssetLimits]) -> Asset | None:
         """An asset for `role` that is not in the room yet, if there is one (see Stock.pick)."""
         limits.setdefault("avoid", tuple(t.asset.key for t in self.things))
         return self.stock.pick(role, rng=self.rng, kind=self.kind, **limits)

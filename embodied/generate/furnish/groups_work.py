@@ -9,7 +9,7 @@ from assets.records import Asset
 from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, Thing, floor_poses, wall_poses
 from embodied.generate.furnish.context import Context, Liking, at_corner, at_window, centred, door_distance, wobble
 from embodied.generate.furnish.space import Wall
-from embodied.generate.furnish.stock import Limits, Size
+from embodied.generate.furnish.stock import AssetLimits, Size
 
 
 def desk(ctx: Context) -> list[Thing] | None:
@@ -86,7 +86,7 @@ def bookshelf(ctx: Context) -> list[Thing] | None:
     return ctx.against_wall(asset, "bookcase", liking=liking, clear=0.5, tries=36)
 
 
-def storage(ctx: Context, role: str, *, clear: float = 0.6, **limits: Unpack[Limits]) -> list[Thing] | None:
+def storage(ctx: Context, role: str, *, clear: float = 0.6, **limits: Unpack[AssetLimits]) -> list[Thing] | None:
     """One piece of storage or a machine at a wall."""
     limits.setdefault("most", (2.6, 0.8, ctx.space.height - 0.03))
     asset = ctx.pick(role, **limits)
@@ -128,7 +128,7 @@ def _window_points(ctx: Context) -> list[tuple[float, float]]:
     ]
 
 
-def corner_thing(ctx: Context, role: str, **limits: Unpack[Limits]) -> list[Thing] | None:
+def corner_thing(ctx: Context, role: str, **limits: Unpack[AssetLimits]) -> list[Thing] | None:
     """A small thing that stands in a corner or at a wall: bin, basket, ladder, broom."""
     asset = ctx.pick(role, **limits)
     if asset is None:
@@ -137,7 +137,7 @@ def corner_thing(ctx: Context, role: str, **limits: Unpack[Limits]) -> list[Thin
     return ctx.against_wall(asset, "corner", liking=liking, clear=0.0, role=asset.object_class, tries=24)
 
 
-def beside(ctx: Context, role: str, anchors: tuple[str, ...], **limits: Unpack[Limits]) -> list[Thing] | None:
+def beside(ctx: Context, role: str, anchors: tuple[str, ...], **limits: Unpack[AssetLimits]) -> list[Thing] | None:
     """A small thing on the floor close to one that stands already: a bin beside the desk."""
     asset = ctx.pick(role, **limits)
     targets = ctx.roles(*anchors)

@@ -35,7 +35,7 @@ from embodied.generate.furnish.programme import (
     tried_before,
     wider_than,
 )
-from embodied.generate.furnish.stock import Limits
+from embodied.generate.furnish.stock import AssetLimits
 
 BEDS = ("bed", "child bed", "bunk bed", "loft bed", "day bed", "sofa bed", "crib", "cradle")
 """Object classes that one can sleep in."""
@@ -54,17 +54,17 @@ def missing(ctx: Context) -> int:
 # Single pieces, by role --------------------------------------------------------------------------
 
 
-def piece(role: str, clear: float = 0.6, **limits: Unpack[Limits]) -> Group:
+def piece(role: str, clear: float = 0.6, **limits: Unpack[AssetLimits]) -> Group:
     """One piece of storage or a machine at a wall, with `clear` metres free before it."""
     return lambda ctx: work.storage(ctx, role, clear=clear, **limits)
 
 
-def corner(role: str, **limits: Unpack[Limits]) -> Group:
+def corner(role: str, **limits: Unpack[AssetLimits]) -> Group:
     """One thing in a corner or at a wall."""
     return lambda ctx: work.corner_thing(ctx, role, **limits)
 
 
-def beside(role: str, *anchors: str, **limits: Unpack[Limits]) -> Group:
+def beside(role: str, *anchors: str, **limits: Unpack[AssetLimits]) -> Group:
     """One thing on the floor close to something of the roles `anchors`."""
     return lambda ctx: work.beside(ctx, role, anchors, **limits)
 

@@ -26,7 +26,7 @@ Size = tuple[float, float, float]
 """Width, depth and height, metres."""
 
 
-class Limits(TypedDict, total=False):
+class AssetLimits(TypedDict, total=False):
     """What may be asked of an asset besides its role."""
 
     most: Size
@@ -59,7 +59,7 @@ class Stock:
         return self._by_role[role]
 
     def pick(
-        self, role: str, *, rng: np.random.Generator, kind: str | None = None, **limits: Unpack[Limits]
+        self, role: str, *, rng: np.random.Generator, kind: str | None = None, **limits: Unpack[AssetLimits]
     ) -> Asset | None:
         """An asset for `role` within the size limits, or None.
 
