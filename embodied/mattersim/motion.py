@@ -1,4 +1,4 @@
-"""How agents move and turn: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`). Both hold a batch of poses."""
+"""How agents move and turn, in batches: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`)."""
 
 from __future__ import annotations
 
