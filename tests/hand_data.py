@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 from hand_worlds import grid_world, thing
 
-from embodied.datasets.build import DatasetConfig, build_dataset
+from embodied.datasets.build import DatasetConfig, build_dataset, units
 from embodied.datasets.store import Dataset
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
+from embodied.scene.house_meshes import owners
 
 
 def hand_house(seed, name, config, catalogue):
@@ -35,3 +39,22 @@ def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_h
 
 def content(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def painted_panorama(node, owners, size=8):
+    """Faces that tell the node: red is three times it, ids go round the owners from it; depth is 1 + face."""
+    rgb = np.zeros((6, size, size, 3), np.uint8)
+    rgb[..., 0], rgb[..., 1] = 3 * node, 40 * np.arange(6)[:, None, None]
+    depth = np.broadcast_to(1.0 + np.arange(6, dtype=np.float32)[:, None, None], (6, size, size)).copy()
+    ids = np.broadcast_to((node + np.arange(6)[:, None, None]) % owners + 1, (6, size, size)).astype(np.int32)
+    return Panorama(rgb, depth, ids)
+
+
+def paint(data, pictures, names=None):
+    """Panoramas that nobody drew into the folders of a data set's houses."""
+    for name in names or [u.name for u in units(data.scale)]:
+        place = data.place(name)
+        many = len(owners(place.house))
+        nodes = [painted_panorama(k, many, pictures.size) for k in range(len(place.graph.ids))]
+        meta = {"house": place.house.digest, **dataclasses.asdict(pictures)}
+        write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)

@@ -1,10 +1,11 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help, seen with pixels; light compares the ways of drawing with a path tracer. Close other programs first: the
-numbers are only as good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets,
-episodes, tables and features in OUT/freeze and writes their digests; with --against it says of every part
-whether it is the same as in a file of them (docs/freeze.json), or differs and why that is meant.
+with help, seen with pixels; light compares the ways of drawing with a path tracer, codecs those of
+storing what was drawn (choose --quality fast). Close other programs first: the numbers are only as
+good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
+and features in OUT/freeze and writes their digests; with --against it says of every part whether it
+is the same as in a file of them (docs/freeze.json), or differs and why that is meant.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "freeze")
+PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "codecs", "freeze")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -54,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     if "light" in parts:
         return light(args, catalogue)
+    if "codecs" in parts:
+        return codecs(args, catalogue)
     if "freeze" in parts:
         return freeze(args, catalogue)
     lines = {
@@ -79,6 +82,15 @@ def light(args: argparse.Namespace, catalogue: Catalogue) -> int:
     from embodied.bench.light import compare
 
     report = compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+    show(args, report.facts, report.text)
+    return 0
+
+
+def codecs(args: argparse.Namespace, catalogue: Catalogue) -> int:
+    """Bytes against decibels of ways to store panoramas."""
+    from embodied.bench.codecs import compare
+
+    report = compare(catalogue, args.cache, args.seed, args.quality)
     show(args, report.facts, report.text)
     return 0
 

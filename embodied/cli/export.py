@@ -1,8 +1,9 @@
-"""Write a data set or a house as others read it: folders of published programs, Parquet, glTF, MJCF, USD.
+"""Write a data set or a house as others read it: folders of published programs, Parquet, LeRobot, glTF, MJCF, USD.
 
   hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
   matterport                    graphs and skyboxes for the Matterport3D simulator
   parquet                       tables and a card, for `datasets.load_dataset`
+  lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
   glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
 
 Folders of programs come with a README-embodied.md: which version, what goes where, which lines a current PyTorch
@@ -15,8 +16,8 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
+from embodied.cli.options import any_path, folder_to_write, video_side, whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,6 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="episodes (.jsonl) to write as tables, too",
     )
+    _add_lerobot(what.add_parser("lerobot", help="episodes as a LeRobot data set (v3.0)"))
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
         sub.add_argument(
@@ -78,6 +80,19 @@ def add(parser: argparse.ArgumentParser) -> None:
         add_json(sub)
 
 
+def _add_lerobot(parser: argparse.ArgumentParser) -> None:
+    _add_data(parser)
+    parser.add_argument(
+        "--episodes", type=any_path, nargs="+", metavar="FILE",
+        help="episodes (.jsonl) of `embodied eval` or `judge` (default: an expert plays --split)",
+    )  # fmt: skip
+    parser.add_argument("--split", default="train", help="what the expert plays (default: %(default)s)")
+    parser.add_argument("--tasks", type=whole(), metavar="N", help="the expert plays the first so many tasks")
+    parser.add_argument(
+        "--size", type=video_side, default=224, help="side of the picture, pixels (default: %(default)s)"
+    )
+
+
 def _add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help="a data set of `embodied dataset`")
     parser.add_argument(
@@ -89,7 +104,8 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     if args.what in PROGRAMS:
         return run_program(args)
-    return run_parquet(args) if args.what == "parquet" else run_house(args)
+    others = {"parquet": run_parquet, "lerobot": run_lerobot}
+    return others.get(args.what, run_house)(args)
 
 
 def run_program(args: argparse.Namespace) -> int:
@@ -138,6 +154,37 @@ def run_parquet(args: argparse.Namespace) -> int:
 
     files = export_parquet(Dataset(args.data), args.out, args.episodes)
     show(args, {"files": len(files), "out": str(args.out)}, f"{len(files)} files in {args.out}; README.md is its card")
+    return 0
+
+
+def run_lerobot(args: argparse.Namespace) -> int:
+    from embodied.datasets.lerobot import Camera, export_lerobot
+    from embodied.datasets.store import Dataset
+    from embodied.evaluation.evaluate import agent
+    from embodied.evaluation.metrics import success
+    from embodied.evaluation.rollout import play
+    from embodied.interface import Episode
+    from embodied.records import load_lines
+
+    data = Dataset(args.data)
+    if args.episodes:
+        episodes = [e for path in args.episodes for e in load_lines(path, Episode)]
+    else:
+        whole_split = data.split(args.split)
+        expert = agent(data.kind, "shortest")
+        episodes = play(whole_split.make_env, expert, whole_split.tasks[: args.tasks], seed=data.config.seed)
+
+    def succeeded(episode: Episode) -> bool:
+        return success(episode, data.place(episode.task.world).graph) > 0
+
+    steps = export_lerobot(
+        data, args.out, bar(episodes, "episodes", "episode"), succeeded=succeeded, camera=Camera(args.size, args.size)
+    )
+    show(
+        args,
+        {"episodes": len(episodes), "steps": steps, "out": str(args.out)},
+        f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')",
+    )
     return 0
 
 

@@ -79,6 +79,23 @@ class ViewSettings:
         return (self.height, 2 * self.height if self.frame == "equirect" else self.width)
 
 
+def framed(panorama: Panorama, view: ViewSettings, channel: str, yaw: float, pitch: float) -> np.ndarray:
+    """One channel, 'rgb', 'depth' or 'ids', of what is seen: (*view.shape), rgb with three colours at the end.
+
+    Args:
+      yaw, pitch: where a 'view' looks, radians; the other frames show every direction.
+    """
+    s = panorama.size
+    if view.frame == "views36":
+        picture = panorama.through(grid36(s, view.height), channel)
+        picture = picture.reshape(*view.shape, *picture.shape[2:])
+    elif view.frame == "equirect":
+        picture = panorama.through(equirect_grid(s, view.height), channel)
+    else:
+        picture = panorama.through(perspective_grid(s, yaw, pitch, view.vfov, view.height, view.width), channel)
+    return np.minimum(picture, np.float32(FAR)) if channel == "depth" else picture
+
+
 class PanoramaStore:
     """Owns the decoded panoramas of some worlds, the latest used, within a budget of bytes."""
 
@@ -137,22 +154,10 @@ class PictureEyes:
 
     def look(self, o: Observation) -> dict[str, np.ndarray]:
         panorama = self._store.at(o.sight)
-        found = {name: self._picture(panorama, name, o.turn * STEP, o.tilt * STEP) for name in self._channels}
+        found = {name: framed(panorama, self._view, name, o.turn * STEP, o.tilt * STEP) for name in self._channels}
         if "rgb" in self._channels:
             found["target_rgb"] = self._target(o.target)
         return found
-
-    def _picture(self, panorama: Panorama, channel: str, yaw: float, pitch: float) -> np.ndarray:
-        view = self._view
-        s = panorama.size
-        if view.frame == "views36":
-            picture = panorama.through(grid36(s, view.height), channel)
-            picture = picture.reshape(*view.shape, *picture.shape[2:])
-        elif view.frame == "equirect":
-            picture = panorama.through(equirect_grid(s, view.height), channel)
-        else:
-            picture = panorama.through(perspective_grid(s, yaw, pitch, view.vfov, view.height, view.width), channel)
-        return np.minimum(picture, np.float32(FAR)) if channel == "depth" else picture
 
     def _target(self, sight: Sight | None) -> np.ndarray:
         if sight is None:

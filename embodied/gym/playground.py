@@ -98,14 +98,17 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
       wanted: whether it is an error that there are none.
 
     Raises:
-      ValueError: none, or not of all houses, though they are wanted.
+      ValueError: none, not of all houses, or not in one way, though they are wanted.
     """
     found = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
+    again = f"`embodied dataset {data.kind} --out {data.folder} ... --panoramas fast`"
     if wanted and len(found) < len(names):
         raise ValueError(
             f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
-            f"`embodied dataset {data.kind} --out {data.folder} ... --panoramas fast`, or choose sees='oracle'"
+            f"{again}, or choose sees='oracle'"
         )
+    if wanted and len(ways := {(p.quality, p.size) for p in found.values()}) > 1:
+        raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
     return next(iter(found.values()), PictureSettings())
 
 

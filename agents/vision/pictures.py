@@ -1,0 +1,181 @@
+"""The pictures of a data set as a torch Dataset: what is seen, how far, of what, from where, in which room.
+
+    pictures = ViewpointPictures(Dataset(Path("data/hanna")), "train", view=ViewSettings("view", 96, 128))
+    for batch in torch.utils.data.DataLoader(pictures, batch_size=32, shuffle=True, num_workers=2):
+        batch["rgb"], batch["depth"], batch["visible"]
+
+Nothing is drawn here: the data set must hold panoramas.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+
+from agents.vision.labels import VISIBLE, ids_to_labels
+from assets.records import ROOM_KINDS
+from embodied.datasets.store import Dataset
+from embodied.gym.eyes import FAR, PIXELS, ViewSettings, framed
+from embodied.gym.playground import pictures_of
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import PanoramaFile
+
+OPEN = 16
+"""Panorama files that a process holds open."""
+
+
+@dataclass(frozen=True, eq=False)
+class _House:
+    """What is known of a house beside its pictures; n viewpoints."""
+
+    name: str
+    positions: np.ndarray
+    """(n, 3) float32, metres, world."""
+    room: np.ndarray
+    """(n,) int64 into ROOM_KINDS."""
+    class_of_id: np.ndarray
+    """(m + 1,) class of each instance id, -1 for none."""
+
+
+class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
+    """Every viewpoint of a split (with `view` of frame 'view': every one of its 36 views), house by house.
+
+    An item is a dictionary; colours come before rows and columns, as torch has them:
+
+      rgb      uint8 (6, 3, s, s), the faces of a panorama in their order; (3, h, w) view or equirect; (36, 3, h, h)
+      depth    float32, the same without colours: metres along the optical axis (equirect: along the ray), 65.535
+               where nothing is
+      ids      int32, the same: i + 1 for parts.owners(house)[i], 0 where nothing is
+      visible  bool (C,), whether objects of classes[k] cover more than 0.3 % of the picture
+      pose     float32 (5,): x, y, z in metres, yaw and pitch in radians (0 where all directions are shown)
+      room     int64, kind of the room that the viewpoint is in, into ROOM_KINDS
+      house    int64, into `houses`
+      node     int64
+
+    Safe in a DataLoader's workers: each process opens the files for itself, when it first needs them.
+    """
+
+    def __init__(
+        self,
+        data: Dataset,
+        split: str,
+        *,
+        view: ViewSettings | None = None,
+        channels: Sequence[str] = PIXELS,
+        classes: Sequence[str] | None = None,
+    ) -> None:
+        """
+        Args:
+          view: how the pictures are framed; the six faces as they are stored where not given.
+          channels: some of 'rgb', 'depth', 'ids'; what is left out is not decoded. 'visible' comes with 'ids'.
+          classes: what `visible` counts; the objects of the split's houses where not given.
+
+        Raises:
+          ValueError: the data set has no such pictures, or no such channel.
+        """
+        if not channels or set(channels) - set(PIXELS):
+            raise ValueError(f"channels should be some of {PIXELS}, got {tuple(channels)!r}")
+        names = data.names(split)
+        self.pictures = pictures_of(data, names, wanted=True)
+        self.houses: tuple[str, ...] = names
+        self.classes = tuple(classes) if classes is not None else _objects(data, names)
+        self._folder, self._view, self._channels = data.folder, view, tuple(channels)
+        self._known = [_known(data, name, self.classes) for name in names]
+        self._each = VIEWS if view is not None and view.frame == "view" else 1
+        self._ends = np.cumsum([self._each * len(h.positions) for h in self._known])
+        self._open: OrderedDict[int, PanoramaFile] = OrderedDict()
+        self._process = os.getpid()
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def __getitem__(self, item: int) -> dict[str, torch.Tensor]:
+        """
+        Raises:
+          IndexError: there are not so many.
+          PanoramaFileError: damaged.
+        """
+        if not -len(self) <= item < len(self):
+            raise IndexError(f"there are {len(self)} pictures, not {item}")
+        item %= len(self)
+        house = int(np.searchsorted(self._ends, item, side="right"))
+        before = int(self._ends[house - 1]) if house else 0
+        node, k = divmod(item - before, self._each)
+        known = self._known[house]
+        yaw, pitch = (float(VIEW_YAWS[k]), float(VIEW_PITCHES[k])) if self._each > 1 else (0.0, 0.0)
+        found = self._seen(house, node, yaw, pitch)
+        out = {name: torch.from_numpy(_colours_first(name, a)) for name, a in found.items()}
+        if "ids" in found:
+            out["visible"] = torch.from_numpy(_visible(found["ids"], known.class_of_id, len(self.classes)))
+        pose = np.array([*known.positions[node], yaw, pitch], np.float32)
+        return {
+            **out,
+            "pose": torch.from_numpy(pose),
+            "room": torch.tensor(int(known.room[node])),
+            "house": torch.tensor(house),
+            "node": torch.tensor(node),
+        }
+
+    def __getstate__(self) -> dict[str, Any]:
+        """To another process go no open files."""
+        return {**self.__dict__, "_open": OrderedDict()}
+
+    def _seen(self, house: int, node: int, yaw: float, pitch: float) -> dict[str, np.ndarray]:
+        """The wanted channels of what is seen, colours last."""
+        panorama = _decoded(self._file(house), node, self._channels)
+        if self._view is None:
+            faces = {"rgb": panorama.rgb, "depth": np.minimum(panorama.depth, np.float32(FAR)), "ids": panorama.ids}
+            return {name: faces[name] for name in self._channels}
+        return {name: framed(panorama, self._view, name, yaw, pitch) for name in self._channels}
+
+    def _file(self, house: int) -> PanoramaFile:
+        """The panoramas of a house, opened by this process."""
+        if self._process != os.getpid():  # forked: the parent's files are the parent's
+            self._open, self._process = OrderedDict(), os.getpid()
+            cv2.setNumThreads(1)  # a worker is one of several; OpenCV's threads do not survive a fork
+        if house not in self._open:
+            path = self._folder / "houses" / self.houses[house] / "panoramas.pano"
+            self._open[house] = PanoramaFile(path)
+            while len(self._open) > OPEN:
+                self._open.popitem(last=False)[1].close()
+        self._open.move_to_end(house)
+        return self._open[house]
+
+
+def _decoded(file: PanoramaFile, node: int, channels: Sequence[str]) -> Panorama:
+    """A panorama of which only some channels are decoded; the others are empty."""
+    s = file.size
+    rgb = file.rgb(node) if "rgb" in channels else np.empty((6, s, s, 0), np.uint8)
+    depth = file.depth(node) if "depth" in channels else np.empty((6, s, 0), np.float32)
+    return Panorama(rgb, depth, file.ids(node) if "ids" in channels else np.empty((6, s, 0), np.int32))
+
+
+def _colours_first(name: str, picture: np.ndarray) -> np.ndarray:
+    """(..., h, w, 3) -> (..., 3, h, w) for 'rgb'; others as they are, in one piece of memory that can be written."""
+    return np.ascontiguousarray(np.moveaxis(picture, -1, -3) if name == "rgb" else picture)
+
+
+def _visible(ids: np.ndarray, class_of_id: np.ndarray, classes: int) -> np.ndarray:
+    """(C,) bool: classes that cover more than VISIBLE of a picture of instance ids."""
+    seen = class_of_id[ids.ravel()]
+    return np.bincount(seen[seen >= 0], minlength=classes) > VISIBLE * ids.size
+
+
+def _known(data: Dataset, name: str, classes: Sequence[str]) -> _House:
+    place = data.place(name)
+    rooms = [ROOM_KINDS.index(place.house.room_by_id[str(r)].kind) for r in place.graph.room_of_node]
+    class_of_id, _ = ids_to_labels(place.house, classes)
+    return _House(name, place.graph.positions.astype(np.float32), np.array(rooms, np.int64), class_of_id)
+
+
+def _objects(data: Dataset, names: Sequence[str]) -> tuple[str, ...]:
+    """The object classes of some houses, sorted."""
+    return tuple(sorted({p.object_class for n in names for p in data.place(n).house.placements}))
