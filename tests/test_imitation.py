@@ -36,7 +36,7 @@ from agents.hanna.training import ADDED, NUMBERS, Split, for_training, learn_onc
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.imitation.checkpoint import CheckpointError
-from agents.imitation.loop import Clock, TrainingError, as_good, tasks_of_update
+from agents.imitation.loop import Clock, TrainingError, as_good, falling_rate, tasks_of_update
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
@@ -454,9 +454,9 @@ def test_impossible_settings_are_refused(change, message):
 
 def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     config = dataclasses.replace(TINY, iterations=100, cooldown=0.4, learning_rate=1e-3)
-    rates = [config.learning_rate_at(u) for u in range(100)]
+    rates = [falling_rate(1e-3, u, 100, 0.4) for u in range(100)]
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
-    assert dataclasses.replace(config, cooldown=0.0).learning_rate_at(99) == 1e-3
+    assert falling_rate(1e-3, 99, 100, 0.0) == 1e-3
     agent, split = agent_for(setting(), config), setting()
     optimizer = torch.optim.Adam(agent.network.parameters(), 1.0)
     learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())

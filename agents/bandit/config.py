@@ -6,11 +6,13 @@ import dataclasses
 import json
 from dataclasses import dataclass
 
+from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
+
 UNITS = ("words", "pieces")
 
 
-@dataclass(frozen=True)
-class BanditConfig:
+@dataclass(frozen=True, kw_only=True)
+class BanditConfig(RunSettings):
     """The defaults are the dissertation's; SCALES holds the smaller settings."""
 
     hidden_size: int = 500
@@ -41,23 +43,17 @@ class BanditConfig:
     """Longest gradient; the authors' program's (docs/sources.md, S73)."""
     checkpoint_minutes: float = 2.0
     """How often a run is saved, so that it can go on after an interruption."""
-    seed: int = 0
-    """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        if self.units not in UNITS:
-            raise ValueError(f"units must be one of {UNITS}, got {self.units!r}")
-        for name in ("hidden_size", "longest", "batch", "pretraining_passes", "critic_passes", "decay_from"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        super().__post_init__()
+        require_word(self, "units", UNITS)
+        require(self, AT_LEAST_ONE, "hidden_size", "longest", "pretraining_passes", "critic_passes", "decay_from")
+        require(self, POSITIVE, "pretraining_rate", "bandit_rate", "clip")
         for name in ("source_words", "target_words"):
             if getattr(self, name) < 4:
                 raise ValueError(
                     f"{name} must be at least 4, got {getattr(self, name)}: for padding, unknown words and the end"
                 )
-        for name in ("pretraining_rate", "bandit_rate", "clip", "checkpoint_minutes"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
         if not self.bandit_set.startswith("bandit"):
             raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
 

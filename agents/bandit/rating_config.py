@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, require, require_word
+
 SCORES = ("success", "nDTW")
 """What a person's stars are simulated from."""
 
@@ -30,11 +32,6 @@ class RatingConfig:
     """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        if self.score not in SCORES:
-            raise ValueError(f"score must be one of {SCORES}, got {self.score!r}")
-        for name in ("updates", "batch"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("learning_rate", "critic_rate", "clip"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        require_word(self, "score", SCORES)
+        require(self, AT_LEAST_ONE, "updates", "batch")
+        require(self, POSITIVE, "learning_rate", "critic_rate", "clip")

@@ -38,6 +38,7 @@ from agents.imitation.loop import (
     TrainingError,
     as_good,
     dropout_of,
+    falling_rate,
     seed_of,
     stop_signal,
     tasks_of_update,
@@ -178,7 +179,7 @@ def learn_once(
                     experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor
                 )
                 for group in optimizer.param_groups:
-                    group["lr"] = config.learning_rate_at(update)
+                    group["lr"] = falling_rate(config.learning_rate, update, config.iterations, config.cooldown)
                 optimizer.zero_grad(set_to_none=True)
                 (losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]).backward()
                 parallel.add_gradients(agent.network.parameters())

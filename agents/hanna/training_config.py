@@ -9,35 +9,26 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from agents.hanna.asking import RULES
 from agents.hanna.config import HannaSizes
+from agents.imitation.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    SHARE,
+    ValidatedRunSettings,
+    require,
+    require_word,
+)
 from embodied.records import from_json
 
 MODELS = ("hanna", "lstm")
 
-RANGES: tuple[tuple[tuple[str, ...], Callable[[float], bool], str], ...] = (
-    (
-        ("hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads", "iterations", "batch")
-        + ("training_steps", "evaluation_steps", "evaluation_batch", "validate_every", "validation_tasks")
-        + ("instruction_length",),
-        lambda x: x >= 1,
-        "at least 1",
-    ),
-    (("learning_rate", "checkpoint_minutes"), lambda x: 0 < x < math.inf, "positive and finite"),
-    (("alpha", "weight_decay", "evaluation_temperature"), lambda x: 0 <= x < math.inf, "at least 0 and finite"),
-    (("training_houses",), lambda x: x >= 0, "at least 0"),
-    (("dropout", "environment_dropout", "curiosity_floor"), lambda x: 0 <= x < 1, "in [0, 1)"),
-    (("ask_threshold", "cooldown", "guided_asking"), lambda x: 0 <= x <= 1, "in [0, 1]"),
-)
-"""Fields of TrainingConfig, what holds of them, and that in words."""
 
-
-@dataclass(frozen=True)
-class TrainingConfig:
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig(ValidatedRunSettings):
     """The defaults are Table D.1; SCALES holds the smaller settings."""
 
     model: str = "hanna"
@@ -56,14 +47,10 @@ class TrainingConfig:
     """Share of units that are silent in training."""
     iterations: int = 30_000
     """Updates of the weights."""
-    learning_rate: float = 1e-4
-    """Of Adam."""
     cooldown: float = 0.0
     """The last share of the updates, over which the learning rate falls linearly to zero (docs/sources.md, S32)."""
     weight_decay: float = 5e-4
     """The authors' program's; the text does not mention it (docs/sources.md, S28)."""
-    batch: int = 32
-    """Episodes per update."""
     training_houses: int = 0
     """Learn from so many of the data set's training houses; 0: from all."""
     training_steps: int = 20
@@ -101,28 +88,18 @@ class TrainingConfig:
     likeliest action walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
     """When judged, the learned rule asks where REQUEST is more probable than this."""
-    validate_every: int = 500
-    """Updates between validations."""
     validation_tasks: int = 200
     """Tasks of each validation."""
-    checkpoint_minutes: float = 3.0
-    """How often the run is saved, so that it can go on after an interruption."""
-    seed: int = 0
-    """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        for name, words in (("model", MODELS), ("ask_rule", sorted(RULES))):
-            if getattr(self, name) not in words:
-                raise ValueError(f"{name} must be one of {words}, got {getattr(self, name)!r}")
-        for names, holds, wanted in RANGES:
-            for name in names:
-                if not holds(getattr(self, name)):  # NaN holds nothing
-                    raise ValueError(f"{name} must be {wanted}, got {getattr(self, name)}")
-
-    def learning_rate_at(self, update: int) -> float:
-        """Of Adam at an update, counted from 0; never zero."""
-        falling = round(self.cooldown * self.iterations)
-        return self.learning_rate * min(1.0, (self.iterations - update) / (falling + 1))
+        super().__post_init__()
+        require_word(self, "model", MODELS)
+        require_word(self, "ask_rule", tuple(sorted(RULES)))
+        require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
+        require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps", "evaluation_batch", "instruction_length")
+        require(self, NOT_NEGATIVE, "alpha", "weight_decay", "evaluation_temperature", "training_houses")
+        require(self, NOT_ALL, "dropout", "environment_dropout", "curiosity_floor")
+        require(self, SHARE, "ask_threshold", "cooldown", "guided_asking")
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""

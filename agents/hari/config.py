@@ -5,9 +5,19 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from agents.imitation.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    ValidatedRunSettings,
+    require,
+)
 
-@dataclass(frozen=True)
-class ExecutionConfig:
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionConfig(ValidatedRunSettings):
     """The execution policy (appendix E, "operation policy" of Table E.2); the defaults are the table's."""
 
     hidden_size: int = 256
@@ -18,10 +28,6 @@ class ExecutionConfig:
     """Of the attention."""
     dropout: float = 0.1
     """Share of units that are silent in training, in attention as elsewhere."""
-    learning_rate: float = 1e-4
-    """Of Adam."""
-    batch: int = 32
-    """Episodes per update."""
     iterations: int = 100_000
     """Updates of the weights."""
     horizon: int = 15
@@ -33,37 +39,25 @@ class ExecutionConfig:
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
     """Share of the updates, the last ones, over which the learning rate falls linearly (docs/sources.md, S79)."""
-    validate_every: int = 500
-    """Updates between validations."""
-    validation_tasks: int = 300
-    """Tasks of each validation."""
-    checkpoint_minutes: float = 3.0
-    """How often the run is saved."""
-    seed: int = 0
-    """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        at_least_one(self, "hidden_size", "layers", "heads", "batch", "iterations", "horizon", "validate_every")
-        above_zero(self, "learning_rate", "clip", "checkpoint_minutes")
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
+        require(self, POSITIVE, "clip")
+        require(self, NOT_ALL, "dropout")
+        require(self, SHARE, "cooldown", "guided")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
-        if not (0 <= self.dropout < 1 and 0 <= self.cooldown <= 1 and 0 <= self.guided <= 1):
-            raise ValueError(
-                f"dropout {self.dropout} should be in [0, 1), cooldown {self.cooldown} and guided {self.guided} in "
-                "[0, 1]"
-            )
 
 
-@dataclass(frozen=True)
-class IntentionConfig:
+@dataclass(frozen=True, kw_only=True)
+class IntentionConfig(ValidatedRunSettings):
     """The intention policy and its critic ("interaction policy" of Table E.2); the defaults are the table's."""
 
     hidden_size: int = 512
     """Width of the recurrent networks."""
     learning_rate: float = 1e-5
     """Of Adam."""
-    batch: int = 32
-    """Episodes per update."""
     critic_iterations: int = 5_000
     """Updates of the critic alone, before the first of both."""
     iterations: int = 50_000
@@ -91,35 +85,17 @@ class IntentionConfig:
     """Updates between validations."""
     validation_tasks: int = 300
     """Tasks of each validation, from its three conditions alike."""
-    checkpoint_minutes: float = 3.0
-    """How often the run is saved."""
-    seed: int = 0
-    """Of everything that is drawn."""
 
     def __post_init__(self) -> None:
-        at_least_one(self, "hidden_size", "batch", "iterations", "stack", "longest", "horizon", "validate_every")
-        above_zero(self, "learning_rate", "clip", "checkpoint_minutes")
-        if self.critic_iterations < 0:
-            raise ValueError(f"critic_iterations should not be negative, got {self.critic_iterations}")
-        if min(self.cost, self.entropy) < 0:
-            raise ValueError(f"cost {self.cost} and entropy {self.entropy} should not be negative")
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
+        require(self, POSITIVE, "clip")
+        require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
 
     @property
     def updates(self) -> int:
         """All updates of a run: those of the critic alone come first."""
         return self.critic_iterations + self.iterations
-
-
-def at_least_one(config: object, *names: str) -> None:
-    for name in names:
-        if getattr(config, name) < 1:
-            raise ValueError(f"{name} should be at least 1, got {getattr(config, name)}")
-
-
-def above_zero(config: object, *names: str) -> None:
-    for name in names:
-        if not getattr(config, name) > 0:
-            raise ValueError(f"{name} should be positive, got {getattr(config, name)}")
 
 
 EXECUTION_SCALES: dict[str, ExecutionConfig] = {

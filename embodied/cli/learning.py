@@ -53,6 +53,41 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_scale(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
+    parser.add_argument(
+        "--scale", choices=sorted(scales), default="mini", help="settings to start from (default: %(default)s)"
+    )
+
+
+def add_run(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
+    """Options of one run that learns: where, from which settings, for how long."""
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        required=True,
+        metavar="DIR",
+        help="run folder; an interrupted run goes on from it",
+    )
+    add_scale(parser, scales)
+    parser.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+
+
+def add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+
+
+def add_judged_tasks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
+    )
+
+
+def add_agents_side_by_side(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--workers", type=whole(), default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
+    )
+
+
 def add_train_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.add_argument(
@@ -71,24 +106,14 @@ def add_features(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
-    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    add_device(parser)
 
 
 def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="run folder; an interrupted run goes on from it",
-    )
-    parser.add_argument(
-        "--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)"
-    )
-    parser.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
-    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    add_run(parser, SCALES)
+    add_device(parser)
     parser.add_argument(
         "--begin", type=any_path, metavar="FILE", help="begin with the weights of this agent instead of random ones"
     )
@@ -116,17 +141,7 @@ def add_train_hari(parser: argparse.ArgumentParser) -> None:
 def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
     add_common(parser)
     parser.set_defaults(threads=1)
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="run folder; an interrupted run goes on from it",
-    )
-    parser.add_argument(
-        "--scale", choices=sorted(scales), default="mini", help="settings to start from (default: %(default)s)"
-    )
-    parser.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    add_run(parser, scales)
 
 
 def add_study_hari(parser: argparse.ArgumentParser) -> None:
@@ -141,12 +156,8 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds", type=whole(), default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
     )
-    parser.add_argument(
-        "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
-    )
-    parser.add_argument(
-        "--workers", type=whole(), default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
-    )
+    add_judged_tasks(parser)
+    add_agents_side_by_side(parser)
     add_fields(parser, IntentionConfig, scales=INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))
 
 
@@ -167,19 +178,13 @@ def add_study(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="agents, episodes and tables; the same command goes on",
     )
-    parser.add_argument(
-        "--scale", choices=sorted(SCALES), default="mini", help="settings to start from (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
-    )
+    add_scale(parser, SCALES)
+    add_judged_tasks(parser)
     parser.add_argument(
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
-    parser.add_argument(
-        "--workers", type=whole(), default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
-    )
-    parser.add_argument("--device", default="cpu", help="'cpu' or 'cuda' (default: %(default)s)")
+    add_agents_side_by_side(parser)
+    add_device(parser)
     parser.set_defaults(threads=1)  # per agent; they are trained side by side
     add_fields(parser, TrainingConfig, skip=("training_houses",), scales=SCALES)
 
@@ -217,9 +222,7 @@ def add_study_bandit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
-    parser.add_argument(
-        "--scale", choices=sorted(BANDIT_SCALES), default="mini", help="settings to start from (default: %(default)s)"
-    )
+    add_scale(parser, BANDIT_SCALES)
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="runs side by side (default: %(default)s)"
     )

@@ -202,7 +202,16 @@ def _scalar(hint: typing.Any) -> tuple[type, str | int | None]:
 
 
 def field_docs(kind: type) -> dict[str, str]:
-    """Field name to the docstring that stands below it in the source, on one line."""
+    """Field name to the docstring that stands below it in the source, on one line; those of the records that `kind`
+    stands on, too."""
+    docs: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if dataclasses.is_dataclass(base):
+            docs |= _own_docs(base)
+    return docs
+
+
+def _own_docs(kind: type) -> dict[str, str]:
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
     assert isinstance(body, ast.ClassDef)
     docs = {}
