@@ -27,6 +27,7 @@ from assets.importing.sh3f import CATALOGUE, PackError, open_pack
 from assets.materials import finish
 from embodied import cli
 from embodied.cli.options import field_docs
+from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError
 from embodied.generate import HouseConfig
 from embodied.house.house import House, HouseError
@@ -242,6 +243,49 @@ def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monke
     assert cli.main(["doctor"]) == 2
     *_, last, end = capsys.readouterr().err.split("\n")
     assert last.startswith("error: /x/a.pano: No space left on device") and not end
+
+
+@pytest.mark.slow
+def test_a_killed_worker_is_one_line(capsys, monkeypatch):
+    from embodied.cli import doctor
+
+    def fail(_):
+        for_each_unit(signal.raise_signal, [signal.SIGKILL] * 2, (), workers=2, watch=None, ray_address=None)
+
+    monkeypatch.setattr(doctor, "run", fail)
+    assert cli.main(["doctor"]) == 2
+    *_, last, end = capsys.readouterr().err.split("\n")
+    assert last.startswith("error: a worker process was ended from outside") and "fewer --workers" in last and not end
+
+
+FULL = """
+import resource, signal, sys
+import numpy as np
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
+from embodied import cli
+from embodied.cli import doctor
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
+rng = np.random.default_rng(0)
+def drawn():
+    for k in range(9):
+        print("drawn", k, flush=True)
+        yield Panorama(rng.integers(0, 255, (6, 32, 32, 3), np.uint8), np.ones((6, 32, 32), np.float32),
+                       np.zeros((6, 32, 32), np.int32))
+resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
+doctor.run = lambda args: write_panoramas(__import__("pathlib").Path(sys.argv[1]), drawn(), {})
+raise SystemExit(cli.main(["doctor"]))
+"""
+
+
+@pytest.mark.slow
+def test_no_space_left_in_the_middle_of_drawing_is_one_line_and_leaves_the_old_pictures(tmp_path):
+    path = tmp_path / "panoramas.pano"
+    path.write_bytes(b"old")
+    done = subprocess.run([sys.executable, "-c", FULL, str(path)], check=False, capture_output=True, text=True)
+    assert done.returncode == 2 and done.stderr.startswith(f"error: {path}: File too large"), done.stderr
+    assert done.stderr.count("\n") == 1 and 2 <= done.stdout.count("drawn") < 9, "it began, and stopped at once"
+    assert [p.name for p in tmp_path.iterdir()] == [path.name] and path.read_bytes() == b"old"
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import NoReturn
 
@@ -56,6 +57,12 @@ REMEDIES = {
     errno.ENOENT: "there is no such file or folder, and it cannot be made; check the path",
 }
 """What to do about an error of the operating system."""
+
+KILLED = (
+    "a worker process was ended from outside, most often because memory ran out; run the same command again, "
+    "perhaps with fewer --workers. What is whole is kept"
+)
+"""What a killed worker leaves to be said."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -115,6 +122,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         _close_bars()
         print(f"error: {message_of(e)}", file=sys.stderr)
+        return 2
+    except BrokenExecutor:  # of joblib's workers
+        if "--traceback" in argv:
+            raise
+        _close_bars()
+        print(f"error: {KILLED}", file=sys.stderr)
         return 2
     except ImportError:
         found = strangers()
