@@ -29,7 +29,6 @@ from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
 from embodied.interface import Ask, Candidates, Feature, FindObject, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
-from embodied.navigation.graph import count_hops
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 
 SMALL = ExecutionConfig(
@@ -338,9 +337,8 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])
     world = fork_world()
     ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
-    hops = {"fork": count_hops(world.graph.next_hop)}
     for update in range(config.updates):
-        learn_once(run, ground, hops, update)
+        learn_once(run, ground, update)
     episodes = play(fork_env, policy_of(agent, sample=False), [fork_task(1), fork_task(2)], seed=0)
     assert all(e.ended == "stop" and e.nodes[-1] in e.task.goal_nodes for e in episodes)
     assert all(e.requests == 1 for e in episodes), "one question, and not the useless one"
@@ -353,7 +351,7 @@ def test_shaped_costs_of_played_episodes_telescope(fork_executor):
     config = QUICK
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
     world = fork_world()
-    hops = count_hops(world.graph.next_hop)
+    hops = world.graph.hops
     for episode in play(fork_env, policy_of(agent), [fork_task(1), fork_task(2)] * 5, seed=3, batch=4):
         plain, shaped = sum(s.cost for s in episode.steps), sum(shaped_costs(episode, hops))
         assert shaped == pytest.approx(plain - hops[0, episode.task.goal_nodes[0]])

@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -34,7 +33,6 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Episode, Move, Place, Task
 from embodied.locks import locked
-from embodied.navigation.graph import count_hops
 
 FORMAT = "embodied-hari-intention-1"
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
@@ -80,7 +78,6 @@ def train(
     run = IntentionRun(agent, critic)
     progress = run.restore(folder / "checkpoint.pt")
     write_json(folder / "settings.json", as_dict(config), indent=1)
-    hops = {name: count_hops(p.graph.next_hop) for name, p in training.places.items()}
     seen: list[dict[str, float]] = []
     with (
         locked(folder),
@@ -94,7 +91,7 @@ def train(
         ) as session,
     ):
         for update in session:
-            seen.append(learn_once(run, training, hops, update))
+            seen.append(learn_once(run, training, update))
             done, last = update + 1, update + 1 == config.updates
             if done % EVERY == 0 or last:
                 note(_line(done, session.progress.seconds, config.updates, seen))
@@ -109,6 +106,7 @@ class IntentionRun:
 
     def __init__(self, agent: HariAgent, critic: RecurrentHead) -> None:
         self.agent, self.critic = agent, critic
+        self.policy = policy_of(agent)
         rate = agent.config.learning_rate
         self.actor_optimizer = torch.optim.Adam(agent.actor.parameters(), rate)
         self.critic_optimizer = torch.optim.Adam(critic.parameters(), rate)
@@ -142,17 +140,17 @@ class IntentionRun:
         return Progress(**body["progress"])
 
 
-def learn_once(run: IntentionRun, ground: Ground, hops: Mapping[str, np.ndarray], update: int) -> dict[str, float]:
+def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, float]:
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)
     tasks = [dataclasses.replace(t, horizon=config.horizon, id=f"{t.id}#{k}") for k, t in enumerate(tasks)]
-    policy = policy_of(run.agent)
-    policy.choices = []
-    episodes = play(ground.make_env, policy, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
-    costs, mask = padded([shaped_costs(e, hops[e.task.world]) for e in episodes])
-    log_p, entropy = chosen(policy.choices, len(tasks))
-    decisions = Decisions(log_p, -values(run.critic, policy.choices, len(tasks)), -costs_to_go(costs, mask), mask)
+    choices: list[Choice] = []
+    run.policy.choices = choices
+    episodes = play(ground.make_env, run.policy, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
+    costs, mask = padded([shaped_costs(e, ground.places[e.task.world].graph.hops) for e in episodes])
+    log_p, entropy = chosen(choices, len(tasks))
+    decisions = Decisions(log_p, -values(run.critic, choices, len(tasks)), -costs_to_go(costs, mask), mask)
     descend(critic_loss(decisions), run.critic_optimizer, config.clip, f"update {update}, critic")
     if update >= config.critic_iterations:
         bonus = config.entropy * (entropy * mask).sum() / len(tasks)

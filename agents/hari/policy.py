@@ -15,7 +15,7 @@ from torch import Tensor
 
 from agents.hari.agent import Executor, HariAgent
 from agents.hari.networks import INTENTIONS, Encoded, RecurrentHead, shown_probabilities
-from agents.hari.words import collate, padded, percept_of
+from agents.hari.words import collate, percept_of_rows
 from embodied.interface import Action, Ask, Description, Intention, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action
 
@@ -25,14 +25,45 @@ DO, DONE = INTENTIONS.index("do"), INTENTIONS.index("done")
 ASKS = {name: INTENTIONS.index(name) for name in ("cur", "goal", "sub")}
 
 
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A description as it was read."""
+
+    description: Description
+    """Kept, so that its identity stays its own."""
+    rows: np.ndarray
+    """(M, 5) int64."""
+    encoded: Tensor
+    """(M, h): what the encoder made of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reader:
+    """An execution policy that learns no more, and what it has read: each description once.
+
+    Each is read by itself, so that what comes out does not depend on who else was listening.
+    """
+
+    executor: Executor
+    read: dict[tuple[str, int], Reading] = field(default_factory=dict, repr=False)
+    """('state' or 'goal', identity of a description) to what was made of it."""
+
+    def __call__(self, what: str, description: Description) -> Reading:
+        """A description of the 'state' or the 'goal'; describers give the same tuple for the same thing."""
+        found = self.read.get((what, id(description)))
+        if found is None:
+            rows = self.executor.words.rows(description, what)
+            encoded = self.executor.network.encode(torch.from_numpy(rows[None])).rows[0]
+            found = self.read[what, id(description)] = Reading(description, rows, encoded)
+        return found
+
+
 @dataclass
 class Belief:
     """What the execution policy carries along for B agents."""
 
     carried: Tensor
     """(B, h) b^s of the last move."""
-    read: dict[tuple[str, Description], Tensor] = field(default_factory=dict, repr=False)
-    """('state' or 'goal', description) to (M, h): what the encoder made of it, once for all steps and agents."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,24 +89,23 @@ class Considered:
 
 
 @torch.inference_mode()
-def consider(executor: Executor, observations: Observations, memory: Belief | None) -> tuple[Considered, Belief]:
+def consider(reader: Reader, observations: Observations, memory: Belief | None) -> tuple[Considered, Belief]:
     """Run the execution policy, which learns no more, on every agent that has not ended."""
-    memory = memory or Belief(executor.network.begin(len(observations)).clone())
+    network, words = reader.executor.network, reader.executor.words
+    memory = memory or Belief(network.begin(len(observations)).clone())
     rows = [i for i, o in enumerate(observations) if o is not None]
     seen = [o for o in observations if o is not None]
-    inputs = collate([percept_of(executor.words, o) for o in seen])
-    state = _read(executor, [("state", o.state_description) for o in seen], memory)
-    goal = _read(executor, [("goal", o.goal_descriptions[-1]) for o in seen], memory)
-    belief, log_moves = executor.network(memory.carried[rows], inputs, state, goal)
+    states = [reader("state", o.state_description) for o in seen]
+    goals = [reader("goal", o.goal_descriptions[-1]) for o in seen]
+    inputs = collate(
+        [
+            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn)
+            for s, g, o in zip(states, goals, seen, strict=True)
+        ]
+    )
+    state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))
+    belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
-
-
-def _read(executor: Executor, texts: Sequence[tuple[str, Description]], memory: Belief) -> Encoded:
-    """Descriptions as the encoder reads them; those that are new are read together, and kept."""
-    if new := [t for t in dict.fromkeys(texts) if t not in memory.read]:
-        rows = padded([executor.words.rows(description, what) for what, description in new])
-        memory.read.update(zip(new, executor.network.encode(torch.from_numpy(rows)).alone(), strict=True))
-    return Encoded.together([memory.read[t] for t in texts])
 
 
 def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
@@ -84,7 +114,7 @@ def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
     for k, i in enumerate(considered.rows):
         if isinstance(actions[i], Move):
             carried[i] = considered.belief[k]
-    return Belief(carried, memory.read)
+    return Belief(carried)
 
 
 def available(observation: Observation) -> np.ndarray:
@@ -141,11 +171,14 @@ class HariPolicy:
     choices: list[Choice] | None = field(default=None, repr=False)
     """Where each step is written down for training; None: nowhere."""
 
+    def __post_init__(self) -> None:
+        self._reader = Reader(self.executor)
+
     def act(
         self, observations: Observations, memory: Mind | None, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.Policy."""
-        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         moves = considered.best_moves
         return self._choose(observations, considered, moves, belief, memory, rngs)
 
@@ -204,7 +237,7 @@ class PerfectOnSubgoals(HariPolicy):
         rngs: Sequence[np.random.Generator],
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.PrivilegedPolicy."""
-        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         moves = considered.best_moves.copy()
         for k, i in enumerate(considered.rows):
             s = situations[i]

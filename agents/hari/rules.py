@@ -10,7 +10,19 @@ import numpy as np
 
 from agents.hari.agent import Executor
 from agents.hari.networks import INTENTIONS
-from agents.hari.policy import ASKS, DO, DONE, Actions, Belief, Observations, action_of, available, carry, consider
+from agents.hari.policy import (
+    ASKS,
+    DO,
+    DONE,
+    Actions,
+    Belief,
+    Observations,
+    Reader,
+    action_of,
+    available,
+    carry,
+    consider,
+)
 
 CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
 
@@ -112,18 +124,21 @@ class RuleMemory:
     """(B, 5)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class RuleAgent:
     """An execution policy whose intentions follow a rule."""
 
     executor: Executor
     rule: Rule
 
+    def __post_init__(self) -> None:
+        self._reader = Reader(self.executor)
+
     def act(
         self, observations: Observations, memory: RuleMemory | None, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, RuleMemory]:
         """See embodied.interface.Policy."""
-        considered, belief = consider(self.executor, observations, memory.belief if memory else None)
+        considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         mind = memory or self._begin(belief, rngs)
         actions: Actions = [None] * len(observations)
         taken, described = mind.taken.copy(), mind.described.copy()

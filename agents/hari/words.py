@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.interface import STEP, TURNS, Candidates, Description, Feature, Observation
+from embodied.interface import STEP, TURNS, Candidates, Description, Feature
 
 TYPES = ("object", "room", "action", "state", "goal")
 """Of feature sets; the last two mark what is described, as the first token of a description."""
@@ -116,19 +116,15 @@ def percept(
     words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int
 ) -> PerceptRows:
     """One agent's descriptions and moves as rows."""
-    return PerceptRows(
-        words.rows(state, "state"),
-        words.rows(goal, "goal"),
-        move_rows(words, candidates),
-        move_angles(candidates, turn),
-        np.append(candidates.allowed, True),
-    )
+    return percept_of_rows(words, words.rows(state, "state"), words.rows(goal, "goal"), candidates, turn)
 
 
-def percept_of(words: FeatureWords, observation: Observation) -> PerceptRows:
-    """What an agent perceives: d^s, the description on top of the stack, and where it can go."""
-    goals = observation.goal_descriptions
-    return percept(words, observation.state_description, goals[-1], observation.candidates, observation.turn)
+def percept_of_rows(
+    words: FeatureWords, state: np.ndarray, goal: np.ndarray, candidates: Candidates, turn: int
+) -> PerceptRows:
+    """One agent's moves as rows beside those of its descriptions."""
+    moves, angles = move_rows(words, candidates), move_angles(candidates, turn)
+    return PerceptRows(state, goal, moves, angles, np.append(candidates.allowed, True))
 
 
 def collate(percepts: Sequence[PerceptRows]) -> Inputs:

@@ -38,25 +38,33 @@ class Describer:
         """`frequent`: the object classes that sparse descriptions keep (the 100 most frequent)."""
         self._frequent, self._config = frozenset(frequent), config
         self._objects: dict[tuple[str, int, float], Description] = {}
+        self._said: dict[tuple[str, str, int, int], Description] = {}
 
     def dense(self, world: Place, node: int, *, goal: bool = False) -> Description:
-        """The room's name and at most 20 objects within 5 m (3 m of a goal), nearest first."""
-        return (self._room(world, node), *self._near(world, node, goal))
+        """The room's name and at most 20 objects within 5 m (3 m of a goal), nearest first; always the same tuple."""
+        key = ("dense", world.house.name, node, goal)
+        if key not in self._said:
+            self._said[key] = (self._room(world, node), *self._near(world, node, goal))
+        return self._said[key]
 
     def sparse(self, world: Place, node: int, *, goal: bool = False) -> Description:
-        """Only frequent objects; the room's name for goals only (4.3.5)."""
-        objects = tuple(f for f in self._near(world, node, goal) if f.name in self._frequent)
-        return (self._room(world, node), *objects) if goal else objects
+        """Only frequent objects; the room's name for goals only (4.3.5). Always the same tuple."""
+        key = ("sparse", world.house.name, node, goal)
+        if key not in self._said:
+            objects = tuple(f for f in self._near(world, node, goal) if f.name in self._frequent)
+            self._said[key] = (self._room(world, node), *objects) if goal else objects
+        return self._said[key]
 
     def step(self, world: Place, node: int, target: int) -> Description:
-        """The next optimal navigation action towards `target`: 'go' with its direction, or 'stop'."""
-        if node == target:
-            return (Feature("action", "stop"),)
-        offset = (
-            np.asarray(world.graph.positions)[int(world.graph.next_hop[node, target])]
-            - np.asarray(world.graph.positions)[node]
-        )
-        return (Feature("action", "go", *_bins(offset)),)
+        """The next optimal navigation action towards `target`: 'go' with its direction, or 'stop'; always the same
+        tuple."""
+        after = int(world.graph.next_hop[node, target])
+        key = ("step", world.house.name, node, after)
+        if key not in self._said:
+            offset = np.asarray(world.graph.positions)[after] - np.asarray(world.graph.positions)[node]
+            go = Feature("action", "stop") if node == target else Feature("action", "go", *_bins(offset))
+            self._said[key] = (go,)
+        return self._said[key]
 
     def pretraining_goal(
         self, world: Place, node: int, start: int, object_class: str, *, rng: np.random.Generator

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.interface import TURNS, Language, PlaceT, Route
-from embodied.navigation.graph import count_hops
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def sampled_paths(
     Args:
       starts: where routes may begin: nodes at which somebody can be met. Where no path can, all may.
     """
-    hops = count_hops(graph.next_hop)
+    hops = graph.hops
     fits = (hops >= config.fewest_edges) & (hops <= config.most_edges) & (np.asarray(graph.distance) >= config.shortest)
     if not fits.any():
         fits = hops == hops.max()
@@ -69,7 +68,7 @@ def spanning_parents(graph: NavGraph) -> tuple[np.ndarray, np.ndarray]:
     root = int(np.argmin(distance.max(axis=1)))
     parent = np.asarray(graph.next_hop)[:, root].astype(np.int64).copy()
     parent[root] = root
-    return parent, count_hops(graph.next_hop)[:, root]
+    return parent, graph.hops[:, root]
 
 
 def ancestors(parent: np.ndarray, node: int) -> list[int]:

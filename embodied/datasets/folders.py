@@ -36,7 +36,7 @@ from embodied.datasets.matterport import (
 )
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
-from embodied.navigation.graph import count_hops, to_matterport
+from embodied.navigation.graph import to_matterport
 from embodied.seeds import stream
 from embodied.tasks.goals import find_instances, goal_classes
 from embodied.tasks.vnla import VnlaConfig
@@ -238,7 +238,7 @@ def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeac
     place, config, plan = data.place(task.world), VnlaConfig(by_room=False), teacher.plan(data.place(task.world))
     goals = _anywhere(place, config)[sought(task).object_class]
     goals = tuple(g for g in goals if plan.counts((g,))[state_of(task.start)] > 0)
-    if count_hops(place.graph.next_hop)[task.start.node, list(goals)].min() + 1 < config.fewest_nodes:
+    if place.graph.hops[task.start.node, list(goals)].min() + 1 < config.fewest_nodes:
         return None
     rng = stream(data.config.seed, "noroom", task.id)
     request = PlainLanguage().request(FindObject(sought(task).object_class), rng=rng)

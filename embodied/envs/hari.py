@@ -14,7 +14,6 @@ from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import Describer
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
-from embodied.navigation.graph import count_hops
 
 if TYPE_CHECKING:
     import numpy as np
@@ -91,17 +90,10 @@ class HariEnv(HelpEnv):
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs
         self._see = describer.dense if dense_states else describer.sparse
-        self._hops: dict[str, np.ndarray] = {}
 
     def task_error(self, node: int, goal: int) -> float:
         """c(s, a_done): edges on the shortest path from node to goal (4.3.6; docs/sources.md, S61)."""
-        return float(self._hops_here()[node, goal])
-
-    def _hops_here(self) -> np.ndarray:
-        name = self.task.world
-        if name not in self._hops:
-            self._hops[name] = count_hops(self.world.graph.next_hop)
-        return self._hops[name]
+        return float(self.world.graph.hops[node, goal])
 
     def _begin(self) -> None:
         goal = self.task.goal_nodes[0]
@@ -166,7 +158,7 @@ def shaped_costs(episode: Episode, hops: np.ndarray) -> list[float]:
     """c-tilde_t = c_t + Phi(s_{t+1}, g_{t+1}) - Phi(s_t, g_t), with Phi = 0 after the end (4.20).
 
     Args:
-      hops: (n, n) edges on the shortest paths (navigation.graph.count_hops).
+      hops: (n, n) edges on the shortest paths (NavGraph.hops).
 
     They sum to the costs minus Phi(s_1, g_1) (4.21), whatever was done.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,11 @@ class NavGraph:
         while nodes[-1] != goal:
             nodes.append(int(self.next_hop[nodes[-1], goal]))
         return tuple(nodes)
+
+    @cached_property
+    def hops(self) -> np.ndarray:
+        """(n, n) int64: edges on the shortest path (by metres) from i to j."""
+        return count_hops(self.next_hop)
 
 
 def graph_of(positions: np.ndarray, edges: np.ndarray, ids: tuple[str, ...], rooms: tuple[str, ...]) -> NavGraph:

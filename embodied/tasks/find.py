@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.interface import TURNS, FindObject, Language, Place, Pose, Task
-from embodied.navigation.graph import count_hops
 from embodied.seeds import stream
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 
@@ -44,7 +43,7 @@ class Pool:
 def build_pool(world: Place, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str) -> Pool:
     """Pairs whose shortest path to the nearest goal (in metres) has `fewest`..`most` nodes."""
     graph = world.graph
-    hops = count_hops(graph.next_hop) + 1
+    hops = graph.hops + 1
     distance = np.asarray(graph.distance)
     pairs = []
     for c, goal in enumerate(classes):
