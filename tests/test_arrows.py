@@ -74,10 +74,10 @@ embodied.light <- assets.catalogue embodied.house embodied.scene embodied.render
 embodied.mattersim <- embodied.render
 embodied.teachers <- embodied.navigation embodied.interface embodied.action_spaces
 embodied.policies <- embodied.interface embodied.action_spaces embodied.language embodied.teachers
-embodied.tasks <- embodied.house embodied.navigation embodied.interface embodied.teachers
+embodied.tasks <- embodied.house embodied.interface embodied.teachers
 embodied.world <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
     embodied.render embodied.light
-embodied.assistants <- embodied.navigation embodied.interface embodied.teachers embodied.tasks
+embodied.assistants <- embodied.house embodied.navigation embodied.interface embodied.teachers embodied.tasks
 embodied.envs <- assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
     embodied.action_spaces embodied.language embodied.teachers embodied.assistants
 embodied.datasets <- embodied.locks assets.catalogue embodied.house embodied.navigation embodied.generate
@@ -107,7 +107,7 @@ agents.vision <- agents.shipped agents.device assets.catalogue embodied.house em
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.locks embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
-    embodied.navigation embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
+    embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
     embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
@@ -123,7 +123,8 @@ viz.story <- embodied.interface
 viz.video <- embodied.interface
 viz.report <- embodied.interface embodied.records
 viz.recording <- embodied.interface embodied.render viz.house3d viz.story embodied.world viz.sinks embodied.navigation
-    viz.blueprint
+    viz.blueprint viz.described
+viz.described <- embodied.assistants embodied.house embodied.interface
 """
 """Every room (a module or folder of a package) and the rooms that it imports, GROUND apart, for type checkers only or
 late, too; from below to above, by package. A new arrow is a decision: it belongs here, and no circle may come of it."""

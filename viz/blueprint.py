@@ -61,7 +61,7 @@ def episode_blueprint(
       dialogue: show who said what.
       target: show the image that an assistant sent.
       probabilities: plot the policy's own probabilities.
-      stack: show HARI's goals.
+      stack: show HARI's goals and costs.
       sees: name of the picture along the agent's gaze.
       lit: show the same view as people are to see it.
     """
@@ -79,7 +79,7 @@ def episode_blueprint(
             rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
-    plots = _plots(probabilities)
+    plots = _plots(probabilities, stack)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(ahead, *(for_people or sent)),
@@ -119,8 +119,8 @@ def _house_view(house: House) -> rrb.Spatial3DView:
     )
 
 
-def _plots(probabilities: bool) -> list[rrb.View]:
-    """Distance and mode over time, and how likely asking was."""
+def _plots(probabilities: bool, cost: bool) -> list[rrb.View]:
+    """Distance and mode over time, how likely asking was, and what it has cost so far."""
     plots: list[rrb.View] = [
         rrb.TimeSeriesView(
             origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
@@ -136,4 +136,6 @@ def _plots(probabilities: bool) -> list[rrb.View]:
                 plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
             )
         )
+    if cost:
+        plots.append(rrb.TimeSeriesView(origin="/plot/cost", name="Cost so far"))
     return plots

@@ -4,8 +4,9 @@ Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
   agent/path, agent/route  walked, spoken of       view/panorama, view/target, view/lit
+  view/panorama/described, task/described   what HARI's assistant spoke of
   text/...               request, instruction, dialogue, goals (HARI's stack)
-  plot/...               distance to the goal, requests, probabilities     events   a log
+  plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from embodied.navigation.free_space import EYE
 from embodied.render.panorama import Panorama
 from embodied.world import World
 from viz.blueprint import blueprint_of
+from viz.described import log_described
 from viz.house3d import light_meshes, lit_meshes, log_house
 from viz.sinks import Sinks, open_recording
 from viz.story import Story
@@ -213,6 +215,8 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
     if task.kind == "hari":
         recording.log("text/goals", rr.TextDocument(state.stack(world, step), media_type=rr.MediaType.MARKDOWN))
+        recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
+        log_described(recording, world, step, views.sizes.panorama)
     log_thought(recording, step)
     log_path(recording, world, state.nodes)
     state.after(step)

@@ -47,6 +47,8 @@ class Story:
         """What the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
         self.count = 0
         self.requests = 0
+        self.cost = 0.0
+        """Of all steps so far (HARI)."""
         self.last: Step | None = None
 
     def before(self, step: Step) -> None:
@@ -70,6 +72,7 @@ class Story:
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step
+        self.cost += step.cost
         self.count += 1
 
     def _heard(self, reply: Reply, pose: Pose) -> None:

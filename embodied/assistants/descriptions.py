@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from embodied.house.house import Placement
 from embodied.interface import STEP, TURNS, Description, Feature, Place
 from embodied.tasks.goals import NOT_OBJECTS
 
@@ -104,6 +105,13 @@ def dropped(description: Description, *, rng: np.random.Generator) -> Descriptio
 
 def near_objects(world: Place, node: int, radius: float, config: DescriberConfig) -> Description:
     """Objects within `radius` metres (3-D, from eye to the middle of the object), nearest first."""
+    return tuple(f for f, _ in near_placements(world, node, radius, config))
+
+
+def near_placements(
+    world: Place, node: int, radius: float, config: DescriberConfig = DescriberConfig()
+) -> list[tuple[Feature, Placement]]:
+    """The same with what each feature set is said of."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
     found = []
     for p in world.house.placements:
@@ -112,8 +120,14 @@ def near_objects(world: Place, node: int, radius: float, config: DescriberConfig
         offset = np.asarray(p.position) + [0.0, 0.0, p.size[2] / 2] - eye
         distance = float(np.linalg.norm(offset))
         if distance <= radius:
-            found.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset))))
-    return tuple(f for _, _, f in sorted(found, key=lambda x: x[:2])[: config.most_objects])
+            found.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset)), p))
+    return [(feature, p) for _, _, feature, p in sorted(found, key=lambda x: x[:2])[: config.most_objects]]
+
+
+def spoken_of(world: Place, node: int, description: Description) -> list[tuple[Feature, Placement]]:
+    """What the objects of a description of `node` are, nearest first."""
+    said = set(description)
+    return [(f, p) for f, p in near_placements(world, node, DescriberConfig().state_radius) if f in said]
 
 
 def frequent_classes(worlds: Iterable[Place], most: int = 100) -> tuple[str, ...]:

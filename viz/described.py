@@ -1,0 +1,73 @@
+"""What HARI's assistant spoke of, marked where it is: names in the panorama, boxes in the house."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from embodied.assistants.descriptions import spoken_of
+from embodied.house.house import Placement
+from embodied.interface import Feature, Intention, Place, Pose, Step
+
+COLOUR = (255, 160, 30)
+Marked = tuple[Feature, Placement]
+
+
+def log_described(recording: rr.RecordingStream, world: Place, step: Step, height: int) -> None:
+    """The objects of the reply to `step`: around the agent in its panorama (CUR), or where it is to go (GOAL, SUB).
+
+    What was marked before goes, so that the marks are always those of the last reply.
+
+    Args:
+      height: of the panorama that is shown, pixels.
+    """
+    here, there = _marked(world, step)
+    at = panorama_pixels(world, step.pose, [p for _, p in here], height)
+    recording.log(
+        "view/panorama/described",
+        rr.Points2D(at, labels=[label(f) for f, _ in here], show_labels=True, radii=3.0, colors=COLOUR),
+    )
+    recording.log(
+        "task/described",
+        rr.Boxes3D(
+            centers=np.array([middle(p) for _, p in there]).reshape(-1, 3),
+            half_sizes=np.array([p.size for _, p in there]).reshape(-1, 3) / 2 + 0.04,
+            rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for _, p in there],
+            labels=[label(f) for f, _ in there],
+            colors=COLOUR,
+            radii=0.01,
+        ),
+    )
+
+
+def _marked(world: Place, step: Step) -> tuple[list[Marked], list[Marked]]:
+    """What the reply to `step` said of the agent's place, and of where it is to go."""
+    reply = step.reply
+    if reply is None or reply.description is None:
+        return [], []
+    if reply.intention is Intention.CUR:
+        return spoken_of(world, step.pose.node, reply.description), []
+    node = step.targets[0] if reply.subtask is None else reply.subtask.target
+    return [], spoken_of(world, node, reply.description)
+
+
+def label(feature: Feature) -> str:
+    """What is said of an object: its name and how far it is in whole metres."""
+    return f"{feature.name.replace('_', ' ')} ({feature.distance} m)"
+
+
+def middle(placement: Placement) -> np.ndarray:
+    """(3,) metres: the middle of what is placed."""
+    return np.add(placement.position, (0.0, 0.0, placement.size[2] / 2))
+
+
+def panorama_pixels(world: Place, pose: Pose, placements: list[Placement], height: int) -> np.ndarray:
+    """(n, 2) pixels, column and row, of the middles of some things in a panorama of (height, 2 height).
+
+    Its middle column is the agent's gaze, as viz.recording.log_sight turns it.
+    """
+    offset = np.array([middle(p) for p in placements]).reshape(-1, 3) - world.graph.positions[pose.node]
+    yaw = np.arctan2(offset[:, 1], offset[:, 0]) - pose.yaw
+    pitch = np.arctan2(offset[:, 2], np.hypot(offset[:, 0], offset[:, 1]))
+    column = (np.pi - yaw) % (2 * np.pi) * height / np.pi
+    return np.stack([column, (np.pi / 2 - pitch) * height / np.pi], axis=1)
