@@ -19,7 +19,10 @@ from conftest import two_rooms
 from tqdm import tqdm
 
 import embodied
+from agents.bandit.config import BanditConfig
+from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import TrainingConfig
+from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.vision.config import VisionConfig
 from assets.cache import atomic_path
 from assets.catalogue import CatalogueError, load_catalogue
@@ -348,7 +351,9 @@ def test_help_imports_no_subcommand_and_import_embodied_is_light():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("kind", [HouseConfig, TrainingConfig, VisionConfig])
+@pytest.mark.parametrize(
+    "kind", [HouseConfig, TrainingConfig, VisionConfig, BanditConfig, RatingConfig, ExecutionConfig, IntentionConfig]
+)
 def test_every_field_that_is_an_option_is_explained(kind):
     assert [f.name for f in dataclasses.fields(kind) if not field_docs(kind).get(f.name)] == []
 

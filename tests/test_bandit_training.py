@@ -364,7 +364,6 @@ def test_intervals_over_seeds_are_students():
 
 
 def test_pieces_leave_no_word_unknown_and_come_back_whole():
-    pytest.importorskip("sentencepiece")
     sentences = [p.source.split() for p in toy_pairs(100)]
     lexicon = build_pieces(sentences, 40)
     again = lexicon_from_json(json.loads(json.dumps(lexicon.to_json())))
