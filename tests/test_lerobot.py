@@ -13,7 +13,7 @@ from hand_data import build, paint
 
 from embodied.cli import main
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.lerobot import ACTION, CAMERA, FPS, STATE, Camera, export_lerobot, seen
+from embodied.datasets.lerobot import ACTION, CAMERA, FPS, STATE, RecordedCamera, export_lerobot, seen
 from embodied.evaluation.metrics import success
 from embodied.evaluation.rollout import play
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
@@ -21,7 +21,7 @@ from embodied.records import save_lines
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
 
-SMALL = Camera(32, 48)
+SMALL = RecordedCamera(32, 48)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_
     with pytest.raises(DatasetError, match=r"no pictures of 'test_0000'; draw them"):
         export_lerobot(data, tmp_path / "blind", blind, **judged)
     with pytest.raises(ValueError, match="even sides"):
-        Camera(33, 48)
+        RecordedCamera(33, 48)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["full"]
 
 

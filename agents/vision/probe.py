@@ -33,7 +33,7 @@ class Labelled:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingScores:
     """What linear readers achieve on unseen houses."""
 
     mean_ap: float
@@ -68,7 +68,7 @@ def average_precision(scores: np.ndarray, positive: np.ndarray) -> float:
     return float((precision * hits).sum() / hits.sum())
 
 
-def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Reading:
+def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> ReadingScores:
     """Fit linear readers on `train` and judge them on `test`."""
     d = train.features.shape[-1]
     x, y = (torch.from_numpy(s.features.reshape(-1, d)) for s in (train, test))
@@ -92,7 +92,7 @@ def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Rea
     depth = _fit(x, goal, F.mse_loss, seed, steps)(y).numpy()[:, 0]
     true_depth = test.log_depth.reshape(-1)
     common = np.bincount(train.room).argmax()
-    return Reading(
+    return ReadingScores(
         mean_ap=float(np.nanmean(ap)),
         chance_ap=float(truth[:, [c for c in known if truth[:, c].any()]].mean()),
         classes=int(np.isfinite(ap).sum()),
@@ -124,7 +124,7 @@ def _fit(
 
 
 def place_auc(nodes: Labelled, near: float = 2.5) -> float:
-    """See Reading.place_auc; pairs of one house only, a node is not compared with itself."""
+    """See ReadingScores.place_auc; pairs of one house only, a node is not compared with itself."""
     close, far = [], []
     for house in sorted(set(nodes.house.tolist())):
         rows = np.flatnonzero(nodes.house == house)

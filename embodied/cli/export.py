@@ -158,7 +158,7 @@ def run_parquet(args: argparse.Namespace) -> int:
 
 
 def run_lerobot(args: argparse.Namespace) -> int:
-    from embodied.datasets.lerobot import Camera, export_lerobot
+    from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import agent
     from embodied.evaluation.metrics import success
@@ -178,7 +178,11 @@ def run_lerobot(args: argparse.Namespace) -> int:
         return success(episode, data.place(episode.task.world).graph) > 0
 
     steps = export_lerobot(
-        data, args.out, bar(episodes, "episodes", "episode"), succeeded=succeeded, camera=Camera(args.size, args.size)
+        data,
+        args.out,
+        bar(episodes, "episodes", "episode"),
+        succeeded=succeeded,
+        camera=RecordedCamera(args.size, args.size),
     )
     show(
         args,

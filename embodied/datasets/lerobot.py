@@ -70,7 +70,7 @@ DTYPES = {pa.float32(): "float32", pa.int64(): "int64", pa.bool_(): "bool"}
 
 
 @dataclass(frozen=True)
-class Camera:
+class RecordedCamera:
     """How the agent's view is framed."""
 
     height: int = 224
@@ -90,7 +90,7 @@ def export_lerobot(
     episodes: Iterable[Episode],
     *,
     succeeded: Callable[[Episode], bool],
-    camera: Camera = Camera(),
+    camera: RecordedCamera = RecordedCamera(),
 ) -> int:
     """Write episodes that were played in a data set's houses; returns how many steps they have.
 
@@ -158,7 +158,7 @@ def action(step: Step, place: Place) -> np.ndarray:
 class _Writer:
     """Owns the files of a data set that is being written."""
 
-    def __init__(self, folder: Path, camera: Camera) -> None:
+    def __init__(self, folder: Path, camera: RecordedCamera) -> None:
         self._folder, self._camera = folder, camera
         self._video = _Video(folder, camera)
         self._rows: list[dict[str, np.ndarray]] = []
@@ -254,7 +254,7 @@ class _Writer:
 class _Video:
     """Owns the video file that is being written; episodes stand in it one after another."""
 
-    def __init__(self, folder: Path, camera: Camera) -> None:
+    def __init__(self, folder: Path, camera: RecordedCamera) -> None:
         self._folder, self._camera = folder, camera
         self._number = -1
         self._container: Any = None
@@ -312,7 +312,7 @@ class _Video:
         )
 
 
-def seen(file: PanoramaFile, pose: Pose, camera: Camera) -> np.ndarray:
+def seen(file: PanoramaFile, pose: Pose, camera: RecordedCamera) -> np.ndarray:
     """(h, w, 3) uint8: what an agent at `pose` has before its eyes."""
     colours_only = Panorama(file.rgb(pose.node), *(np.empty((6, file.size, 0)),) * 2)
     return colours_only.view_rgb(pose.yaw, pose.pitch, camera.vfov, (camera.height, camera.width))
