@@ -13,7 +13,7 @@ import torch
 
 from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
-from agents.hanna.run import split_of
+from agents.imitation.lessons import split_of
 from agents.vision.config import Looked
 from agents.vision.run import encoder_of, pictures_of
 from assets.cache import digest, write_json

@@ -21,9 +21,11 @@ import torch
 from agents.failures import hanna_policies
 from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.run import Lessons, split_of, train_agent
+from agents.hanna.run import train_agent
 from agents.hanna.training_config import TrainingConfig
+from agents.imitation.lessons import Lessons, split_of
 from agents.judging import about
+from agents.tables import side_by_side as beside
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
@@ -388,22 +390,7 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
 
 def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row]) -> str:
     """The table with the dissertation's numbers in brackets, and what it was made with."""
-    heads = [f"{column} {split}" for split in table.splits for column in table.columns]
-    text = [
-        f"# {name}: {table.title}" if name == "houses" else f"# Table {name}: {table.title}",
-        "",
-        "| agent | " + " | ".join(heads) + " |",
-        "|" + "---|" * (1 + len(heads)),
-    ]
     by = {(r.agent, r.split): r for r in rows}
-    for line in table.lines:
-        cells = []
-        for k, split in enumerate(table.splits):
-            for column in table.columns:
-                cell = shown(column, by[line.label, split].values[column])
-                printed = line.printed.get(column)
-                cells.append(cell if printed is None else f"{cell} ({printed[k]:g})")
-        text.append(f"| {line.label} | " + " | ".join(cells) + " |")
     first = {r.split: r for r in rows}
     counts = "; ".join(f"{s}: {first[s].episodes} episodes in {first[s].houses} houses" for s in table.splits)
     c = setting.config
@@ -412,4 +399,7 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
         f"Trained {c.iterations} updates of {c.batch} episodes, seed {c.seed}; judged with seed {setting.seed}, "
         f"temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per cent."
     )
-    return "\n".join([*text, "", how, ""])
+    title = f"{name}: {table.title}" if name == "houses" else f"Table {name}: {table.title}"
+    lines = [(line.label, line.printed) for line in table.lines]
+    value = lambda label, split, column: by[label, split].values[column]
+    return beside(title, table.splits, table.columns, lines, value, how)

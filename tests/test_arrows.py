@@ -94,28 +94,33 @@ embodied.cli <- agents.shipped embodied.gl viz.sinks agents.imitation assets.imp
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
-    embodied.evaluation agents.vision agents.hanna agents.hari agents.bandit agents.failures agents.judging
-    agents.study
+    embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.failures
+    agents.judging agents.study
 embodied.__main__ <- embodied.cli
 agents.shipped <-
 agents.device <-
 agents.tensor_file <-
-agents.imitation <- agents.device
+agents.imitation <- agents.device agents.tensor_file agents.vision embodied.interface embodied.records embodied.locks
+    embodied.envs embodied.datasets embodied.evaluation
 agents.figures <- embodied.evaluation
+agents.tables <- embodied.evaluation
 agents.vision <- agents.shipped agents.device assets.catalogue embodied.house embodied.scene embodied.interface
     embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file embodied.locks embodied.records
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
-    embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.locks embodied.records
+    embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
     embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
     embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
+agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface
+    embodied.action_spaces embodied.language embodied.records embodied.teachers embodied.policies embodied.assistants
+    embodied.envs embodied.datasets embodied.evaluation
 agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.vision agents.hanna
-agents.judging <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna
-    agents.failures embodied.locks
-agents.study <- embodied.interface embodied.records embodied.datasets embodied.evaluation agents.figures agents.vision
-    agents.hanna agents.failures agents.judging embodied.locks
+agents.judging <- agents.imitation embodied.interface embodied.records embodied.datasets embodied.evaluation
+    agents.vision agents.hanna agents.failures embodied.locks
+agents.study <- agents.imitation agents.tables embodied.interface embodied.records embodied.datasets
+    embodied.evaluation agents.figures agents.vision agents.hanna agents.failures agents.judging embodied.locks
 viz.sinks <-
 viz.house3d <- embodied.scene
 viz.blueprint <- embodied.house embodied.interface embodied.render

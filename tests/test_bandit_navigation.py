@@ -25,11 +25,11 @@ from agents.bandit.navigation_study import NavigationSetting, gain, raters, run_
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
-from agents.hanna.training import Split
 from agents.hanna.training_config import SCALES
 from agents.hanna.vocabulary import build_vocabulary
 from agents.imitation.actor_critic import advantages
 from agents.imitation.checkpoint import CheckpointError, read_checkpoint
+from agents.imitation.lessons import Split
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

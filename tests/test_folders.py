@@ -17,7 +17,15 @@ import pytest
 from hand_data import build
 
 from embodied import mattersim
-from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, subgoal_words
+from embodied.datasets.folders import (
+    PROGRAMS,
+    action_space,
+    export_folder,
+    largest_batch,
+    names_of,
+    split_sentence,
+    subgoal_words,
+)
 from embodied.datasets.matterport import scan_name
 from embodied.datasets.skyboxes import write_skybox
 from embodied.evaluation import metrics
@@ -110,6 +118,58 @@ def test_the_readme_says_what_to_run_and_which_lines_to_change(program, folders)
         and "$" not in text.replace("$ ", "")
     )
     assert "not a ResNet-152's" in text
+
+
+def minibatches(items: list, batch: int, count: int) -> list[list]:
+    """As `_next_minibatch` of all of them: the last batch of a pass is filled up with the first items, once."""
+    at, found = 0, []
+    for _ in range(count):
+        taken = items[at : at + batch]
+        at = at + batch if len(taken) == batch else batch - len(taken)
+        found.append(taken if len(taken) == batch else taken + items[:at])
+    return found
+
+
+@pytest.mark.parametrize("program", KINDS)
+def test_the_readme_says_how_large_a_batch_may_be_and_one_more_breaks_it(program, data_sets, folders):
+    data, text = data_sets[KINDS[program]], (folders / program / "README-embodied.md").read_text()
+    most = largest_batch(data)
+    assert program == "iliad-nav" or f"at most {most} episodes" in text
+    if program in ("hanna", "vnla"):
+        name = {"hanna": "data/hanna/hanna_{}.json", "vnla": "data/asknav/asknav_{}.json"}[program]
+        sizes = [sum(len(i["instructions"]) for i in read(folders / program / name.format(s))) for s in data.splits]
+    else:
+        sizes = [3 * len({(t.world, t.goal.path) for t in data.tasks(s)}) for s in data.splits]
+    counts = [50, *[1] * (len(sizes) - 1)]  # judging begins anew each time and ends with the first repeat
+
+    def whole(batch: int) -> bool:
+        made = [b for n, count in zip(sizes, counts, strict=True) for b in minibatches(list(range(n)), batch, count)]
+        return all(len(b) == batch for b in made)
+
+    assert data.splits[0] == "train" and whole(most) and not whole(most + 1)
+
+
+def test_what_the_programs_write_down_of_an_episode_is_json(folders):
+    """Their trajectories are viewpoint, heading and elevation as the simulator gives them."""
+    for dialect, program in (("upstream", "r2r"), ("hanna", "hanna"), ("v0.1", "vnla")):
+        home = folders / program / PROGRAMS[program].data / "connectivity"
+        scan, graph = next(iter(program_graphs(home).items()))
+        start = sorted(graph.nodes)[0]
+        sim = mattersim.module(dialect).Simulator()
+        sim.setNavGraphPath(str(home))
+        sim.setRenderingEnabled(False)
+        sim.setDiscretizedViewingAngles(True)
+        if dialect == "v0.1":
+            sim.newEpisode(scan, start, 0.3, 0)
+            sim.makeAction(0, 1, 0)
+            state = sim.getState()
+        else:
+            sim.newEpisode([scan], [start], [0.3], [0])
+            sim.makeAction([0], [1], [0])
+            state = sim.getState()[0]
+        pose = state.location.viewpointId, state.heading, state.elevation
+        assert json.loads(json.dumps(pose)) == list(pose)
+        assert type(state.viewIndex) is int and type(state.scanId) is str
 
 
 # HANNA -------------------------------------------------------------------------------------------

@@ -31,12 +31,15 @@ from agents.hanna.losses import (
     reason_loss,
     relative_entropy,
 )
-from agents.hanna.policy import choose_at, choose_likeliest, choose_sampled
-from agents.hanna.training import ADDED, NUMBERS, Split, for_training, learn_once, train
+from agents.hanna.policy import for_training
+from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.choosing import choose_at, choose_likeliest, choose_sampled
+from agents.imitation.lessons import Split
 from agents.imitation.loop import Clock, TrainingError, as_good, falling_rate, tasks_of_update
+from agents.imitation.spine import ADDED, NUMBERS
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

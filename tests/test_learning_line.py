@@ -14,8 +14,9 @@ from hand_data import build
 from agents import study as module
 from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent, new_agent
-from agents.hanna.run import run_train_hanna, split_of, vocabulary_of
+from agents.hanna.run import run_train_hanna, vocabulary_of
 from agents.hanna.training_config import SCALES
+from agents.imitation.lessons import split_of
 from agents.judging import run_eval
 from agents.shipped import WEIGHTS
 from agents.study import StudySetting, run_study

@@ -13,8 +13,9 @@ from agents.hanna.training_config import TrainingConfig
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.imitation.settings import RunSettings, ValidatedRunSettings
 from agents.vision.config import VisionConfig
+from agents.vnla.config import VnlaSettings
 
-VALIDATED = (TrainingConfig(), ExecutionConfig(), IntentionConfig())
+VALIDATED = (TrainingConfig(), ExecutionConfig(), IntentionConfig(), VnlaSettings())
 RUNS = (*VALIDATED, BanditConfig())
 ALL = (*RUNS, RatingConfig(), VisionConfig())
 

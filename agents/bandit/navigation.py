@@ -26,8 +26,8 @@ from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
-from agents.hanna.training import Split
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.imitation.lessons import Split
 from agents.imitation.loop import Note, seed_of, tasks_of_update
 from assets.cache import digest
 from embodied.evaluation import metrics

@@ -15,8 +15,7 @@ from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.run import split_of
-from agents.hanna.training import Split
+from agents.imitation.lessons import Split, split_of
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,33 +11,20 @@ import torch
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
-from agents.hanna.policy import HannaPolicy, choose_at
+from agents.hanna.policy import HannaPolicy
 from agents.hanna.training_config import TrainingConfig
 from agents.hanna.vocabulary import Vocabulary
+from agents.imitation.agent_file import read_agent, refuse_features, write_agent
+from agents.imitation.choosing import choose_at
 from agents.shipped import SHIPPED_AGENT
-from agents.tensor_file import load_tensors, put, save_tensors
+from agents.tensor_file import put
 from agents.vision.bank import FeatureBank
-from embodied.records import from_plain, parse
 
 FORMAT, OLD_FORMAT = "embodied-agent-2", "embodied-agent-1"
 """The older one has no checksum."""
 NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 SHIPPED = SHIPPED_AGENT
 """The agent of this repository; see agents/weights/README.md."""
-
-
-@dataclass(frozen=True)
-class AgentSettings:
-    """What stands beside the weights in an agent's file, as text."""
-
-    format: str
-    config: str
-    """TrainingConfig as JSON."""
-    encoder: str
-    """Digest of the encoder whose features it learned from."""
-    feature_size: str
-    vocabulary: str
-    """Words as a JSON list."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +42,7 @@ class HannaAgent:
         Raises:
           ValueError: features of another encoder.
         """
-        if bank.digest != self.encoder_digest:
-            raise ValueError(
-                f"the features come from encoder {bank.digest[:12]}, the agent learned from "
-                f"{self.encoder_digest[:12]}; "
-                "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
-            )
+        refuse_features(bank.digest, self.encoder_digest)
         config = self.config
         rule = ask_above(config.ask_threshold) if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
@@ -86,14 +67,7 @@ def new_agent(config: TrainingConfig, vocabulary: Vocabulary, encoder_digest: st
 
 def save_agent(agent: HannaAgent, path: Path) -> None:
     """Write weights in half precision, with settings and vocabulary, atomically."""
-    settings = {
-        "format": FORMAT,
-        "config": agent.config.to_json(),
-        "encoder": agent.encoder_digest,
-        "feature_size": str(agent.feature_size),
-        "vocabulary": json.dumps(agent.vocabulary.words),
-    }
-    save_tensors(Path(path), {k: v.detach().half() for k, v in agent.network.state_dict().items()}, settings)
+    write_agent(agent, path, FORMAT)
 
 
 def load_agent(path: Path = SHIPPED) -> HannaAgent:
@@ -103,14 +77,10 @@ def load_agent(path: Path = SHIPPED) -> HannaAgent:
       FileNotFoundError, OSError.
       ValueError: truncated, changed, or of another format.
     """
-    tensors, about = load_tensors(path, (FORMAT, OLD_FORMAT), "train the agent again with `embodied train hanna`")
-    settings = from_plain(AgentSettings, about, str(path))
-    config = TrainingConfig.from_json(settings.config)
-    words = parse(settings.vocabulary, "a vocabulary")
-    if not isinstance(words, list) or not all(isinstance(w, str) for w in words) or not settings.feature_size.isdigit():
-        raise ValueError(f"{path}: its vocabulary should be a list of words and its feature size a number")
-    agent = new_agent(config, Vocabulary(tuple(words)), settings.encoder, int(settings.feature_size))
-    put(agent.network, {k: v.float() for k, v in tensors.items()}, path)
+    file = read_agent(path, (FORMAT, OLD_FORMAT), "train the agent again with `embodied train hanna`")
+    config = TrainingConfig.from_json(file.config)
+    agent = new_agent(config, Vocabulary(file.words), file.encoder, file.feature_size)
+    put(agent.network, file.tensors, path)
     agent.network.eval()
     return agent
 

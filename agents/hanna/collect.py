@@ -7,7 +7,6 @@ the networks said while acting is kept with its gradients, so each step is compu
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,11 +15,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.hanna.losses import IGNORE, help_loss, navigation_loss
-from agents.hanna.policy import HannaMemory, HannaPolicy, Moment
+from agents.hanna.losses import help_loss, navigation_loss
+from agents.hanna.policy import HannaPolicy, Moment
+from agents.imitation.losses import IGNORE
+from agents.imitation.playing import play_remembering
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import rollout
-from embodied.interface import Action, Episode, Label, Move, Observation, Place, Stop, Task, Teacher
+from embodied.interface import Episode, Label, Move, Place, Stop, Task, Teacher
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,27 +60,6 @@ class Experience:
     """Seconds of playing that the policy took; the environment and the teacher took the others."""
 
 
-class _Remembering:
-    """A policy that keeps the memory of its last call, because `rollout` does not hand it out, and its time."""
-
-    def __init__(self, policy: HannaPolicy) -> None:
-        self.policy = policy
-        self.memory: HannaMemory | None = None
-        self.seconds = 0.0
-
-    def act(
-        self,
-        observations: Sequence[Observation | None],
-        memory: HannaMemory | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-    ) -> tuple[list[Action | None], HannaMemory]:
-        began = time.perf_counter()
-        actions, self.memory = self.policy.act(observations, memory, rngs=rngs)
-        self.seconds += time.perf_counter() - began
-        return actions, self.memory
-
-
 def collect(
     make_env: Callable[[], HelpEnv],
     policy: HannaPolicy,
@@ -91,14 +70,10 @@ def collect(
     seed: int,
 ) -> Experience:
     """Play `tasks` side by side with a policy that keeps its moments, and have them labelled."""
-    remembering = _Remembering(policy)
-    frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
-    done = {f.index: f.episode for f in frames if f.episode is not None}
-    episodes = tuple(done[i] for i in range(len(tasks)))
+    episodes, memory, thinking = play_remembering(make_env, policy, tasks, seed=seed)
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
-    assert remembering.memory is not None, "somebody has acted"
-    moments = remembering.memory.moments
-    return Experience(episodes, join(moments), targets(moments, labels), remembering.seconds)
+    moments = memory.moments
+    return Experience(episodes, join(moments), targets(moments, labels), thinking)
 
 
 def join(moments: Sequence[Moment]) -> Said:

@@ -12,21 +12,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-IGNORE = -100
-"""Label of a step that is not learned from."""
-
-
-def negative_log_likelihood(logits: Tensor, labels: Tensor) -> Tensor:
-    """L_NL = -log pi(a* | o), Eq 4.11.
-
-    Args:
-      logits: (N, A), -inf where there is no action.
-      labels: (N,) int64, IGNORE where there is none.
-
-    Returns:
-      (N,).
-    """
-    return F.cross_entropy(logits, labels, ignore_index=IGNORE, reduction="none")
+from agents.imitation.losses import IGNORE, negative_log_likelihood
 
 
 def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor, floor: float = 0.0) -> Tensor:

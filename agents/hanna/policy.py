@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,33 +17,10 @@ from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
 from agents.hanna.vocabulary import Vocabulary
+from agents.imitation.choosing import Chooser, choose_likeliest, choose_sampled
 from agents.vision.bank import FeatureBank
 from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action
-
-Chooser = Callable[[np.ndarray, np.random.Generator], int]
-
-
-def choose_likeliest(probabilities: np.ndarray, rng: np.random.Generator) -> int:
-    """Index of the largest probability, the first of equals: for evaluation."""
-    return int(probabilities.argmax())
-
-
-def choose_sampled(probabilities: np.ndarray, rng: np.random.Generator) -> int:
-    """Index drawn from the distribution with one uniform number: for training."""
-    possible = np.flatnonzero(probabilities)
-    edges = np.cumsum(probabilities[possible], dtype=np.float64)
-    drawn = int(np.searchsorted(edges, rng.random() * edges[-1], side="right"))
-    return int(possible[min(drawn, len(possible) - 1)])
-
-
-def choose_at(temperature: float) -> Chooser:
-    """Draw from the distribution sharpened (below 1) or flattened (above 1) by `temperature`; 0 is the likeliest."""
-    if temperature == 0:
-        return choose_likeliest
-    if temperature == 1:
-        return choose_sampled
-    return lambda probabilities, rng: choose_sampled((probabilities / probabilities.max()) ** (1 / temperature), rng)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,48 +4,23 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 
 from agents.hanna.agent import load_agent, new_agent, take_weights
-from agents.hanna.training import Split, train
+from agents.hanna.training import train
 from agents.hanna.training_config import TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary
+from agents.imitation.lessons import Lessons
 from agents.imitation.loop import Progress
 from agents.imitation.parallel import join_launcher, one_voice
-from agents.vision.encoder import Encoder
-from agents.vision.features import feature_path, load_bank
-from agents.vision.run import encoder_of, pictures_of
+from agents.vision.run import encoder_of
 from embodied.datasets.store import Dataset
-from embodied.evaluation.evaluate import spread
 from embodied.interface import Episode
 from embodied.teachers.hanna import HannaTeacher
 
 Note = Callable[[str], None]
-
-
-def split_of(
-    data: Dataset,
-    name: str,
-    encoder: Encoder,
-    device: str = "cpu",
-    limit: int | None = None,
-    houses: int | None = None,
-    quality: str | None = None,
-) -> Split:
-    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
-
-    Args:
-      quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
-    """
-    split = data.split(name, houses=houses)
-    pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
-    paths = {n: feature_path(data.folder / "features", encoder.digest, n, pictures[n]) for n in split.worlds}
-    tasks = split.tasks if limit is None else spread(split.tasks, limit)
-    bank = load_bank(paths, encoder.digest, split.worlds, pictures)
-    return Split(split.worlds, tasks, split.make_env, bank.to(device))
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
@@ -73,20 +48,6 @@ def run_train_hanna(
         on_validation=on_validation,
     )
     return 0
-
-
-@dataclass(frozen=True, eq=False)
-class Lessons:
-    """What an agent learns from, and where it does."""
-
-    data: Dataset
-    encoder: Encoder
-    quality: str | None = None
-    """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
-    device: str = "cpu"
-
-    def split(self, name: str, *, limit: int | None = None, houses: int | None = None) -> Split:
-        return split_of(self.data, name, self.encoder, self.device, limit, houses, self.quality)
 
 
 def train_agent(

@@ -10,7 +10,11 @@ from typing import Any
 
 import torch
 
+from agents.imitation.agent_file import TrainedAgent
+from agents.imitation.loop import Progress
+from agents.tensor_file import put
 from assets.cache import write_bytes
+from embodied.records import from_json, from_plain
 
 
 class CheckpointError(ValueError):
@@ -75,3 +79,44 @@ def refuse_changes(
         raise CheckpointError(
             f"{path}: settings changed since this run began ({pairs}); restore them or use another run folder"
         )
+
+
+def save_run(path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
+    """Write the state of a run that trains `agent`, atomically; an interruption leaves the checkpoint before it."""
+    body = {
+        "config": agent.config.to_json(),
+        "encoder": agent.encoder_digest,
+        "vocabulary": list(agent.vocabulary.words),
+        "network": agent.network.state_dict(),
+        "optimizer": optimizer.state_dict(),
+        "progress": vars(progress),
+    }
+    write_checkpoint(path, kind, body)
+
+
+def load_run(
+    path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.Optimizer, may_change: Collection[str]
+) -> Progress:
+    """Put a run back into `agent` and `optimizer` and say where it was.
+
+    Args:
+      may_change: settings that may differ without changing what was learned so far.
+
+    Raises:
+      CheckpointError: truncated, of another version, or of a run with other settings, another
+        vocabulary or another encoder.
+    """
+    fields = ("encoder", "vocabulary", "config", "network", "optimizer", "progress")
+    body = read_checkpoint(Path(path), kind, fields)
+    if body["encoder"] != agent.encoder_digest:
+        raise CheckpointError(
+            f"{path}: this run learned from encoder {body['encoder'][:12]}, the data set has features of "
+            f"{agent.encoder_digest[:12]}; use the same data set and encoder, or another run folder"
+        )
+    if tuple(body["vocabulary"]) != agent.vocabulary.words:
+        raise CheckpointError(f"{path}: the data set has other words than this run began with; use another run folder")
+    before, now = from_json(type(agent.config), body["config"]), agent.config
+    refuse_changes(path, vars(before), vars(now), may_change)
+    put(agent.network, body["network"], path)
+    optimizer.load_state_dict(body["optimizer"])
+    return from_plain(Progress, body["progress"], f"{path}: progress")

@@ -1,4 +1,4 @@
-"""Judge a learned HANNA agent (Tables 4.3 to 4.5, and why its episodes fail) or HARI agent (Table 4.7).
+"""Judge a learned HANNA agent (Tables 4.3 to 4.5, and why its episodes fail), VNLA agent or HARI agent (Table 4.7).
 
 Which one it is follows from the data set.
 """
@@ -27,11 +27,53 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.datasets.store import Dataset
 
-    if Dataset(args.data).kind == "hari":
-        return run_hari(args)
+    kind = Dataset(args.data).kind
+    if kind in ("hari", "vnla"):
+        return run_hari(args) if kind == "hari" else run_vnla(args)
     from agents import judging
 
     return judging.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))
+
+
+def run_vnla(args: argparse.Namespace) -> int:
+    """The learned asker beside others, direct intervention and agents without learning."""
+    from agents.imitation.lessons import Lessons
+    from agents.imitation.parallel import use_threads
+    from agents.shipped import SHIPPED_AGENT
+    from agents.vision.run import encoder_of
+    from agents.vnla.agent import load_agent
+    from agents.vnla.judging import COLUMNS, judge
+    from agents.vnla.run import vnla_data
+    from embodied.evaluation.tables import as_json, markdown, save
+    from embodied.records import episodes_file, save_lines
+
+    if args.agent == SHIPPED_AGENT:
+        raise ValueError("no VNLA agent ships yet; name yours with --agent (`embodied train vnla`)")
+    use_threads(args.threads)
+    agent = load_agent(args.agent)
+    lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality)
+
+    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
+        if args.out:
+            save_lines(Path(args.out) / episodes_file(split, name), episodes)
+
+    rows = judge(
+        lessons,
+        agent,
+        args.split or ("test_unseen",),
+        seed=args.seed,
+        limit=args.tasks,
+        batch=args.batch,
+        only=args.only or (),
+        keep=keep,
+        watch=lambda agents: bar(agents, "agents", "agent"),
+    )
+    if args.out:
+        save(rows, args.out, "table")
+        note(f"table and episodes in {args.out}")
+    facts = {"rows": json.loads(as_json(rows)), "rules": agent.config.rules, "learned from": agent.pictures}
+    show(args, facts, f"{markdown(rows, COLUMNS)}\nrules: {agent.config.rules}; learned from pictures {agent.pictures}")
+    return 0
 
 
 def run_hari(args: argparse.Namespace) -> int:

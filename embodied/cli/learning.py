@@ -1,4 +1,4 @@
-"""Options of the commands that learn: `embodied train vision | hanna`, `features`, `judge` and `study`.
+"""Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features`, `judge` and `study`.
 
 Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run,
 agents.hanna.run, agents.judging and agents.study.
@@ -16,6 +16,8 @@ from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import NETWORKS, VisionConfig
+from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
+from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
 from embodied.cli.options import add_fields, any_path, folder_to_write, positive, whole
 from embodied.render.pictures import QUALITIES
@@ -118,6 +120,41 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
         "--begin", type=any_path, metavar="FILE", help="begin with the weights of this agent instead of random ones"
     )
     add_fields(parser, TrainingConfig, scales=SCALES)
+
+
+VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
+
+
+def add_train_vnla(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    add_encoder(parser)
+    add_run(parser, VNLA_SCALES)
+    add_device(parser)
+    add_fields(parser, VnlaSettings, words=VNLA_WORDS, scales=VNLA_SCALES)
+
+
+def add_study_vnla(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="askers, interventions, rooms or rules")
+    add_common(parser)
+    add_encoder(parser)
+    parser.set_defaults(threads=1)  # per agent; they are trained side by side
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        required=True,
+        metavar="DIR",
+        help="agents, episodes and tables; the same command goes on",
+    )
+    parser.add_argument(
+        "--without-rooms", type=any_path, metavar="DIR", help="a data set of --no-rooms, for the table 'rooms'"
+    )
+    add_scale(parser, VNLA_SCALES)
+    parser.add_argument(
+        "--seeds", type=whole(), default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+    )
+    add_judged_tasks(parser)
+    add_agents_side_by_side(parser)
+    add_fields(parser, VnlaSettings, skip=("asker", "ask_rules", "rules"), scales=VNLA_SCALES)
 
 
 def add_train_hari(parser: argparse.ArgumentParser) -> None:

@@ -2,11 +2,13 @@
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
     embodied study hari 4.7 4.8 --data DATA --out STUDY
+    embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
-number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. `bandit` is a translator
+number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's: `askers`,
+`interventions`, `rooms` (wants --without-rooms) and `rules`. `bandit` is a translator
 that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
 agent learn from ratings in the same way, in houses. Rows that tables share are
 trained once. Interrupt it whenever you like: the same command goes on.
@@ -26,12 +28,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     learning.add_study(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
     learning.add_study_hari(kinds.add_parser("hari", help="agents that learn which question to ask"))
+    learning.add_study_vnla(kinds.add_parser("vnla", help="agents that ask an advisor within a budget"))
     learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
     learning.add_study_stars(kinds.add_parser("stars", help="HANNA agents that learn from ratings of their walks"))
 
 
 def run(args: argparse.Namespace) -> int:
-    for path in {"hanna": run_hanna, "hari": run_hari, "bandit": run_bandit, "stars": run_stars}[args.what](args):
+    runs = {"hanna": run_hanna, "hari": run_hari, "vnla": run_vnla, "bandit": run_bandit, "stars": run_stars}
+    for path in runs[args.what](args):
         print(path.read_text(encoding="utf-8"))
     return 0
 
@@ -67,6 +71,26 @@ def run_hari(args: argparse.Namespace) -> list[Path]:
         executor=args.execution,
         seeds=args.seeds,
         tasks=args.tasks,
+        threads=args.threads,
+    )
+    return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def run_vnla(args: argparse.Namespace) -> list[Path]:
+    from agents.vision.run import encoder_of
+    from agents.vnla.config import SCALES
+    from agents.vnla.study import VnlaStudySetting, run_study
+    from embodied.cli.options import chosen
+
+    setting = VnlaStudySetting(
+        args.data,
+        args.out,
+        encoder_of(args),
+        chosen(args, SCALES[args.scale]),
+        without_rooms=args.without_rooms,
+        seeds=args.seeds,
+        tasks=args.tasks,
+        quality=args.quality,
         threads=args.threads,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())

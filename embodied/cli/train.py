@@ -1,4 +1,4 @@
-"""Teach: the encoder that sees (vision), or an agent that navigates and asks for help (hanna, hari).
+"""Teach: the encoder that sees (vision), or an agent that navigates and asks for help (hanna, vnla, hari).
 
 Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
 not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
@@ -33,15 +33,20 @@ def add(parser: argparse.ArgumentParser) -> None:
         "hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__
     )
     learning.add_train_hanna(hanna)
+    vnla = kinds.add_parser(
+        "vnla", help="the agent that asks an advisor, on a VNLA data set with features", description=run_vnla.__doc__
+    )
+    learning.add_train_vnla(vnla)
     hari = kinds.add_parser("hari", help="the agent that learns which question to ask", description=run_hari.__doc__)
     learning.add_train_hari(hari)
-    hanna.add_argument(
-        "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
-    )
+    for parser in (hanna, vnla):
+        parser.add_argument(
+            "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
+        )
 
 
 def run(args: argparse.Namespace) -> int:
-    return {"vision": run_vision, "hanna": run_hanna, "hari": run_hari}[args.what](args)
+    return {"vision": run_vision, "hanna": run_hanna, "vnla": run_vnla, "hari": run_hari}[args.what](args)
 
 
 def run_vision(args: argparse.Namespace) -> int:
@@ -62,6 +67,23 @@ def run_hanna(args: argparse.Namespace) -> int:
     return run_train_hanna(
         args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None
     )
+
+
+def run_vnla(args: argparse.Namespace) -> int:
+    """Teach an agent by imitation to navigate by one view, to ask an advisor within a budget and to do what it says."""
+    from agents.imitation.lessons import Lessons
+    from agents.imitation.parallel import join_launcher, use_threads
+    from agents.vision.run import encoder_of
+    from agents.vnla.config import SCALES
+    from agents.vnla.run import train_agent, vnla_data
+    from embodied.cli.options import chosen
+
+    use_threads(args.threads)
+    config = chosen(args, SCALES[args.scale])
+    lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality, join_launcher(args.device))
+    watch = _recorder(args) if args.rrd else None
+    train_agent(lessons, config, args.out, minutes=args.minutes, note=note, on_validation=watch)
+    return 0
 
 
 def run_hari(args: argparse.Namespace) -> int:

@@ -115,8 +115,23 @@ def readme(program: str, data: Dataset, with_features: bool) -> str:
         "DIGEST": data.digest[:16],
         "TABLE": data.table().strip(),
         "FEATURES": note,
+        "BATCH": str(largest_batch(data)),
     }
     return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text).rstrip()
+
+
+def largest_batch(data: Dataset) -> int:
+    """How many episodes the programs can play side by side on every split.
+
+    They fill the last batch of a split up with its first tasks, once: with fewer training tasks than a batch, or fewer
+    than half as many to judge by, some of the batch is left without a task and the simulator refuses it.
+    """
+    return min(_instructions(data, s) if s == "train" else 2 * _instructions(data, s) for s in data.splits)
+
+
+def _instructions(data: Dataset, split: str) -> int:
+    tasks = data.tasks(split)
+    return 3 * len({(t.world, route_of(t).path) for t in tasks}) if data.kind == "vln" else len(tasks)
 
 
 def sought(task: Task) -> FindObject:

@@ -27,7 +27,7 @@ from embodied.interface import (
     Task,
 )
 from embodied.navigation.graph import nearest
-from embodied.teachers.vnla import GoalAwareTeacher, VnlaTeacher
+from embodied.teachers.vnla import AskRules, GoalAwareTeacher, VnlaTeacher
 
 
 class VnlaEnv(HelpEnv):
@@ -99,8 +99,9 @@ class MuteDirectVnlaEnv(DirectVnlaEnv):
     """Direct intervention that is not put into words: the agent reads its request throughout."""
 
     def _replied(self, reply: Reply) -> None:
+        time_on_task = self.time_on_task
         super()._replied(reply)
-        self.instruction = self.task.request
+        self.instruction, self.time_on_task = self.task.request, time_on_task  # the instruction has not changed
 
 
 class Algorithm6Env(HelpEnv):
@@ -136,14 +137,20 @@ RULES: Mapping[str, type[HelpEnv]] = {
 """Rules of play by the names that commands know them by; the first is the program's with help in words."""
 
 
-def teacher_of(rules: str) -> VnlaTeacher:
+ALL_RULES = AskRules()
+
+
+def teacher_of(rules: str, asking: AskRules = ALL_RULES) -> VnlaTeacher:
     """The teacher of a rule of play.
+
+    Args:
+      asking: when it would ask.
 
     Raises:
       ValueError: an unknown rule.
     """
     check_rules(rules)
-    return GoalAwareTeacher() if rules == "goal-aware" else VnlaTeacher()
+    return GoalAwareTeacher(rules=asking) if rules == "goal-aware" else VnlaTeacher(rules=asking)
 
 
 def check_rules(rules: str) -> None:

@@ -219,6 +219,12 @@ def _taken(odds: dict[str, float], o: Observation, rng: np.random.Generator) -> 
     return Stop(thought) if choice == len(WORDS) else Move(choice, thought)
 
 
+def random_times(s: Situation, rng: np.random.Generator) -> frozenset[int]:
+    """When the asker 'random' asks, drawn at the beginning of an episode: as often as its budget allows."""
+    left = min(s.requests_left or 0, s.task.horizon)
+    return frozenset(int(t) for t in rng.choice(s.task.horizon, left, replace=False))
+
+
 class VnlaAsking:
     """A VNLA navigation policy with one of the program's askers in front of it (docs/sources.md, S51)."""
 
@@ -235,7 +241,7 @@ class VnlaAsking:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
-        times, inner = memory or ([self._times(s, rng) for s, rng in zip(situations, rngs, strict=True)], None)
+        times, inner = memory or (self._times(situations, rngs), None)
         actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
         for i, (o, s, planned) in enumerate(zip(observations, situations, actions, strict=True)):
             if o is None or s is None or planned is None:
@@ -244,12 +250,9 @@ class VnlaAsking:
                 actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
 
-    def _times(self, s: Situation | None, rng: np.random.Generator) -> frozenset[int]:
-        """When the asker 'random' asks, drawn at the beginning of an episode."""
-        if s is None or self._ask != "random":
-            return frozenset()
-        left = s.requests_left or 0
-        return frozenset(int(t) for t in rng.choice(s.task.horizon, min(left, s.task.horizon), replace=False))
+    def _times(self, situations: Situations, rngs: Sequence[np.random.Generator]) -> list[frozenset[int]]:
+        random = self._ask == "random"
+        return [random_times(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True)]
 
     def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
         if self._ask == "teacher":

@@ -1,0 +1,73 @@
+"""What learners by imitation learn from: a split of a data set, ready to be played with features."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from agents.vision.bank import FeatureBank
+from agents.vision.config import drawing
+from agents.vision.encoder import Encoder
+from agents.vision.features import feature_path, load_bank
+from agents.vision.run import pictures_of
+from embodied.datasets.store import Dataset
+from embodied.envs.base import HelpEnv
+from embodied.envs.make import AS_PUBLISHED
+from embodied.evaluation.evaluate import spread
+from embodied.interface import Place, Task
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Tasks of some houses and the environment they are played in."""
+
+    worlds: Mapping[str, Place]
+    tasks: Sequence[Task]
+    make_env: Callable[[], HelpEnv]
+    bank: FeatureBank
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """What an agent learns from, and where it does."""
+
+    data: Dataset
+    encoder: Encoder
+    quality: str | None = None
+    """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
+    device: str = "cpu"
+
+    def split(
+        self, name: str, *, limit: int | None = None, houses: int | None = None, vnla: str = AS_PUBLISHED
+    ) -> Split:
+        """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split."""
+        return split_of(self.data, name, self.encoder, self.device, limit, houses, self.quality, vnla)
+
+    def pictures(self, name: str) -> str:
+        """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
+        drawn = {drawing(pictures_of(self.data, n, self.quality)) for n in self.data.names(name)}
+        return ", ".join(sorted(drawn))
+
+
+def split_of(
+    data: Dataset,
+    name: str,
+    encoder: Encoder,
+    device: str = "cpu",
+    limit: int | None = None,
+    houses: int | None = None,
+    quality: str | None = None,
+    vnla: str = AS_PUBLISHED,
+) -> Split:
+    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
+
+    Args:
+      quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
+      vnla: VNLA's rule of play, as in Dataset.split.
+    """
+    split = data.split(name, houses=houses, vnla=vnla)
+    pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
+    paths = {n: feature_path(data.folder / "features", encoder.digest, n, pictures[n]) for n in split.worlds}
+    tasks = split.tasks if limit is None else spread(split.tasks, limit)
+    bank = load_bank(paths, encoder.digest, split.worlds, pictures)
+    return Split(split.worlds, tasks, split.make_env, bank.to(device))

@@ -1,0 +1,40 @@
+"""Playing training episodes with a policy whose memory holds, in the end, all that it said."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from embodied.envs.base import HelpEnv
+from embodied.evaluation.rollout import rollout
+from embodied.interface import Actions, Agent, Episode, Observations, Situations, Task, act
+
+
+class _Remembering:
+    """An agent that keeps the memory of its last call, because `rollout` does not hand it out, and its time."""
+
+    def __init__(self, agent: Agent) -> None:
+        self._agent = agent
+        self.memory: Any = None
+        self.seconds = 0.0
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        began = time.perf_counter()
+        actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)
+        self.seconds += time.perf_counter() - began
+        return actions, self.memory
+
+
+def play_remembering(
+    make_env: Callable[[], HelpEnv], agent: Agent, tasks: Sequence[Task], *, seed: int
+) -> tuple[tuple[Episode, ...], Any, float]:
+    """Play `tasks` side by side; their episodes, the agent's last memory and the seconds that it took."""
+    remembering = _Remembering(agent)
+    frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
+    done = {f.index: f.episode for f in frames if f.episode is not None}
+    return tuple(done[i] for i in range(len(tasks))), remembering.memory, remembering.seconds

@@ -1,0 +1,79 @@
+"""Judging a VNLA agent beside other askers, direct intervention and agents without learning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import torch
+
+from agents.imitation.lessons import Lessons
+from agents.vision.bank import FeatureBank
+from agents.vnla.agent import VnlaAgent
+from embodied.evaluation.evaluate import agent as agent_without_learning
+from embodied.evaluation.evaluate import evaluate
+from embodied.evaluation.tables import Row
+from embodied.interface import Agent, Episode
+
+COLUMNS = ("success", "room success", "navigation error", "requests", "oracle success", "steps")
+"""Those of the first paper, and how far the agents came."""
+WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
+ASKED = {
+    "learned, asks never": "none",
+    "learned, asks first": "first",
+    "learned, asks at random": "random",
+    "learned, asks as its teacher": "teacher",
+}
+"""Rows that put another asker in front of the same networks (docs/sources.md, S39), and that asker."""
+DIRECT = "learned, direct intervention"
+"""The advisor carries out what it said: direct with sub-goals in the paper."""
+LEARNED = "learned"
+
+
+def row_names() -> tuple[str, ...]:
+    """All rows that one agent gives."""
+    return (LEARNED, *ASKED, DIRECT, *WITHOUT_LEARNING)
+
+
+def player(agent: VnlaAgent, bank: FeatureBank, name: str) -> Agent:
+    """Who plays the row `name`."""
+    if name in WITHOUT_LEARNING:
+        return agent_without_learning("vnla", name, rules=agent.config.rules)
+    return agent.player(bank, ASKED.get(name))
+
+
+@torch.inference_mode()
+def judge(
+    lessons: Lessons,
+    agent: VnlaAgent,
+    splits: Sequence[str],
+    *,
+    seed: int = 0,
+    limit: int | None = None,
+    batch: int = 64,
+    only: Sequence[str] = (),
+    keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
+    watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+) -> list[Row]:
+    """One row per player and split, over the same tasks, under the rule of play that the agent is judged under.
+
+    Args:
+      limit: at most so many tasks per split, from all houses alike.
+      only: names of rows; none for all.
+      keep: is given split, name and episodes (to save them).
+      watch: wraps the iterator over rows (a progress bar).
+
+    Raises:
+      ValueError: an unknown row.
+    """
+    if unknown := sorted(set(only) - set(row_names())):
+        raise ValueError(f"unknown rows {unknown}; there are {list(row_names())}")
+    rows = []
+    for split in splits:
+        bank = lessons.split(split).bank
+        for name in watch(only or row_names()):
+            rules = "direct" if name == DIRECT else agent.config.rules
+            players: Mapping[str, Agent] = {name: player(agent, bank, name)}
+            kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
+            whole = lessons.data.split(split, vnla=rules)
+            rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=kept)
+    return rows

@@ -1,0 +1,375 @@
+"""VnlaPolicy: the networks as a Policy of embodied.interface, batched over episodes.
+
+A step has two passes, as in the program: one considers whether to ask, and nothing of it is kept; the other acts, with
+the text that is there after asking. Asking is an action of its own, so the second pass may belong to the next call.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from agents.hanna.vocabulary import Vocabulary, tokenize
+from agents.imitation.choosing import Chooser, choose_likeliest, choose_sampled
+from agents.vision.bank import FeatureBank
+from agents.vnla.network import (
+    ASK,
+    DONT,
+    MOST_LEFT,
+    NO_ASK,
+    NO_MOVE,
+    STOP,
+    DecoderState,
+    ReadText,
+    VnlaNetwork,
+    VnlaPercept,
+)
+from embodied.action_spaces import WORDS
+from embodied.interface import (
+    TURNS,
+    Action,
+    Actions,
+    Ask,
+    Move,
+    Observation,
+    Observations,
+    Pose,
+    Situation,
+    Situations,
+    Stop,
+    Thought,
+)
+from embodied.policies.baselines import random_times
+from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
+
+
+@dataclass(frozen=True, eq=False)
+class VnlaMoment:
+    """What the networks said in one call, for the episodes that were asked, and what the teacher said of it."""
+
+    asks: Tensor
+    """(m, 2) logits of the episodes that could ask."""
+    ask_labels: Tensor
+    """(m,) int64."""
+    moves: Tensor
+    """(n, 6) logits of the episodes that acted."""
+    move_labels: Tensor
+    """(n,) int64."""
+
+
+@dataclass(frozen=True, eq=False)
+class VnlaMemory:
+    """What the policy carries between steps; rows belong to the episodes that still run."""
+
+    positions: tuple[int, ...]
+    state: DecoderState
+    text: ReadText
+    previous_move: Tensor
+    """(k,) int64."""
+    previous_ask: Tensor
+    """(k,) int64."""
+    before: tuple[Observation | None, ...]
+    """What each saw when it acted last, to know what was carried out; None before, and after asking."""
+    times: tuple[frozenset[int], ...]
+    """When the asker 'random' asks."""
+    channels: Tensor | None = None
+    """(k, D) what each episode sees of every feature channel; None is everything."""
+    moments: tuple[VnlaMoment, ...] = ()
+    """All steps so far, if there is a teacher."""
+
+    def keep(self, positions: tuple[int, ...]) -> VnlaMemory:
+        """The memory of the episodes at `positions` only."""
+        if positions == self.positions:
+            return self
+        rows = [self.positions.index(p) for p in positions]
+        index = torch.tensor(rows, dtype=torch.long, device=self.previous_ask.device)
+        return dataclasses.replace(
+            self,
+            positions=positions,
+            state=self.state.select(index),
+            text=self.text.select(index),
+            previous_move=self.previous_move[index],
+            previous_ask=self.previous_ask[index],
+            before=tuple(self.before[r] for r in rows),
+            times=tuple(self.times[r] for r in rows),
+            channels=None if self.channels is None else self.channels[index],
+        )
+
+
+Decide = Callable[[int, Observation, Thought, frozenset[int], np.random.Generator], bool]
+"""(position, what is seen, what the networks said, times drawn at the beginning, generator) -> whether to ask now."""
+
+
+@dataclass(frozen=True, eq=False)
+class VnlaPolicy:
+    """A trained (or training) network that acts, and asks by a rule that needs no privilege."""
+
+    network: VnlaNetwork
+    vocabulary: Vocabulary
+    bank: FeatureBank
+    asker: str = "learned"
+    """'learned', 'none' or 'first'; 'random' and 'teacher' need SupervisedVnla."""
+    ask_threshold: float = 0.5
+    choose: Chooser = choose_likeliest
+    instruction_length: int = 50
+    environment_dropout: float = 0.0
+    """Share of feature channels that an episode does not see at all. For training."""
+    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+    def act(
+        self, observations: Observations, memory: VnlaMemory | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, VnlaMemory]:
+        """One step of every running episode; see embodied.interface.Policy."""
+        none = [None] * len(observations)
+        return self.play(observations, none, memory, rngs=rngs, decide=self.wants)
+
+    def wants(
+        self, position: int, observation: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
+    ) -> bool:
+        """Whether to ask now, where that is possible."""
+        if self.asker == "learned":
+            return (thought.asks or {})["help"] > self.ask_threshold
+        return self.asker == "first"
+
+    def play(
+        self,
+        observations: Observations,
+        situations: Situations,
+        memory: VnlaMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        decide: Decide,
+        teacher: VnlaTeacher | None = None,
+    ) -> tuple[Actions, VnlaMemory]:
+        """One step of every running episode.
+
+        Args:
+          situations: of the episodes, for 'random' and for the teacher; None without.
+          decide: whether to ask.
+          teacher: whose labels are kept with what was said, with its gradients.
+        """
+        running = [(i, o) for i, o in enumerate(observations) if o is not None]
+        positions, seen = tuple(i for i, _ in running), [o for _, o in running]
+        now = [situations[p] for p in positions]
+        memory = self.start(positions, now, rngs) if memory is None else memory.keep(positions)
+        actions: Actions = [None] * len(observations)
+        if not positions:
+            return actions, memory
+        with torch.set_grad_enabled(teacher is not None and torch.is_grad_enabled()):
+            memory = self._listen(memory, seen)
+            percept = self._percept(memory, seen)
+            able = [row for row, o in enumerate(seen) if o.can_ask]
+            thoughts, asks = self._consider(memory, percept, able)
+            asking = []
+            for row in able:
+                place = positions[row]
+                if decide(place, seen[row], thoughts[row], memory.times[row], rngs[place]):
+                    actions[place] = Ask(seen[row].can_ask[0], thoughts[row])
+                    asking.append(row)
+            acting = [row for row in range(len(seen)) if row not in asking]
+            memory, moves = self._navigate(memory, percept, seen, acting)
+        chances = moves.detach().softmax(-1).cpu().numpy()  # (n, 6)
+        for chance, row in zip(chances, acting, strict=True):
+            place = positions[row]
+            said = thoughts[row].asks if row in thoughts else None
+            actions[place] = _taken(self.choose(chance, rngs[place]), Thought(chance, said))
+        if teacher is not None:
+            moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
+            memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
+        return actions, _after(memory, seen, set(asking))
+
+    def start(
+        self, positions: tuple[int, ...], situations: Situations, rngs: Sequence[np.random.Generator]
+    ) -> VnlaMemory:
+        """Memory before the first step of the episodes at `positions`."""
+        k, device = len(positions), next(self.network.parameters()).device
+        drawn = [
+            random_times(s, rngs[p]) if self.asker == "random" and s is not None else frozenset()
+            for p, s in zip(positions, situations, strict=True)
+        ]
+        share = self.environment_dropout
+        return VnlaMemory(
+            positions,
+            self.network.start(k),
+            self.network.blank(k, self.instruction_length),
+            torch.full((k,), NO_MOVE, device=device),
+            torch.full((k,), NO_ASK, device=device),
+            (None,) * k,
+            tuple(drawn),
+            F.dropout(torch.ones(k, self.bank.size, device=device), share) if share else None,
+        )
+
+    def encode(self, text: str) -> np.ndarray:
+        """(L,) int64 numbers of the words, the last one first, then the end, then padding, as in the program."""
+        if text not in self._encoded:
+            words = tokenize(text)[: self.instruction_length - 1]
+            self._encoded[text] = self.vocabulary.encode(" ".join(words[::-1]), self.instruction_length)
+        return self._encoded[text]
+
+    def _listen(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaMemory:
+        """Read the texts that are new, and notice what was carried out: an advisor may have acted in its place."""
+        device = memory.previous_move.device
+        new = [row for row, o in enumerate(seen) if o.time_on_task == 0]
+        text = memory.text
+        if new:
+            tokens = torch.from_numpy(np.stack([self.encode(seen[row].instruction) for row in new])).to(device)
+            text = text.put(torch.tensor(new, device=device), self.network.read(tokens))
+        done = [
+            int(kept) if b is None else carried_out(b, o)
+            for b, o, kept in zip(memory.before, seen, memory.previous_move.tolist(), strict=True)
+        ]
+        return dataclasses.replace(memory, text=text, previous_move=torch.tensor(done, device=device))
+
+    def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
+        device = memory.previous_move.device
+        views = torch.tensor([Pose(0, o.turn, o.tilt).view for o in seen], device=device)
+        view = self.bank.gather([o.sight for o in seen])[torch.arange(len(seen), device=device), views]  # (k, D)
+        left = [MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
+        return VnlaPercept(
+            view=view if memory.channels is None else view * memory.channels,
+            previous_move=memory.previous_move,
+            previous_ask=memory.previous_ask,
+            left=torch.tensor(left, device=device),
+            allowed=torch.tensor([[*o.candidates.allowed.tolist(), True] for o in seen], device=device),
+        )
+
+    def _consider(
+        self, memory: VnlaMemory, percept: VnlaPercept, rows: Sequence[int]
+    ) -> tuple[dict[int, Thought], Tensor]:
+        """The first pass: what each of `rows` was about to do and whether it would ask, and logits (m, 2)."""
+        if not rows:
+            return {}, percept.view.new_zeros(0, 2)
+        index = torch.tensor(rows, device=percept.view.device)
+        moves, asks = self.network.consider(
+            _rows(percept, index), memory.state.select(index), memory.text.select(index)
+        )
+        chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
+        thoughts = {
+            row: Thought(chance, {"help": h, "nothing": 1 - h})
+            for row, chance, h in zip(rows, chances, help_, strict=True)
+        }
+        return thoughts, asks
+
+    def _navigate(
+        self, memory: VnlaMemory, percept: VnlaPercept, seen: Sequence[Observation], rows: Sequence[int]
+    ) -> tuple[VnlaMemory, Tensor]:
+        """The second pass: memory after it and logits (n, 6)."""
+        if not rows:
+            return memory, percept.view.new_zeros(0, STOP + 1)
+        index = torch.tensor(rows, device=percept.view.device)
+        asked = [
+            ASK if memory.before[r] is None and not seen[r].can_ask and int(percept.previous_ask[r]) == ASK else DONT
+            for r in rows
+        ]
+        now = dataclasses.replace(_rows(percept, index), previous_ask=torch.tensor(asked, device=index.device))
+        moves, state, text = self.network.navigate(now, memory.state.select(index), memory.text.select(index))
+        after = dataclasses.replace(
+            memory,
+            state=memory.state.put(index, state),
+            text=memory.text.put(index, text),
+            previous_ask=memory.previous_ask.index_copy(0, index, now.previous_ask),
+        )
+        return after, moves
+
+
+@dataclass(frozen=True, eq=False)
+class SupervisedVnla:
+    """The same networks asking at random or when the teacher says so, and with labels for training."""
+
+    policy: VnlaPolicy
+    rules: AskRules = AskRules()
+    teacher: VnlaTeacher | None = None
+    """Whose labels are kept: for training."""
+    forced: bool = False
+    """The learned asker asks when the teacher would, as in training."""
+
+    def act_privileged(
+        self,
+        observations: Observations,
+        situations: Situations,
+        memory: VnlaMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[Actions, VnlaMemory]:
+        def wants(
+            position: int, o: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
+        ) -> bool:
+            asker, situation = self.policy.asker, situations[position]
+            assert situation is not None, "the episode is running"
+            if asker == "random":
+                return o.time in times
+            if asker == "teacher" or (asker == "learned" and self.forced):
+                return ask_reason(situation, thought, self.rules) is not None
+            return self.policy.wants(position, o, thought, times, rng)
+
+        return self.policy.play(observations, situations, memory, rngs=rngs, decide=wants, teacher=self.teacher)
+
+
+def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: float = 0.0) -> SupervisedVnla:
+    """The networks as they learn: moves are sampled, the learned asker asks when its teacher would."""
+    sampling = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=environment_dropout)
+    return SupervisedVnla(sampling, teacher.rules, teacher, forced=True)
+
+
+def carried_out(before: Observation, now: Observation) -> int:
+    """The action that led from one observation to the next, as an agent knows it itself; stop where it stood still."""
+    if now.sight != before.sight:
+        return WORDS.index("forward")
+    if now.turn != before.turn:
+        return WORDS.index("left" if (now.turn - before.turn) % TURNS == 1 else "right")
+    if now.tilt != before.tilt:
+        return WORDS.index("up" if now.tilt > before.tilt else "down")
+    return STOP
+
+
+def move_index(action: Move | Stop) -> int:
+    """Number of a navigation action."""
+    return STOP if isinstance(action, Stop) else action.candidate
+
+
+def _taken(index: int, thought: Thought) -> Action:
+    return Stop(thought) if index == STOP else Move(index, thought)
+
+
+def _rows(percept: VnlaPercept, index: Tensor) -> VnlaPercept:
+    return VnlaPercept(**{f.name: getattr(percept, f.name)[index] for f in dataclasses.fields(percept)})
+
+
+def _after(memory: VnlaMemory, seen: Sequence[Observation], asking: set[int]) -> VnlaMemory:
+    """The memory after the actions: who asked goes on with the same step, who moved will see what came of it."""
+    asked = memory.previous_ask.tolist()
+    for row in asking:
+        asked[row] = ASK
+    before = tuple(None if row in asking else o for row, o in enumerate(seen))
+    return dataclasses.replace(
+        memory, previous_ask=torch.tensor(asked, device=memory.previous_ask.device), before=before
+    )
+
+
+def _moment(
+    teacher: VnlaTeacher,
+    situations: Sequence[Situation | None],
+    thoughts: dict[int, Thought],
+    asks: Tensor,
+    able: Sequence[int],
+    moves: Tensor,
+    acting: Sequence[int],
+) -> VnlaMoment:
+    """What was said, beside what the teacher says: whether to ask by the first pass, where to go by the second."""
+    there = [s for s in situations if s is not None]
+    assert len(there) == len(situations), "a teacher sees situations"
+    wished = [int(ask_reason(there[row], thoughts[row], teacher.rules) is not None) for row in able]
+    wanted = [move_index(teacher.reference(there[row])) for row in acting]
+    device = moves.device
+    return VnlaMoment(
+        asks,
+        torch.tensor(wished, dtype=torch.long, device=device),
+        moves,
+        torch.tensor(wanted, dtype=torch.long, device=device),
+    )

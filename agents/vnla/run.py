@@ -1,0 +1,68 @@
+"""What the commands of VNLA do: a data set with features becomes lessons, lessons an agent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from agents.hanna.vocabulary import Vocabulary, build_vocabulary
+from agents.imitation.lessons import Lessons
+from agents.imitation.loop import Progress
+from agents.imitation.parallel import one_voice
+from agents.vnla.agent import new_agent
+from agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from agents.vnla.training import train
+from embodied.action_spaces import WORDS
+from embodied.assistants.advisor import HELP_STEPS
+from embodied.datasets.store import Dataset
+from embodied.interface import Episode
+from embodied.language.plain import PlainLanguage
+
+Note = Callable[[str], None]
+
+
+def vnla_data(folder: Path) -> Dataset:
+    """A VNLA data set.
+
+    Raises:
+      ValueError: it is of another kind.
+    """
+    data = Dataset(folder)
+    if data.kind != "vnla":
+        raise ValueError(
+            f"{folder} is a data set of {data.kind!r}, VNLA learns from its own: embodied dataset vnla --out DIR"
+        )
+    return data
+
+
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+    """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
+    names = data.names("train")[:houses]
+    requests = [t.request for t in data.tasks("train") if t.world in names]
+    said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
+    return build_vocabulary([*requests, *said])
+
+
+def train_agent(
+    lessons: Lessons,
+    config: VnlaSettings,
+    folder: Path,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> Progress:
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.vnla.training.train."""
+    houses, note = config.training_houses or None, one_voice(note)
+    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules])
+    validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
+    words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
+    agent = new_agent(config, words, encoder.digest, encoder.size, lessons.pictures("train"))
+    agent.network.to(lessons.device)
+    size = sum(p.numel() for p in agent.network.parameters())
+    count = len({t.world for t in training.tasks})
+    note(
+        f"{len(training.tasks)} tasks in {count} houses, {len(words)} words, {size:,} parameters, "
+        f"pictures: {agent.pictures}"
+    )
+    return train(agent, training, validation, folder, minutes=minutes, note=note, on_validation=on_validation)

@@ -1,0 +1,128 @@
+"""The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.imitation.spine.
+
+episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
+           learner's place it learns from what is done all the same                              (policy)
+loss = - log pi_main(a*) - log pi_ask(a*), summed over steps, averaged over episodes              (`losses_of`)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from agents.imitation import parallel, spine
+from agents.imitation.checkpoint import load_run, save_run
+from agents.imitation.lessons import Split
+from agents.imitation.loop import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.imitation.losses import negative_log_likelihood
+from agents.imitation.playing import play_remembering
+from agents.vnla.agent import VnlaAgent, rules_of, save_agent
+from agents.vnla.config import MAY_CHANGE, TRAINED_UNDER
+from agents.vnla.policy import VnlaMoment, for_training
+from embodied.envs.vnla import teacher_of
+from embodied.evaluation import metrics
+from embodied.interface import Agent, Episode, Place, Task
+
+FORMAT = "embodied-vnla-checkpoint-1"
+
+
+def train(
+    agent: VnlaAgent,
+    training: Split,
+    validation: Split,
+    folder: Path,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+) -> Progress:
+    """Train `agent` in place; see agents.imitation.spine.train for what is written, stopped and raised.
+
+    Args:
+      training: played under TRAINED_UNDER[config.rules], `validation` under config.rules itself.
+    """
+    learner = VnlaLearner(agent, training)
+    return spine.train(learner, validation, folder, minutes=minutes, note=note, on_validation=on_validation)
+
+
+class VnlaLearner:
+    """A VNLA agent in training: its optimizer, and how it plays."""
+
+    def __init__(self, agent: VnlaAgent, training: Split) -> None:
+        self.agent, self.config, self.network = agent, agent.config, agent.network
+        config = agent.config
+        self.optimizer = torch.optim.Adam(
+            agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
+        )
+        teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
+        self._training = training
+        self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
+
+    def learn(self, update: int, clock: Clock) -> dict[str, float]:
+        """One update; the numbers to report."""
+        config, training = self.config, self._training
+        tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
+
+        def played() -> tuple[VnlaExperience, float]:
+            seed = seed_of(config.seed, update)
+            episodes, memory, seconds = play_remembering(training.make_env, self._player, tasks, seed=seed)
+            return VnlaExperience(episodes, memory.moments), seconds
+
+        def lesson_of(experience: VnlaExperience) -> spine.Lesson:
+            losses = losses_of(experience.moments, config.batch)
+            learned = losses[0] + losses[1] if config.asker == "learned" else losses[0]
+            return spine.Lesson(losses, learned, numbers_of(experience, training.worlds))
+
+        return spine.learn_once(self.network, self.optimizer, config, update, clock, played, lesson_of)
+
+    def judged(self, split: Split) -> Agent:
+        return self.agent.player(split.bank)
+
+    def task(self, task: Task) -> Task:
+        return task  # its own time limit belongs to it
+
+    def keep(self, path: Path) -> None:
+        save_agent(self.agent, path)
+
+    def save(self, path: Path, progress: Progress) -> None:
+        save_run(path, FORMAT, self.agent, self.optimizer, progress)
+
+    def load(self, path: Path) -> Progress:
+        return load_run(path, FORMAT, self.agent, self.optimizer, MAY_CHANGE)
+
+
+@dataclass(frozen=True, eq=False)
+class VnlaExperience:
+    """A batch of finished episodes, ready to be learned from."""
+
+    episodes: tuple[Episode, ...]
+    moments: tuple[VnlaMoment, ...]
+
+
+def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Tensor]:
+    """Eq 4.3: navigation and asking, summed over steps, averaged over episodes (docs/sources.md, S114)."""
+    moves, asks = (torch.cat([getattr(m, n) for m in moments]) for n in ("moves", "asks"))
+    wanted, wished = (torch.cat([getattr(m, n) for m in moments]) for n in ("move_labels", "ask_labels"))
+    navigation = negative_log_likelihood(moves, wanted).sum() / episodes
+    return navigation, negative_log_likelihood(asks, wished).sum() / episodes
+
+
+def numbers_of(experience: VnlaExperience, worlds: Mapping[str, Place]) -> dict[str, float]:
+    """What a researcher wants to know about one update, besides its losses."""
+    episodes, moments = experience.episodes, experience.moments
+    moves, wanted = torch.cat([m.moves for m in moments]), torch.cat([m.move_labels for m in moments])
+    asks, wished = torch.cat([m.asks for m in moments]), torch.cat([m.ask_labels for m in moments])
+    numbers = {
+        "right moves": float((moves.argmax(-1) == wanted).float().mean()),
+        "steps": float(sum(len(e.steps) for e in episodes)),
+        "success": sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes),
+        "requests": sum(e.requests for e in episodes) / len(episodes),
+    }
+    if len(wished):
+        numbers["should ask"] = float(wished.float().mean())
+        numbers["right asks"] = float((asks.argmax(-1) == wished).float().mean())
+    return numbers

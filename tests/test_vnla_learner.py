@@ -1,0 +1,277 @@
+"""VNLA's learner: coverage, the two losses, budgets, a head that is detached, resuming, and a run on a small house."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+from hand_vnla import TINY, lesson, split_under
+
+from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.loop import Clock
+from agents.imitation.playing import play_remembering
+from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent
+from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER, VnlaSettings
+from agents.vnla.network import (
+    ASK,
+    DONT,
+    MOST_LEFT,
+    NO_ASK,
+    NO_MOVE,
+    STOP,
+    CoverageAttention,
+    DecoderState,
+    ReadText,
+    VnlaPercept,
+)
+from agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
+from agents.vnla.training import VnlaLearner, losses_of, train
+from embodied.action_spaces import WORDS
+from embodied.envs.vnla import RULES, teacher_of
+from embodied.evaluation.rollout import play
+from embodied.interface import Ask
+from embodied.teachers.vnla import AskRules, ask_reason
+
+quiet = lambda line: None
+
+
+# The networks ------------------------------------------------------------------------------------
+
+
+def test_attention_and_coverage_are_those_of_the_equations():
+    """One agent, two words of one number each: the weights by hand, and what the GRU makes of them."""
+    attention = CoverageAttention(hidden=1, coverage=1)
+    for p in attention.parameters():
+        torch.nn.init.zeros_(p)
+    attention.query.weight.data.fill_(2.0)
+    attention.remembered.weight.data.fill_(0.5)
+    attention.out.weight.data.copy_(torch.tensor([[1.0, 0.0]]))
+    attention.memory.weight_ih.data.copy_(torch.tensor([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    text = ReadText(torch.tensor([[[1.0], [3.0]]]), torch.ones(1, 2, dtype=torch.bool), torch.tensor([[[2.0], [0.0]]]))
+    attended, weights, coverage = attention(torch.tensor([[0.5]]), text)
+    words = np.array([1 + 0.5 * 2, 3.0])  # the coverage of a word is added to it
+    scores = 2 * 0.5 * words
+    expected = np.exp(scores) / np.exp(scores).sum()
+    assert weights[0].tolist() == pytest.approx(expected.tolist())
+    assert attended.item() == pytest.approx(math.tanh(float(expected @ words)))
+    after = [0.5 * np.tanh(expected[0]) + 0.5 * 2, 0.5 * np.tanh(expected[1])]  # half new, half kept: gates at zero
+    assert coverage[0, :, 0].tolist() == pytest.approx(after)
+
+
+def test_words_behind_the_end_are_not_read():
+    agent, *_ = lesson()
+    agent.network.eval()
+    tokens = torch.tensor([[5, 6, 2, 0, 0, 0], [5, 6, 7, 8, 9, 2]])
+    alone = agent.network.read(tokens[:1])
+    together = agent.network.read(tokens)
+    assert torch.allclose(alone.words, together.words[:1]) and together.mask[0].tolist() == [True] * 3 + [False] * 3
+    state = agent.network.start(1)
+    state = DecoderState(state.hidden + 0.3, state.cell)
+    _, weights, _ = agent.network.attention(state.hidden, alone)
+    assert weights[0, 3:].tolist() == [0.0] * 3
+
+
+def percept(agents=3, left=2):
+    return VnlaPercept(
+        torch.randn(agents, 16),
+        torch.full((agents,), NO_MOVE),
+        torch.full((agents,), NO_ASK),
+        torch.full((agents,), left),
+        torch.ones(agents, STOP + 1, dtype=torch.bool),
+    )
+
+
+def test_no_gradient_leaves_the_asking_head():
+    agent, *_ = lesson()
+    network = agent.network
+    text = network.read(torch.tensor([[5, 6, 2]] * 3))
+    _, asks = network.consider(percept(), network.start(3), text)
+    asks.sum().backward()
+    touched = {name.split(".")[0] for name, p in network.named_parameters() if p.grad is not None and p.grad.any()}
+    assert touched == {"asking"}
+
+
+def test_the_asking_head_knows_how_many_requests_are_left_and_counts_no_further_than_the_table():
+    agent, *_ = lesson()
+    network = agent.network.eval()
+    torch.manual_seed(0)
+    seen, text = percept(), network.read(torch.tensor([[5, 6, 2]] * 3))
+    said = [
+        network.consider(dataclasses.replace(seen, left=torch.full((3,), n)), network.start(3), text)[1]
+        for n in (0, 1, MOST_LEFT, MOST_LEFT + 5)
+    ]
+    assert not torch.allclose(said[0], said[1]) and torch.equal(said[2], said[3])
+
+
+def test_actions_that_are_not_possible_are_never_likely():
+    agent, *_ = lesson()
+    allowed = torch.tensor([[False, True, True, True, False, True]] * 3)
+    seen = dataclasses.replace(percept(), allowed=allowed)
+    text = agent.network.read(torch.tensor([[5, 6, 2]] * 3))
+    logits, _, after = agent.network.navigate(seen, agent.network.start(3), text)
+    assert torch.equal(logits.softmax(-1) > 0, allowed) and not torch.equal(after.coverage, text.coverage)
+
+
+def test_the_paper_sizes_have_about_as_many_parameters_as_the_reference_says():
+    agent = new_agent(SCALES["paper"], lesson()[0].vocabulary, "x", 192)
+    assert 4.3e6 < sum(p.numel() for p in agent.network.parameters()) < 4.9e6
+
+
+# The losses --------------------------------------------------------------------------------------
+
+
+def test_the_losses_are_two_cross_entropies_by_hand():
+    moves = torch.tensor([[0.0, 0.0, -math.inf, -math.inf, -math.inf, 0.0], [math.log(3), 0, 0, 0, -math.inf, 0]])
+    one = VnlaMoment(torch.tensor([[0.0, math.log(4)]]), torch.tensor([ASK]), moves, torch.tensor([1, 0]))
+    other = VnlaMoment(torch.zeros(0, 2), torch.zeros(0, dtype=torch.long), moves[:1], torch.tensor([STOP]))
+    navigation, asking = losses_of([one, other], episodes=2)
+    assert float(navigation) == pytest.approx((math.log(3) + math.log(7 / 3) + math.log(3)) / 2)
+    assert float(asking) == pytest.approx(math.log(5 / 4) / 2)
+
+
+def moments(config=TINY):
+    agent, training, _ = lesson(config)
+    teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
+    player = for_training(agent.policy(training.bank), teacher)
+    return training, *play_remembering(training.make_env, player, training.tasks[:8], seed=3)[:2]
+
+
+def test_in_training_it_asks_when_its_teacher_would_and_learns_from_every_move():
+    training, episodes, memory = moments()
+    asked = sum(e.requests for e in episodes)
+    wished = torch.cat([m.ask_labels for m in memory.moments])
+    assert asked == int(wished.sum()) > 0, "who should have asked has asked"
+    assert sum(len(m.move_labels) for m in memory.moments) == sum(len(e.steps) for e in episodes) - asked
+    assert sum(len(m.ask_labels) for m in memory.moments) == sum(bool(s.can_ask) for e in episodes for s in e.steps)
+
+
+def test_labels_are_those_of_the_teacher_afterwards():
+    training, episodes, memory = moments()
+    teacher = teacher_of("direct")
+    told = [[x for x in teacher.relabel(e, training.worlds["grid"]) if x.move is not None] for e in episodes]
+    counts = dict.fromkeys(("left", "right", "up", "down", "forward", "stop"), 0)
+    for labels in told:
+        for x in labels:
+            counts["stop" if not hasattr(x.move, "candidate") else WORDS[x.move.candidate]] += 1
+    found = torch.cat([m.move_labels for m in memory.moments]).tolist()
+    assert counts == {w: found.count((*WORDS, "stop").index(w)) for w in counts}
+
+
+def test_what_an_advisor_did_in_its_place_is_what_it_knows_to_have_done():
+    training, episodes, _ = moments()
+    for episode in episodes:
+        env = training.make_env()
+        before = env.reset(episode.task, seed=3)
+        for step in episode.steps[:-1]:
+            after = env.step(step.action)
+            if not isinstance(step.action, Ask):
+                assert carried_out(before, after) == step.action.candidate
+            before = after
+
+
+def test_rules_of_the_teacher_can_be_left_out():
+    assert rules_of(dataclasses.replace(TINY, ask_rules="b to d")) == AskRules(only=("uncertain", "unmoved", "remain"))
+    _, episodes, memory = moments(dataclasses.replace(TINY, ask_rules="a and e"))
+    assert int(torch.cat([m.ask_labels for m in memory.moments]).sum()) == sum(e.requests for e in episodes)
+
+
+# Acting ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("asker", ASKERS)
+def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
+    agent, _, split = lesson()
+    agent.network.eval()
+    player = agent.player(split.bank, asker)
+    tasks = [dataclasses.replace(t, budget=2.0) for t in split.tasks[:6]]
+    together = play(split.make_env, player, tasks, seed=1, batch=6)
+    alone = play(split.make_env, player, tasks[::-1], seed=1, batch=1)[::-1]
+    assert [[s.action for s in e.steps] for e in together] == [[s.action for s in e.steps] for e in alone]
+    requests = [e.requests for e in together]
+    assert max(requests) <= 2 and (asker != "none" or not any(requests)) and (asker != "first" or sum(requests) > 6)
+
+
+def test_the_asker_teacher_asks_by_the_first_pass():
+    agent, _, split = lesson()
+    for e in play(split.make_env, agent.player(split.bank, "teacher"), split.tasks[:4], seed=1):
+        env = split.make_env()
+        env.reset(e.task, seed=1)
+        for step in e.steps:
+            if isinstance(step.action, Ask):
+                assert ask_reason(env.situation, step.action.thought) is not None
+            env.step(step.action)
+
+
+def test_a_random_asker_needs_the_situation_and_says_so():
+    agent, _, split = lesson()
+    assert isinstance(agent.player(split.bank, "random"), SupervisedVnla)
+    assert not isinstance(agent.player(split.bank, "learned"), SupervisedVnla)
+
+
+def test_features_of_another_encoder_are_refused():
+    agent, _, split = lesson()
+    with pytest.raises(ValueError, match="the agent learned from other"):
+        dataclasses.replace(agent, encoder_digest="other").policy(split.bank)
+
+
+# Training ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_it_learns_one_batch_by_heart():
+    config = dataclasses.replace(TINY, hidden_size=48, iterations=90, batch=4, learning_rate=5e-3, dropout=0.0)
+    agent, training, _ = lesson(config)
+    learner = VnlaLearner(agent, dataclasses.replace(training, tasks=training.tasks[:4]))
+    numbers = [learner.learn(u, Clock()) for u in range(config.iterations)]
+    mean = lambda name, some: sum(n[name] for n in some) / len(some)
+    assert mean("right moves", numbers[-10:]) > 0.75 > 0.5 > mean("right moves", numbers[:5])
+    assert mean("loss navigation", numbers[-10:]) < 0.65 * mean("loss navigation", numbers[5:15])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rules", RULES)
+def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
+    agent, training, validation = lesson(dataclasses.replace(TINY, rules=rules, iterations=2, validate_every=2))
+    progress = train(agent, training, validation, tmp_path, note=quiet)
+    assert progress.update == 2
+    found = load_agent(tmp_path / "best.safetensors")
+    assert (found.pictures, found.config.rules) == ("unlit_192", rules)
+    played = play(validation.make_env, found.player(validation.bank), validation.tasks[:3], seed=0)
+    assert len(played) == 3
+
+
+@pytest.mark.slow
+def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
+    def run(folder, *iterations):
+        for n in iterations:
+            agent, training, validation = lesson(dataclasses.replace(TINY, iterations=n, validate_every=10))
+            train(agent, training, validation, folder, note=quiet)
+        return agent.network.state_dict()
+
+    whole, parts = run(tmp_path / "whole", 4), run(tmp_path / "parts", 2, 4)
+    assert all(torch.equal(whole[k], parts[k]) for k in whole)
+    with pytest.raises(CheckpointError, match="hidden_size 24 -> 32|settings changed"):
+        agent, training, validation = lesson(dataclasses.replace(TINY, batch=5))
+        train(agent, training, validation, tmp_path / "parts", note=quiet)
+
+
+def test_an_agent_comes_back_from_its_file(tmp_path):
+    agent, _, split = lesson()
+    save_agent(agent, tmp_path / "agent.safetensors")
+    found = load_agent(tmp_path / "agent.safetensors")
+    assert (found.config, found.vocabulary, found.pictures) == (agent.config, agent.vocabulary, "unlit_192")
+    (tmp_path / "agent.safetensors").write_bytes((tmp_path / "agent.safetensors").read_bytes()[:-9])
+    with pytest.raises(ValueError, match="cannot be read|checksum"):
+        load_agent(tmp_path / "agent.safetensors")
+
+
+def test_settings_refuse_what_they_cannot_be():
+    assert VnlaSettings.from_json(SCALES["mini"].to_json()) == SCALES["mini"]
+    for wrong in ({"asker": "every5"}, {"rules": "Algorithm 6"}, {"dropout": 1.0}, {"batch": 0}, {"ask_rules": "a"}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            dataclasses.replace(TINY, **wrong)
+    assert set(TRAINED_UNDER) == set(RULES) and DONT != ASK
+    assert split_under("algorithm-6", 3).tasks[0].horizon > split_under("indirect", 3).tasks[0].horizon
