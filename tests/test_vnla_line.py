@@ -1,0 +1,88 @@
+"""The commands of VNLA's learner, end to end on a hand-made data set: training, resuming, judging, the tables."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hand_data import build
+
+from agents.vision.encoder import random_encoder
+from agents.vision.features import feature_path, save_features
+from agents.vnla.agent import load_agent
+from embodied.cli import main
+
+pytestmark = pytest.mark.slow
+
+SMALL = [
+    *("--hidden-size", 16, "--word-embedding", 8, "--navigation-embedding", 4, "--ask-embedding", 4),
+    *("--budget-embedding", 4, "--coverage", 2, "--batch", 4, "--validation-tasks", 3, "--validate-every", 1),
+    *("--threads", 1, "--network", "random"),
+]
+
+
+def with_features(data):
+    """The data set with features of the untrained encoder that are not computed but drawn."""
+    encoder, rng = random_encoder(seed=0), np.random.default_rng(0)
+    for name in sorted({n for s in data.splits for n in data.names(s)}):
+        place = data.place(name)
+        features = rng.normal(size=(len(place.graph.positions), 36, encoder.size))
+        path = feature_path(data.folder / "features", encoder.digest, name)
+        save_features(path, features, encoder, place.house.digest)
+    return data
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("vnla")
+    return with_features(build(folder / "data", folder / "cache", "vnla"))
+
+
+@pytest.fixture(scope="module")
+def without_rooms(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("no rooms")
+    return with_features(build(folder / "data", folder / "cache", "vnla", rooms=False))
+
+
+def run(*words) -> int:
+    return main([str(w) for w in words])
+
+
+def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, capsys):
+    train = ("train", "vnla", "--data", data.folder, "--out", tmp_path, *SMALL, "--iterations")
+    assert run(*train, 1) == 0 and run(*train, 2) == 0
+    said = capsys.readouterr()
+    assert "continuing after update 1" in said.out + said.err and "pictures: unlit_192" in said.out + said.err
+    assert len((tmp_path / "validation.jsonl").read_text().splitlines()) == 2
+    best = tmp_path / "best.safetensors"
+    assert load_agent(best).pictures == "unlit_192"
+    judge = ("judge", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 3, "--json")
+    assert run(*judge, "--out", tmp_path / "judged") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert {r["agent"] for r in facts["rows"]} > {"learned", "learned, asks never", "learned, direct intervention"}
+    by = {r["agent"]: r["values"] for r in facts["rows"]}
+    assert by["shortest"]["success"]["mean"] == 1 and by["learned, asks never"]["requests"]["mean"] == 0
+    assert facts["learned from"] == "unlit_192" and (tmp_path / "judged/table.md").exists()
+    assert run(*judge, "--only", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
+
+
+def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path, capsys):
+    words = ("study", "vnla", "interventions", "rooms", "--data", data.folder, "--out", tmp_path, *SMALL)
+    words = (*words, "--iterations", 1, "--seeds", 1, "--tasks", 2)
+    assert run(*words) == 2 and "--without-rooms" in capsys.readouterr().err
+    words = (*words, "--without-rooms", without_rooms.folder)
+    assert run(*words) == 0
+    text = (tmp_path / "table_interventions.md").read_text()
+    assert "| direct, not in words |" in text and "seeds 123, 435, 6757, 867, 983" in text and "unlit_192" in text
+    rooms = (tmp_path / "table_rooms.md").read_text()
+    assert "| learned, trained with rooms |" in rooms
+    before = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}
+    assert run(*words) == 0 and len(before) == 5
+    assert before == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}, "what is done is not done again"
+
+
+def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
+    other = build(tmp_path / "data", tmp_path / "cache", "find")
+    assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2
+    assert "embodied dataset vnla" in capsys.readouterr().err
