@@ -29,9 +29,10 @@ DIRECT = "learned, direct intervention"
 LEARNED = "learned"
 
 
-def row_names() -> tuple[str, ...]:
-    """All rows that one agent gives."""
-    return (LEARNED, *ASKED, DIRECT, *WITHOUT_LEARNING)
+def row_names(agent: VnlaAgent) -> tuple[str, ...]:
+    """All rows that an agent gives; direct intervention is that of one which learned to read what the advisor says."""
+    direct = (DIRECT,) if agent.config.rules == "indirect" else ()
+    return (LEARNED, *ASKED, *direct, *WITHOUT_LEARNING)
 
 
 def player(agent: VnlaAgent, bank: FeatureBank, name: str) -> Agent:
@@ -65,12 +66,12 @@ def judge(
     Raises:
       ValueError: an unknown row.
     """
-    if unknown := sorted(set(only) - set(row_names())):
-        raise ValueError(f"unknown rows {unknown}; there are {list(row_names())}")
+    if unknown := sorted(set(only) - set(row_names(agent))):
+        raise ValueError(f"unknown rows {unknown}; there are {list(row_names(agent))}")
     rows = []
     for split in splits:
         bank = lessons.split(split).bank
-        for name in watch(only or row_names()):
+        for name in watch(only or row_names(agent)):
             rules = "direct" if name == DIRECT else agent.config.rules
             players: Mapping[str, Agent] = {name: player(agent, bank, name)}
             kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
