@@ -104,10 +104,10 @@ EXECUTION_SCALES: dict[str, ExecutionConfig] = {
     ),
     "paper": ExecutionConfig(),
 }
-"""'mini': about an hour of two cores; 'paper': Table E.2, for a GPU."""
+"""'mini': about half an hour of one core in flats of 60 to 100 m2; 'paper': Table E.2, for a GPU."""
 INTENTION_SCALES: dict[str, IntentionConfig] = {
     "mini": IntentionConfig(
-        hidden_size=128, learning_rate=5e-4, critic_iterations=150, iterations=1_500, validate_every=150
+        hidden_size=128, learning_rate=1e-3, batch=64, critic_iterations=30, iterations=300, validate_every=50
     ),
     "paper": IntentionConfig(),
 }
