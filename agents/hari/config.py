@@ -100,7 +100,7 @@ class IntentionConfig(ValidatedRunSettings):
 
 EXECUTION_SCALES: dict[str, ExecutionConfig] = {
     "mini": ExecutionConfig(
-        hidden_size=128, heads=4, learning_rate=1e-3, iterations=4_000, guided=0.5, cooldown=0.4, validate_every=250
+        hidden_size=128, heads=4, learning_rate=1e-3, iterations=3_000, guided=0.5, cooldown=0.4, validate_every=250
     ),
     "paper": ExecutionConfig(),
 }
