@@ -17,6 +17,7 @@ from hand_worlds import grid_world
 
 import embodied.gym.env
 from embodied.envs.base import ActionError
+from embodied.envs.hari import Costs, HariRules
 from embodied.gym.registration import IDS
 from embodied.gym.spaces import Numbers, SpaceLayout, decode, number, text_of, word_number, words
 from embodied.interface import Ask, Intention, Move, Stop
@@ -147,6 +148,17 @@ def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
             total, n = total + reward, n + 1
         assert info["success"] == 1 and info["spl"] == pytest.approx(1)
         assert total == pytest.approx(1 - 0.01 * n + (start if shaping else 0))
+
+
+def test_haris_variants_are_chosen_by_name(tmp):
+    cheap, dear = (make("hari", tmp, hari=HariRules(Costs.alike(c), stack=1, horizon=4)) for c in (0.0, 0.5))
+    for env in (cheap, dear):
+        env.reset(seed=0)
+    ask = number(Ask(Intention.CUR), SpaceLayout())
+    assert [env.step(ask)[1] for env in (cheap, dear)] == [0.0, -0.5]
+    assert [dear.step(ask)[3] for _ in range(3)] == [False, False, True], "the horizon is 4"
+    with pytest.raises(ValueError, match="HARI's"):
+        make("find", tmp, hari=HariRules(stack=1))
 
 
 def test_haris_reward_is_minus_its_cost(tmp):

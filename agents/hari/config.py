@@ -107,7 +107,7 @@ EXECUTION_SCALES: dict[str, ExecutionConfig] = {
 """'mini': about half an hour of one core in flats of 60 to 100 m2; 'paper': Table E.2, for a GPU."""
 INTENTION_SCALES: dict[str, IntentionConfig] = {
     "mini": IntentionConfig(
-        hidden_size=128, learning_rate=1e-3, batch=64, critic_iterations=30, iterations=300, validate_every=50
+        hidden_size=128, learning_rate=1e-3, batch=64, critic_iterations=30, iterations=200, validate_every=50
     ),
     "paper": IntentionConfig(),
 }

@@ -144,7 +144,7 @@ def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, floa
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)
-    tasks = [dataclasses.replace(t, horizon=config.horizon, id=f"{t.id}#{k}") for k, t in enumerate(tasks)]
+    tasks = [dataclasses.replace(t, id=f"{t.id}#{k}") for k, t in enumerate(tasks)]
     choices: list[Choice] = []
     run.policy.choices = choices
     episodes = play(ground.make_env, run.policy, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
@@ -219,7 +219,7 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
 def _validate(agent: HariAgent, ground: Ground, progress: Progress, update: int, folder: Path, note: Note) -> Progress:
     """Judge by what is optimised: the mean cost, task errors included; keep the cheapest agent."""
     config = agent.config
-    tasks = [dataclasses.replace(t, horizon=config.horizon) for t in ground.tasks[: config.validation_tasks]]
+    tasks = ground.tasks[: config.validation_tasks]
     with torch.inference_mode():
         episodes = play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)
     cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import torch
@@ -42,9 +41,8 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
 def validation_means(data: Dataset, agent: HariAgent, *, seed: int, tasks: int) -> dict[str, float]:
     """The agent's mean number of each intention on validation tasks of all three conditions."""
     ground = ground_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
-    asked = [dataclasses.replace(t, horizon=agent.config.horizon) for t in ground.tasks]
     with torch.inference_mode():
-        return counts_of(play(ground.make_env, policy_of(agent), asked, seed=seed, batch=agent.config.batch))
+        return counts_of(play(ground.make_env, policy_of(agent), ground.tasks, seed=seed, batch=agent.config.batch))
 
 
 def judge(
@@ -74,7 +72,7 @@ def judge(
     rows = []
     for split in splits:
         whole = data.split(split, hari=rules_of(agent.config))
-        tasks = [dataclasses.replace(t, horizon=agent.config.horizon) for t in spread(whole.tasks, limit)]
+        tasks = spread(whole.tasks, limit)
         graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):
             episodes = _play(whole.make_env, judged[name], tasks, agent, seed)

@@ -44,8 +44,7 @@ def lessons_of(data: Dataset) -> Curriculum:
 
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
-    cost = config.cost
-    return HariRules(Costs(cost, cost, cost, cost), config.stack, config.longest, config.cooperative)
+    return HariRules(Costs.alike(config.cost), config.stack, config.longest, config.cooperative, horizon=config.horizon)
 
 
 def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:

@@ -7,11 +7,12 @@ the episodes, to --out.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, show
-from embodied.cli.options import add_rules, any_path, folder_to_write, whole
+from embodied.cli.options import add_hari_rules, add_rules, any_path, folder_to_write, hari_rules_of, whole
 from embodied.datasets.scale import KINDS
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which splits (default: test_unseen)")
     parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
     add_rules(parser)
+    add_hari_rules(parser)
     parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where to write the table and the episodes")
@@ -58,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     data = Dataset(args.data)
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
-    names = args.agent or agent_names(args.kind)
+    names, variants = args.agent or agent_names(args.kind), hari_rules_of(args)
 
     def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")
@@ -77,14 +79,20 @@ def run(args: argparse.Namespace) -> int:
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
         agents = {name: agent(args.kind, name, worlds, args.rules) for name in names}
-        whole = data.split(split, worlds=worlds, vnla=args.rules)
+        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants)
         rows += evaluate(whole, agents, seed=args.seed, limit=args.tasks, keep=keep, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
         if theirs:
             tables.save(theirs, args.out, "table_as_programs")
         facts = fingerprint(
-            data=data.digest, seed=args.seed, splits=args.split, agents=names, tasks=args.tasks, rules=args.rules
+            data=data.digest,
+            seed=args.seed,
+            splits=args.split,
+            agents=names,
+            tasks=args.tasks,
+            rules=args.rules,
+            hari=dataclasses.asdict(variants),
         )
         write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))

@@ -19,6 +19,9 @@ import typing
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+if typing.TYPE_CHECKING:
+    from embodied.envs.hari import HariRules
+
 C = typing.TypeVar("C")
 METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD"}
 MOST = 2**31
@@ -54,6 +57,17 @@ def positive(text: str) -> float:
         value = math.nan
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"should be a number above 0, got {text[:40]!r}")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """Finite numbers from zero on."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"should be a number from 0 on, got {text[:40]!r}")
     return value
 
 
@@ -132,6 +146,27 @@ def add_rules(parser: argparse.ArgumentParser) -> None:
         help="VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not "
         "(direct-mute), the program's 'forward' (goal-aware), Algorithm 6 as printed (default: %(default)s)",
     )
+
+
+def add_hari_rules(parser: argparse.ArgumentParser) -> None:
+    """HARI's variants; `hari_rules_of` reads them."""
+    group = parser.add_argument_group("HARI's variants (defaults: Table E.2 of the dissertation)")
+    group.add_argument("--stack", type=whole(), default=2, metavar="L", help="most goals on the stack (default: 2)")
+    group.add_argument("--longest", type=whole(), default=3, metavar="N", help="most nodes to a sub-goal (default: 3)")
+    group.add_argument("--cost", type=not_negative, default=0.01, metavar="X", help="of each action (default: 0.01)")
+    group.add_argument(
+        "--horizon", type=whole(), metavar="H", help="most steps of an episode (default: its task's, 30)"
+    )
+    group.add_argument("--uncooperative", action="store_true", help="the assistant answers another question than asked")
+    group.add_argument("--dense-states", action="store_true", help="the agent's own place is described densely, always")
+
+
+def hari_rules_of(args: argparse.Namespace) -> HariRules:
+    """The variants of `add_hari_rules`."""
+    from embodied.envs.hari import Costs, HariRules
+
+    costs, cooperative = Costs.alike(args.cost), not args.uncooperative
+    return HariRules(costs, args.stack, args.longest, cooperative, args.dense_states, args.horizon)
 
 
 # Options made from settings ---------------------------------------------------------------------

@@ -235,7 +235,7 @@ class Dataset:
             vnla=vnla,
         )
         tasks = [t for t in self.tasks(name) if t.world in places]
-        return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla), make_env)
+        return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla, hari), make_env)
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""

@@ -28,6 +28,15 @@ class Costs:
     sub: float = 0.01
     do: float = 0.01
 
+    def __post_init__(self) -> None:
+        if not all(0 <= c < float("inf") for c in (self.cur, self.goal, self.sub, self.do)):
+            raise ValueError(f"costs should be numbers from 0 on, got {self}")
+
+    @classmethod
+    def alike(cls, cost: float) -> Costs:
+        """The same for all four."""
+        return cls(cost, cost, cost, cost)
+
     def of(self, action: Action) -> float:
         """Cost of an action that does not end the episode; DONE on a sub-goal is free (4.3.4.4)."""
         if isinstance(action, Move):
@@ -48,10 +57,14 @@ class HariRules:
     """False: the assistant answers a question drawn from those that could be asked (Table 4.7)."""
     dense_states: bool = False
     """True: d^s is as rich as the assistant's, always, as for an agent that sees everything."""
+    horizon: int | None = None
+    """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
 
     def __post_init__(self) -> None:
-        if min(self.stack, self.longest) < 1:
-            raise ValueError(f"stack {self.stack} and longest {self.longest} should be at least 1")
+        if min(self.stack, self.longest, self.horizon or 1) < 1:
+            raise ValueError(
+                f"stack {self.stack}, longest {self.longest} and horizon {self.horizon} should be at least 1"
+            )
 
 
 AS_PRINTED = HariRules()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 from embodied.action_spaces import PanoramicMoves
@@ -43,7 +44,7 @@ def environment_maker(
     Raises:
       ValueError: an unknown kind or rule of play, or a rule of VNLA for another kind.
     """
-    refuse_rules(kind, vnla)
+    refuse_rules(kind, vnla, hari)
     if kind in ("find", "vln"):
         moves = PanoramicMoves()
         return lambda: HelpEnv(worlds, moves=moves)
@@ -64,15 +65,21 @@ def environment_maker(
     raise ValueError(f"unknown kind of task {kind!r}")
 
 
-def refuse_rules(kind: str, vnla: str) -> None:
-    """Raises ValueError for an unknown rule of VNLA, or one for another kind of task."""
+def refuse_rules(kind: str, vnla: str, hari: HariRules = AS_PRINTED) -> None:
+    """Raises ValueError for an unknown rule of VNLA, or variants of VNLA or HARI for another kind of task."""
     check_rules(vnla)
+    if kind != "hari" and hari != AS_PRINTED:
+        raise ValueError(f"{hari} are HARI's, these tasks are of kind {kind!r}; leave them out")
     if kind != "vnla" and vnla != AS_PUBLISHED:
         raise ValueError(f"rules {vnla!r} are VNLA's, these tasks are of kind {kind!r}; leave the rules out")
 
 
-def tasks_under(kind: str, tasks: Sequence[Task], worlds: Mapping[str, Place], vnla: str) -> tuple[Task, ...]:
-    """The tasks with time enough under a rule of VNLA; as they are for other kinds and for the program's rule."""
+def tasks_under(
+    kind: str, tasks: Sequence[Task], worlds: Mapping[str, Place], vnla: str, hari: HariRules = AS_PRINTED
+) -> tuple[Task, ...]:
+    """The tasks with time enough under a rule of VNLA, or with HARI's horizon; else as they are."""
+    if kind == "hari" and hari.horizon is not None:
+        return tuple(dataclasses.replace(t, horizon=hari.horizon) for t in tasks)
     if kind != "vnla" or vnla == AS_PUBLISHED:
         return tuple(tasks)
     teacher = teacher_of(vnla)

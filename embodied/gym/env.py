@@ -23,7 +23,7 @@ from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
 from embodied.envs.base import ActionError, HelpEnv
-from embodied.envs.hari import HariEnv
+from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
@@ -281,6 +281,8 @@ class StageSettings:
     """VNLA's rule of play, one of embodied.envs.vnla.RULES."""
     rooms: bool = True
     """Whether VNLA's requests in a generated flat name the room; those of a data set are as it was built."""
+    hari: HariRules = AS_PRINTED
+    """Variants of HARI: costs, stack, sub-goals' length, horizon, whether the assistant cooperates, dense states."""
     wheels: bool = False
     """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
 
@@ -304,9 +306,10 @@ def set_stage(kind: str, **settings: Any) -> Stage:
         sees=seen,
         rules=wanted.rules,
         rooms=wanted.rooms,
+        hari=wanted.hari,
     )
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
-    layout = wanted.layout or SpaceLayout(descriptions=kind == "hari")
+    layout = wanted.layout or SpaceLayout(descriptions=kind == "hari", stack=max(SpaceLayout.stack, wanted.hari.stack))
     return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout)
 
 

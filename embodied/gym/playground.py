@@ -20,6 +20,7 @@ from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
+from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
@@ -58,6 +59,7 @@ def make_playground(
     sees: Sequence[str] = ("oracle",),
     rules: str = AS_PUBLISHED,
     rooms: bool = True,
+    hari: HariRules = AS_PRINTED,
 ) -> Playground:
     """A split of a data set, or one flat generated from `seed` where `data` is None.
 
@@ -65,6 +67,7 @@ def make_playground(
       pictures: how the houses are drawn; as the data set's pictures are, or 'fast', where not given.
       sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
       rules, rooms: VNLA's rule of play, and whether the requests in a generated flat name the room.
+      hari: variants of HARI.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
@@ -72,7 +75,9 @@ def make_playground(
     catalogue = load_catalogue(cache)
     if data is None:
         drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
-        worlds, tasks, make_env = _flat(kind, seed, cache, catalogue, worlds, drawn, rules=rules, rooms=rooms)
+        worlds, tasks, make_env = _flat(
+            kind, seed, cache, catalogue, worlds, drawn, rules=rules, rooms=rooms, hari=hari
+        )
     else:
         whole = Dataset(data)
         if whole.kind != kind:
@@ -85,7 +90,7 @@ def make_playground(
             names = whole.names(split)
             drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
             worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-        chosen = whole.split(split, worlds=worlds, vnla=rules)
+        chosen = whole.split(split, worlds=worlds, vnla=rules, hari=hari)
         tasks, make_env = chosen.tasks, chosen.make_env
     features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
     return Playground(worlds, tasks, make_env, features)
@@ -144,6 +149,7 @@ def _flat(
     *,
     rules: str,
     rooms: bool,
+    hari: HariRules,
 ) -> tuple[Mapping[str, SeenPlace], tuple[Task, ...], Callable[[], HelpEnv]]:
     """One world (generated unless given), tasks in it, and a maker of environments.
 
@@ -166,5 +172,5 @@ def _flat(
         routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
     tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=rooms)[part]
-    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=rules)
-    return worlds, tasks_under(kind, tasks, worlds, rules), make_env
+    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=rules, hari=hari)
+    return worlds, tasks_under(kind, tasks, worlds, rules, hari), make_env
