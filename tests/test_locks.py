@@ -75,6 +75,15 @@ def test_what_a_killed_process_left_is_swept_and_what_others_write_or_own_stays(
     assert set(tmp_path.iterdir()) == {mine, far, tmp_path / "b.json", *others}
 
 
+def test_whoever_takes_a_folder_finds_nothing_that_a_killed_process_left_in_it(tmp_path):
+    with locked(tmp_path):
+        pass  # it has been swept once in this process
+    left = tmp_path / f".weights.safetensors.{_MACHINE}-{dead_pid()}.x.safetensors"
+    left.write_text("half")
+    with locked(tmp_path):
+        assert not left.exists()
+
+
 @pytest.mark.parametrize("body", [lambda t: t.write_bytes(b"x"), lambda t: (t / "no").write_text(""), None])
 def test_every_failed_write_names_the_file_that_was_wanted(body, tmp_path):
     path = tmp_path / "weights.safetensors"

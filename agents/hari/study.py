@@ -8,7 +8,6 @@ where it stopped.
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ from agents.imitation.loop import Note
 from assets.cache import write_bytes
 from embodied.evaluation.tables import Estimate, across_seeds, as_json, save, shown
 from embodied.interface import Ask, Episode, Move
-from embodied.records import load_lines, save_lines
+from embodied.records import load_lines, parse_file, save_lines
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 COSTS = (0.01, 0.05, 0.1, 0.2, 0.5)
@@ -151,9 +150,12 @@ def rows_of(setting: HariStudySetting, name: str, split: str) -> list[dict[str, 
     row = name if name in RULE_ROWS else "learned"
     found = []
     for seed in setting.repeats:
-        body = json.loads((setting.folder(variant, seed) / "rows.json").read_text())
-        (mine,) = [r for r in body if r["agent"] == row and r["split"] == split]
-        found.append({k: v["mean"] for k, v in mine["values"].items()})
+        path = setting.folder(variant, seed) / "rows.json"
+        try:
+            (mine,) = [r for r in parse_file(path) if r["agent"] == row and r["split"] == split]  # type: ignore[attr-defined]
+            found.append({k: v["mean"] for k, v in mine["values"].items()})
+        except (KeyError, TypeError, AttributeError, ValueError) as e:
+            raise ValueError(f"{path} is no table of this study ({e!r}); delete it, the same command makes it") from e
     return found
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
-from embodied.cli.options import any_path, folder_to_write, video_side, whole
+from embodied.cli.options import any_path, file_to_write, folder_to_write, video_side, whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -65,7 +65,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         sub.add_argument(
             "--house", type=any_path, required=True, metavar="DIR", help="folder that `embodied house` wrote"
         )
-        sub.add_argument("--out", type=any_path, required=True, metavar="PATH", help="file to write (mjcf: folder)")
+        place = folder_to_write if name == "mjcf" else file_to_write
+        sub.add_argument("--out", type=place, required=True, metavar="PATH", help="file to write (mjcf: folder)")
         sub.add_argument(
             "--light", choices=("none", "fast", "normal", "high"), default="normal",
             help="bake light of this quality into it, or leave its materials as they are (default: %(default)s)",
@@ -195,18 +196,19 @@ def run_lerobot(args: argparse.Namespace) -> int:
 def run_house(args: argparse.Namespace) -> int:
     from embodied.house.validation import load_house
     from embodied.scene.export import export_glb, export_mjcf
+    from embodied.scene.usd import check_usd, export_usd
     from embodied.scene.web import export_lit_glb
 
+    if args.what == "usd":
+        check_usd(args.out)
+        if args.light == "none":
+            raise ValueError("USD is written of a lit house; leave --light none out")
     catalogue = catalogue_of(args)
     house = load_house(args.house / "house.json", catalogue)
     lit = light(args, house, catalogue)
     if args.what == "mjcf":
         path = export_mjcf(house, catalogue, args.out, lit=lit)
-    elif args.what == "usd":
-        from embodied.scene.usd import export_usd
-
-        if lit is None:
-            raise ValueError("USD is written of a lit house; leave --light none out")
+    elif args.what == "usd" and lit is not None:
         path = export_usd(house, lit, args.out)
     elif lit is None:
         path = export_glb(house, catalogue, args.out, ceilings=not args.no_ceilings)

@@ -7,6 +7,7 @@ says what it is, as the extras of the glTF do (embodied.scene.web).
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import tempfile
 from pathlib import Path
@@ -22,19 +23,28 @@ from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.web import JPEG_QUALITY, about
 
 
-def export_usd(house: House, lit: LitPages, path: Path) -> Path:
-    """Write the house with its baked light as one USDZ file.
+def check_usd(path: Path) -> None:
+    """Whether USD can be written to `path`; to be asked before a house is lit for it.
 
     Raises:
       UnableError: OpenUSD is not installed.
       ValueError: the name does not end in .usdz.
     """
-    try:
-        from pxr import Sdf, Usd, UsdGeom, UsdUtils
-    except ImportError as e:
-        raise UnableError("USD needs OpenUSD; install it with: pip install 'embodied-houses[usd]'") from e
     if Path(path).suffix != ".usdz":
         raise ValueError(f"{path} should end in .usdz: the house and its pages are one file")
+    if importlib.util.find_spec("pxr") is None:
+        raise UnableError("USD needs OpenUSD; install it with: pip install 'embodied-houses[usd]'")
+
+
+def export_usd(house: House, lit: LitPages, path: Path) -> Path:
+    """Write the house with its baked light as one USDZ file.
+
+    Raises:
+      UnableError, ValueError: as `check_usd`.
+    """
+    check_usd(path)
+    from pxr import Sdf, Usd, UsdGeom, UsdUtils
+
     with tempfile.TemporaryDirectory() as folder:
         stage = Usd.Stage.CreateNew(str(Path(folder) / "house.usdc"))
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
