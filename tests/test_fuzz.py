@@ -25,7 +25,7 @@ from agents.bandit import store
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
 from agents.bandit.store import load_translator, save_weights
-from agents.bandit.training import Material
+from agents.bandit.training import NumberedCorpus
 from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
 from agents.hanna.agent import load_agent, new_agent, save_agent
 from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
@@ -156,7 +156,7 @@ def _write_others(folder: Path) -> None:
     executor = hari.new_executor(execution, FeatureWords(("action/go", "action/stop", "room/hall")))
     hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
     words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
-    material = Material(BanditConfig(hidden_size=8), {}, (words, words), "", "")
+    material = NumberedCorpus(BanditConfig(hidden_size=8), {}, (words, words), "", "")
     save_weights(Translator(4, 4, 8), material, folder / "translator.safetensors")
 
 
