@@ -65,15 +65,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--no-rooms", action="store_true", help="requests name no room: any such thing in the house will do (VNLA)"
     )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
-    parser.add_argument(
-        "--panoramas",
-        choices=QUALITIES[:5],
-        help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
-        "that are there already, else fast; hari: none)",
-    )
-    parser.add_argument(
-        "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
-    )
+    _add_drawing(parser)
     parser.add_argument(
         "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
     )
@@ -84,6 +76,18 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
+
+
+def _add_drawing(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--panoramas",
+        choices=QUALITIES[:5],
+        help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
+        "that are there already, else fast; hari: none)",
+    )
+    parser.add_argument(
+        "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

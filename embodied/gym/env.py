@@ -37,7 +37,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.playground import Playground, make_playground
+from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
@@ -295,19 +295,17 @@ def set_stage(kind: str, **settings: Any) -> Stage:
     """
     wanted = StageSettings(**settings)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
-    play = make_playground(
-        kind,
-        Path(wanted.data) if wanted.data else None,
-        wanted.split,
-        seed=wanted.seed,
-        cache=where,
-        worlds=wanted.worlds,
-        pictures=wanted.pictures,
-        sees=seen,
-        rules=wanted.rules,
-        rooms=wanted.rooms,
-        hari=wanted.hari,
-    )
+    asked: dict[str, Any] = {
+        "cache": where,
+        "worlds": wanted.worlds,
+        "pictures": wanted.pictures,
+        "sees": seen,
+        "variants": Variants(wanted.rules, wanted.rooms, wanted.hari),
+    }
+    if wanted.data:
+        play = split_playground(kind, Path(wanted.data), wanted.split, **asked)
+    else:
+        play = flat_playground(kind, wanted.seed, **asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or SpaceLayout(descriptions=kind == "hari", stack=max(SpaceLayout.stack, wanted.hari.stack))
     return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout)

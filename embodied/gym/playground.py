@@ -47,53 +47,98 @@ class Playground:
     """(nodes, 36, D) float32 by world; empty when not asked for."""
 
 
-def make_playground(
+@dataclass(frozen=True)
+class Variants:
+    """Of the kinds of task that can be played in several ways."""
+
+    vnla: str = AS_PUBLISHED
+    """VNLA's rule of play."""
+    rooms: bool = True
+    """Whether VNLA's requests in a generated flat name the room."""
+    hari: HariRules = AS_PRINTED
+
+
+def split_playground(
     kind: str,
-    data: Path | None,
+    data: Path,
     split: str,
     *,
-    seed: int,
     cache: Path,
     worlds: Mapping[str, SeenPlace] | None = None,
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
-    rules: str = AS_PUBLISHED,
-    rooms: bool = True,
-    hari: HariRules = AS_PRINTED,
+    variants: Variants = Variants(),
 ) -> Playground:
-    """A split of a data set, or one flat generated from `seed` where `data` is None.
+    """A split of a data set.
 
     Args:
-      pictures: how the houses are drawn; as the data set's pictures are, or 'fast', where not given.
+      pictures: how the houses are drawn; as the data set's pictures are where not given.
       sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
-      rules, rooms: VNLA's rule of play, and whether the requests in a generated flat name the room.
-      hari: variants of HARI.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
     """
-    catalogue = load_catalogue(cache)
-    if data is None:
-        drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
-        worlds, tasks, make_env = _flat(
-            kind, seed, cache, catalogue, worlds, drawn, rules=rules, rooms=rooms, hari=hari
+    catalogue, whole = load_catalogue(cache), Dataset(data)
+    if whole.kind != kind:
+        raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
+    if (rooms := variants.rooms) != whole.config.rooms:
+        raise ValueError(
+            f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
         )
-    else:
-        whole = Dataset(data)
-        if whole.kind != kind:
-            raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
-        if rooms != whole.config.rooms:
-            raise ValueError(
-                f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
-            )
-        if worlds is None:
-            names = whole.names(split)
-            drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
-            worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-        chosen = whole.split(split, worlds=worlds, vnla=rules, hari=hari)
-        tasks, make_env = chosen.tasks, chosen.make_env
-    features = {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
-    return Playground(worlds, tasks, make_env, features)
+    if worlds is None:
+        names = whole.names(split)
+        drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
+        worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
+    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari)
+    return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, cache, sees))
+
+
+def flat_playground(
+    kind: str,
+    seed: int,
+    *,
+    cache: Path,
+    worlds: Mapping[str, SeenPlace] | None = None,
+    pictures: PictureSettings | None = None,
+    sees: Sequence[str] = ("oracle",),
+    variants: Variants = Variants(),
+) -> Playground:
+    """One world (generated from `seed` unless given) and tasks in it.
+
+    In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
+
+    Args:
+      pictures: how the flat is drawn; 'fast' where not given.
+      sees: as for `split_playground`.
+    """
+    catalogue = load_catalogue(cache)
+    language: Language = PlainLanguage() if worlds is not None else People(tries=1)
+    paths = None
+    if worlds is None:
+        name = f"flat_{seed}"
+        house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
+        if kind == "hanna":
+            met = meet(house, graph, catalogue, seed=seed)
+            paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
+            house = add_people(house, met, (p[0] for p in paths))
+        drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
+        worlds = {name: open_world(house, catalogue, cache, graph=graph, pictures=drawn)}
+    name, world = next(iter(worlds.items()))
+    routes: tuple[Route, ...] = ()
+    if kind in ("hanna", "vln"):
+        paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
+        routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
+    part = "main_unseen" if kind == "hari" else "main"
+    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
+    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari)
+    played = tasks_under(kind, tasks, worlds, variants.vnla, variants.hari)
+    return Playground(worlds, played, make_env, _oracle(worlds, catalogue, cache, sees))
+
+
+def _oracle(
+    worlds: Mapping[str, SeenPlace], catalogue: Catalogue, cache: Path, sees: Sequence[str]
+) -> Mapping[str, np.ndarray]:
+    return {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
 
 
 def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> PictureSettings:
@@ -137,40 +182,3 @@ def _npy(array: np.ndarray) -> bytes:
     out = io.BytesIO()
     np.save(out, array, allow_pickle=False)
     return out.getvalue()
-
-
-def _flat(
-    kind: str,
-    seed: int,
-    cache: Path,
-    catalogue: Catalogue,
-    worlds: Mapping[str, SeenPlace] | None,
-    pictures: PictureSettings,
-    *,
-    rules: str,
-    rooms: bool,
-    hari: HariRules,
-) -> tuple[Mapping[str, SeenPlace], tuple[Task, ...], Callable[[], HelpEnv]]:
-    """One world (generated unless given), tasks in it, and a maker of environments.
-
-    In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
-    """
-    language: Language = PlainLanguage() if worlds is not None else People(tries=1)
-    paths = None
-    if worlds is None:
-        name = f"flat_{seed}"
-        house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
-        if kind == "hanna":
-            met = meet(house, graph, catalogue, seed=seed)
-            paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
-            house = add_people(house, met, (p[0] for p in paths))
-        worlds = {name: open_world(house, catalogue, cache, graph=graph, pictures=pictures)}
-    name, world = next(iter(worlds.items()))
-    routes: tuple[Route, ...] = ()
-    if kind in ("hanna", "vln"):
-        paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
-        routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
-    part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=rooms)[part]
-    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=rules, hari=hari)
-    return worlds, tasks_under(kind, tasks, worlds, rules, hari), make_env
