@@ -238,11 +238,14 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
 def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monkeypatch):
     from embodied.cli import doctor
 
-    def fail(_):
-        for _ in tqdm(range(3), "panoramas", file=sys.stderr):
+    def drawn():
+        yield from tqdm(range(3), "panoramas", file=sys.stderr)
+
+    def write(panoramas) -> None:
+        for _ in panoramas:  # which the traceback keeps, and with it the bar
             raise OSError(errno.ENOSPC, "No space left on device", "/x/a.pano")
 
-    monkeypatch.setattr(doctor, "run", fail)
+    monkeypatch.setattr(doctor, "run", lambda _: write(drawn()))
     assert cli.main(["doctor"]) == 2
     *_, last, end = capsys.readouterr().err.split("\n")
     assert last.startswith("error: /x/a.pano: No space left on device") and not end
