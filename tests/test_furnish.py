@@ -68,8 +68,20 @@ def furnished(seed: int, area: tuple[float, float]) -> House:
     return furnish(draft, catalogue(), seed=seed)
 
 
+AREAS = ((45, 55), (70, 90), (110, 130), (160, 200), (240, 280), (350, 400))
+FEW = 3
+"""Of the houses that are looked at in the whole suite, those that `-m "not slow"` looks at, too."""
+
+
 def houses() -> list[House]:
-    return [furnished(s, a) for s, a in enumerate([(45, 55), (70, 90), (110, 130), (160, 200), (240, 280), (350, 400)])]
+    return [furnished(s, a) for s, a in enumerate(AREAS)]
+
+
+@pytest.fixture(scope="module", params=["few", pytest.param("more", marks=pytest.mark.slow)])
+def some(request) -> list[House]:
+    """The smaller houses, and in the whole suite the others, too."""
+    chosen = range(FEW) if request.param == "few" else range(FEW, len(AREAS))
+    return [furnished(s, AREAS[s]) for s in chosen]
 
 
 @functools.cache
@@ -101,14 +113,14 @@ BASINS = ("washbasin", "wall washbasin", "bathroom vanity", "double vanity")
 
 
 @pytest.mark.slow
-def test_every_house_is_a_valid_house_that_survives_json():
-    for house in houses():
+def test_every_house_is_a_valid_house_that_survives_json(some):
+    for house in some:
         check(house)
         assert House.from_json(house.to_json()).digest == house.digest
 
 
-def test_what_has_a_parent_lies_exactly_on_one_of_its_surfaces():
-    for house in houses():
+def test_what_has_a_parent_lies_exactly_on_one_of_its_surfaces(some):
+    for house in some:
         for p in house.placements:
             if p.parent is None:
                 continue
@@ -125,8 +137,8 @@ def test_what_has_a_parent_lies_exactly_on_one_of_its_surfaces():
             assert surface.y0 * ky - 0.01 <= v <= surface.y1 * ky + 0.01, p.id
 
 
-def test_what_has_no_parent_stands_on_the_floor_hangs_on_a_wall_or_under_the_ceiling():
-    for house in houses():
+def test_what_has_no_parent_stands_on_the_floor_hangs_on_a_wall_or_under_the_ceiling(some):
+    for house in some:
         for p in house.placements:
             if p.parent is not None:
                 continue
@@ -146,7 +158,7 @@ def test_what_has_no_parent_stands_on_the_floor_hangs_on_a_wall_or_under_the_cei
             assert gap < 0.03, f"{p.id} floats {gap:.3f} m from the wall"
 
 
-def test_objects_do_not_interpenetrate():
+def test_objects_do_not_interpenetrate(some):
     chairs_under = (
         "dining table",
         "bistro table",
@@ -158,7 +170,7 @@ def test_objects_do_not_interpenetrate():
         "drafting table",
         "bar table",
     )
-    for house in houses():
+    for house in some:
         for room in house.rooms:
             things = [p for p in house.placements if p.room == room.id and not (p.size[2] <= 0.03 and not p.parent)]
             boxes = [box_of(p) for p in things]
@@ -170,8 +182,8 @@ def test_objects_do_not_interpenetrate():
                     assert tucked, f"{p.id} meets {q.id} in {house.seed} {room.id}"
 
 
-def test_objects_stay_between_the_walls_of_their_room():
-    for house in houses():
+def test_objects_stay_between_the_walls_of_their_room(some):
+    for house in some:
         for p in house.placements:
             room = house.room_by_id[p.room]
             storey = house.storey_of(room)
@@ -180,8 +192,8 @@ def test_objects_stay_between_the_walls_of_their_room():
             assert p.position[2] + p.size[2] <= storey.elevation + storey.height + 2e-3, p.id
 
 
-def test_nothing_stands_in_a_doorway_or_before_a_window():
-    for house in houses():
+def test_nothing_stands_in_a_doorway_or_before_a_window(some):
+    for house in some:
         for room in house.rooms:
             for wall in room_space(house, room).walls:
                 for s0, s1, o in wall.openings:
@@ -197,11 +209,11 @@ def test_nothing_stands_in_a_doorway_or_before_a_window():
                             assert not overlap(free, box_of(p)), f"{p.id} blocks {o.id} in {house.seed}"
 
 
-def test_one_walks_from_every_door_of_a_room_to_every_other():
+def test_one_walks_from_every_door_of_a_room_to_every_other(some):
     """A raster of its own: free floor eroded by 0.2 m, furniture as it was placed."""
     from scipy import ndimage
 
-    for house in houses():
+    for house in some:
         for room in house.rooms:
             floor = house.floor(room)
             blocked = [
@@ -283,9 +295,9 @@ def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monk
     )
 
 
-def test_worktops_of_all_kitchens_are_in_use():
+def test_worktops_of_all_kitchens_are_in_use(some):
     worktops = ("base cabinet", "drawer cabinet", "kitchen sink", "cooker", "kitchen island")
-    for house in houses():
+    for house in some:
         for room in house.rooms:
             if room.kind == "kitchen":
                 carriers = {p.id for p in house.placements if p.room == room.id and p.object_class in worktops}
@@ -293,9 +305,9 @@ def test_worktops_of_all_kitchens_are_in_use():
                 assert len(things) >= 4, (house.seed, room.id, things)
 
 
-def test_no_picture_hangs_twice_while_there_are_others():
+def test_no_picture_hangs_twice_while_there_are_others(some):
     """The framed print and the poster of one image are the same picture."""
-    for house in houses():
+    for house in some:
         hung = [
             p.asset.rsplit("/", 1)[-1].removeprefix("paper_")
             for p in house.placements
@@ -306,6 +318,7 @@ def test_no_picture_hangs_twice_while_there_are_others():
         assert max(map(hung.count, hung)) == 1 or len(hung) > 60, house.seed
 
 
+@pytest.mark.slow
 def test_beds_have_their_head_at_a_wall():
     found = 0
     for house in houses():
@@ -316,6 +329,7 @@ def test_beds_have_their_head_at_a_wall():
     assert found >= 15
 
 
+@pytest.mark.slow
 def test_a_sofa_that_shares_a_group_with_a_television_faces_it():
     found = 0
     for house in [*houses(), *(one_room("living_room", s) for s in range(6))]:
@@ -329,8 +343,8 @@ def test_a_sofa_that_shares_a_group_with_a_television_faces_it():
     assert found >= 8
 
 
-def test_chairs_look_at_their_table():
-    for house in houses():
+def test_chairs_look_at_their_table(some):
+    for house in some:
         for chair in of_class(house, "dining chair"):
             tables = [p for p in of_class(house, "dining table", "bistro table") if p.group == chair.group]
             for table in tables:
@@ -342,6 +356,7 @@ def test_chairs_look_at_their_table():
                 assert solid.distance(shapely.Point(ahead)) < solid.distance(shapely.Point(behind)), chair.id
 
 
+@pytest.mark.slow
 def test_a_large_house_holds_at_least_250_objects_and_a_middle_one_at_least_130():
     assert len(furnished(5, (350, 400)).placements) >= 250
     assert len(furnished(2, (110, 130)).placements) >= 130

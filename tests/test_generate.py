@@ -30,14 +30,24 @@ from embodied.house.validation import STYLES
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import stream
 
-SEEDS = 24
+SEEDS, FEW = 24, 6
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 PRIVATE = (*BEDROOMS, "bathroom", "toilet", "closet", "pantry")
 
 
 @functools.cache
+def house_of(seed: int) -> House:
+    return generate_house(seed, stages=BARE)
+
+
 def houses() -> tuple[House, ...]:
-    return tuple(generate_house(seed, stages=BARE) for seed in range(SEEDS))
+    return tuple(house_of(seed) for seed in range(SEEDS))
+
+
+@pytest.fixture(scope="module", params=["few", pytest.param("more", marks=pytest.mark.slow)])
+def some(request) -> tuple[House, ...]:
+    """The first houses, and in the whole suite the others, too."""
+    return tuple(house_of(seed) for seed in (range(FEW) if request.param == "few" else range(FEW, SEEDS)))
 
 
 def polygon(room: Room) -> shapely.Polygon:
@@ -54,34 +64,34 @@ def doors_of(house: House) -> dict[str, set[str]]:
 
 
 @pytest.mark.slow
-def test_every_house_passes_check_and_survives_json():
-    for house in houses():
+def test_every_house_passes_check_and_survives_json(some):
+    for house in some:
         check(house)
         assert House.from_json(house.to_json()) == house
 
 
-def test_rooms_tile_the_footprint_without_gaps():
-    for house in houses():
+def test_rooms_tile_the_footprint_without_gaps(some):
+    for house in some:
         union = shapely.union_all([polygon(r) for r in house.rooms])
         assert union.geom_type == "Polygon" and not union.interiors
         assert union.area == pytest.approx(sum(polygon(r).area for r in house.rooms), abs=1e-6)
 
 
-def test_corners_lie_on_the_tenth_of_a_metre():
-    for house in houses():
+def test_corners_lie_on_the_tenth_of_a_metre(some):
+    for house in some:
         corners = np.concatenate([r.polygon for r in house.rooms])
         assert np.allclose(corners * 10, np.round(corners * 10), atol=1e-6)
 
 
 @pytest.mark.slow
-def test_every_room_can_be_entered_on_foot_past_the_open_leaves():
-    for house in houses():
+def test_every_room_can_be_entered_on_foot_past_the_open_leaves(some):
+    for house in some:
         assert unreachable_rooms(house) == ()
 
 
-def test_nobody_crosses_a_bedroom_or_a_bath_to_reach_another_room():
+def test_nobody_crosses_a_bedroom_or_a_bath_to_reach_another_room(some):
     """Take away a private room: only rooms it owns (an ensuite, a closet) may be cut off with it."""
-    for house in houses():
+    for house in some:
         ways = doors_of(house)
         start = next(r.id for r in house.rooms if r.kind == "hall")
         kinds = {r.id: r.kind for r in house.rooms}
@@ -95,14 +105,14 @@ def test_nobody_crosses_a_bedroom_or_a_bath_to_reach_another_room():
             assert cut <= ({"bathroom", "closet"} if kinds[gone] in BEDROOMS else set()), (house.seed, gone, cut)
 
 
-def test_there_is_one_front_door_and_it_opens_into_the_hall():
-    for house in houses():
+def test_there_is_one_front_door_and_it_opens_into_the_hall(some):
+    for house in some:
         front = [o for o in house.openings if o.kind == "front_door"]
         assert len(front) == 1 and house.room_by_id[front[0].rooms[0]].kind == "hall"
 
 
-def test_windows_keep_clear_of_the_ends_of_inner_walls():
-    for house in houses():
+def test_windows_keep_clear_of_the_ends_of_inner_walls(some):
+    for house in some:
         corners = np.concatenate([r.polygon for r in house.rooms])
         for o in house.openings:
             if o.kind in ("window", "french_window"):
@@ -110,6 +120,7 @@ def test_windows_keep_clear_of_the_ends_of_inner_walls():
                 assert min(window.distance(shapely.Point(c)) for c in corners) > house.inner_wall / 2
 
 
+@pytest.mark.slow
 def test_rooms_to_live_in_have_daylight():
     dark = total = 0
     for house in houses():
@@ -121,8 +132,8 @@ def test_rooms_to_live_in_have_daylight():
     assert dark <= 0.01 * total
 
 
-def test_bedrooms_open_off_halls_and_corridors_except_in_flats():
-    for house in houses():
+def test_bedrooms_open_off_halls_and_corridors_except_in_flats(some):
+    for house in some:
         ways = doors_of(house)
         kinds = {r.id: r.kind for r in house.rooms}
         for r in house.rooms:
@@ -130,6 +141,7 @@ def test_bedrooms_open_off_halls_and_corridors_except_in_flats():
                 assert any(kinds[n] in ("hall", "corridor") for n in ways[r.id]), (house.seed, r.id)
 
 
+@pytest.mark.slow
 def test_rooms_have_the_proportions_of_rooms_and_corridors_their_width():
     ratios = []
     for house in houses():
@@ -145,11 +157,13 @@ def test_rooms_have_the_proportions_of_rooms_and_corridors_their_width():
     assert np.quantile(ratios, 0.95) < 2.2
 
 
+@pytest.mark.slow
 def test_circulation_takes_a_tenth_to_a_sixth_of_most_houses():
     shares = [sum(polygon(r).area for r in h.rooms if r.kind in ("hall", "corridor")) / h.area for h in houses()]
     assert 0.07 < np.median(shares) < 0.16
 
 
+@pytest.mark.slow
 def test_sizes_fit_the_table_of_usual_rooms():
     areas: dict[str, list[float]] = {}
     for house in houses():
@@ -166,12 +180,14 @@ def test_sizes_fit_the_table_of_usual_rooms():
         assert low < np.median(areas[kind]) < high, kind
 
 
+@pytest.mark.slow
 def test_at_least_sixteen_room_kinds_occur_and_all_are_known():
     kinds = {r.kind for house in houses() for r in house.rooms}
     assert len(kinds) >= 16
     assert kinds <= set(ROOM_KINDS)
 
 
+@pytest.mark.slow
 def test_wide_houses_are_not_all_rectangles():
     corners = [
         len(shapely.union_all([polygon(r) for r in h.rooms]).simplify(1e-6).exterior.coords) - 1 for h in houses()
@@ -204,6 +220,7 @@ def test_asked_rooms_are_counted_as_in_advertisements():
     assert sum(r.kind in BEDROOMS for r in house.rooms) == 4
 
 
+@pytest.mark.slow
 def test_living_rooms_mostly_look_south():
     south = 0
     for house in houses():
@@ -217,8 +234,8 @@ def test_every_style_has_a_taste():
     assert tuple(TASTES) == STYLES
 
 
-def test_palettes_use_known_materials_and_one_style_per_house():
-    for house in houses():
+def test_palettes_use_known_materials_and_one_style_per_house(some):
+    for house in some:
         assert house.style in STYLES
         for r in house.rooms:
             keys = [r.floor_finish, r.wall_finish, r.ceiling_finish, r.skirting_finish]
@@ -229,8 +246,8 @@ def test_palettes_use_known_materials_and_one_style_per_house():
         assert len(floors) == 1
 
 
-def test_an_accent_wall_has_neither_door_nor_window():
-    for house in houses():
+def test_an_accent_wall_has_neither_door_nor_window(some):
+    for house in some:
         for r in house.rooms:
             if r.accent_wall is not None:
                 corners = [*r.polygon, r.polygon[0]]
@@ -279,9 +296,10 @@ def test_the_same_seed_gives_the_same_house_in_another_process():
     )
     env = {"PYTHONHASHSEED": "4711", "PATH": ""}
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
-    assert out.stdout.split() == [houses()[3].digest, houses()[17].digest]
+    assert out.stdout.split() == [house_of(3).digest, house_of(17).digest]
 
 
+@pytest.mark.slow
 def test_different_seeds_give_different_houses():
     assert len({h.digest for h in houses()}) == SEEDS
 
@@ -339,7 +357,7 @@ def test_every_kind_of_room_that_is_drawn_stands_in_the_table_of_kinds():
 
 
 def test_a_wardrobe_in_the_doorway_is_cleared_away_with_what_lies_on_it():
-    house = houses()[1]
+    house = house_of(1)
     door = next(o for o in house.openings if o.kind == "door" and house.room_by_id[o.rooms[0]].kind in BEDROOMS)
     x, y = (np.add(door.a, door.b) / 2).tolist()
     block = Placement("wardrobe_1", "a/b", "wardrobe", door.rooms[0], (x, y, 0.0), 0.0, (1.2, 1.2, 2.0))
