@@ -41,6 +41,8 @@ def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[
       ValueError: truncated, of another format, or changed since it was written.
     """
     path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist; name another file, or {remedy}")
     tensors = read_weights(path)
     with safetensors.safe_open(path, "pt") as f:
         about = dict(f.metadata() or {})

@@ -325,6 +325,12 @@ def test_weights_beside_settings_that_cannot_be_are_refused(read, form, about, m
         read(tmp_path / "a.safetensors")
 
 
+@pytest.mark.parametrize("read", [hari.load_agent, load_agent, load_translator])
+def test_weights_that_are_not_there_say_how_they_are_made(read, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"none\.safetensors does not exist; name another file, or .*train"):
+        read(tmp_path / "none.safetensors")
+
+
 @pytest.mark.parametrize("offset", [8, 10])
 def test_strips_in_an_archive_that_says_it_is_packed_otherwise_are_refused(offset, kinds):
     """A flip in the directory of a .npz: another way of packing, or 'encrypted'."""

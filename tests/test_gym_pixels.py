@@ -127,7 +127,7 @@ def test_the_store_keeps_to_its_budget_and_gives_the_same_pictures(world):
     assert (store.at(Sight(world.name, 0)).rgb == first).all()
 
 
-@pytest.mark.parametrize("sees", ["touch", ("rgb", "rgb"), (), ("rgb", "smell")])
+@pytest.mark.parametrize("sees", ["touch", ("rgb", "rgb"), (), ("rgb", "smell"), None, 3, ("rgb", ["depth"])])
 def test_what_cannot_be_seen_is_refused_with_what_can(sees, tmp_path):
     with pytest.raises(ValueError, match="sees should be one or several of .*oracle"):
         embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, sees=sees)

@@ -223,7 +223,7 @@ def checked_sees(sees: str | Sequence[str]) -> tuple[str, ...]:
     Raises:
       ValueError: something that cannot be seen, nothing, or the same twice.
     """
-    chosen = (sees,) if isinstance(sees, str) else tuple(sees)
-    if not chosen or set(chosen) - set(SEES) or len(set(chosen)) < len(chosen):
+    chosen = (sees,) if isinstance(sees, str) or not isinstance(sees, Sequence) else tuple(sees)
+    if not chosen or any(name not in SEES for name in chosen) or len(set(chosen)) < len(chosen):
         raise ValueError(f"sees should be one or several of {SEES}, each once, got {sees!r}")
     return chosen
