@@ -347,6 +347,18 @@ def test_vnlas_goals_of_a_task_lie_in_rooms_of_one_letter(folders):
     assert set(region.values()) <= letters
 
 
+@pytest.mark.parametrize("prefix", ["asknav", "noroom"])
+def test_vnlas_vocabulary_holds_every_training_word_once_behind_the_special_ones(prefix, folders):
+    """It is read before the words of sub-goals; a word that is missing is read as unknown without a word of it."""
+    home = folders / f"vnla/data/{prefix}"
+    words = (home / "train_vocab.txt").read_text().split("\n")[:-1]
+    assert words[:3] == ["<PAD>", "<UNK>", "<EOS>"] and len(words) == len(set(words))
+    said = {w for i in read(home / f"{prefix}_train.json") for t in i["instructions"] for w in t.split()}
+    assert said == set(words[3:])
+    longest = max(len(t.split()) for i in read(home / f"{prefix}_train.json") for t in i["instructions"])
+    assert longest + 20 < 50, "with a sub-goal before it and the end behind it: it takes a full line for an empty one"
+
+
 def test_vnlas_words_of_sub_goals_cover_what_the_advisor_says(data_sets, folders):
     from embodied.language import PlainLanguage
 

@@ -256,6 +256,9 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     with pytest.raises(CheckpointError, match="hidden_size 24 -> 32|settings changed"):
         agent, training, validation = lesson(dataclasses.replace(TINY, batch=5))
         train(agent, training, validation, tmp_path / "parts", note=quiet)
+    with pytest.raises(CheckpointError, match="learned from pictures unlit_192, the data set has fast_256"):
+        agent, training, validation = lesson(dataclasses.replace(TINY, iterations=5))
+        train(dataclasses.replace(agent, pictures="fast_256"), training, validation, tmp_path / "parts", note=quiet)
 
 
 def test_an_agent_comes_back_from_its_file(tmp_path):

@@ -82,6 +82,14 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}, "what is done is not done again"
 
 
+@pytest.mark.parametrize("rules", ["algorithm-6", "goal-aware"])
+def test_a_rule_of_play_is_chosen_on_the_command_line(rules, data, capsys):
+    words = ("eval", "vnla", "--data", data.folder, "--rules", rules, "--agent", "shortest", "--tasks", 4, "--json")
+    assert run(*words) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert row["values"]["success"]["mean"] == 1
+
+
 def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
     other = build(tmp_path / "data", tmp_path / "cache", "find")
     assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2

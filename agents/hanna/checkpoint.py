@@ -9,17 +9,9 @@ import torch
 from agents.hanna.agent import HannaAgent
 from agents.imitation.checkpoint import load_run, save_run
 from agents.imitation.loop import Progress
+from agents.imitation.settings import MAY_CHANGE
 
 FORMAT = "embodied-checkpoint-1"
-MAY_CHANGE = (
-    "iterations",
-    "cooldown",
-    "checkpoint_minutes",
-    "evaluation_batch",
-    "evaluation_temperature",
-    "ask_threshold",
-)
-"""Settings that may differ on resuming without changing what was learned so far."""
 
 
 def save_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimizer, progress: Progress) -> None:

@@ -18,7 +18,7 @@ from agents.imitation.settings import (
     NOT_ALL,
     NOT_NEGATIVE,
     SHARE,
-    ValidatedRunSettings,
+    ImitationSettings,
     require,
     require_word,
 )
@@ -28,7 +28,7 @@ MODELS = ("hanna", "lstm")
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingConfig(ValidatedRunSettings):
+class TrainingConfig(ImitationSettings):
     """The defaults are Table D.1; SCALES holds the smaller settings."""
 
     model: str = "hanna"
@@ -47,24 +47,14 @@ class TrainingConfig(ValidatedRunSettings):
     """Share of units that are silent in training."""
     iterations: int = 30_000
     """Updates of the weights."""
-    cooldown: float = 0.0
-    """The last share of the updates, over which the learning rate falls linearly to zero (docs/sources.md, S32)."""
-    weight_decay: float = 5e-4
-    """The authors' program's; the text does not mention it (docs/sources.md, S28)."""
-    training_houses: int = 0
-    """Learn from so many of the data set's training houses; 0: from all."""
     training_steps: int = 20
     """Horizon of training episodes."""
-    instruction_length: int = 50
-    """Words of an instruction that are read."""
     alpha: float = 1.0
     """Weight of the curiosity-encouraging loss; 0: ablation. The authors: 0.5 with ask rules other than 'learned'."""
     curiosity_floor: float = 0.0
     """Mistakes less likely than this are not pushed down further; 0: Eq 4.13, without bound (docs/sources.md, S34)."""
     evaluation_steps: int = 50
     """Horizon of episodes that are judged."""
-    evaluation_batch: int = 32
-    """Has no influence on results here, only on speed."""
     ask_rule: str = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
     guided_asking: float = 0.0
@@ -80,26 +70,16 @@ class TrainingConfig(ValidatedRunSettings):
     """False: ablation of Table D.2 (beta = 0)."""
     turn_to_agent: bool = True
     """Views in the agent's frame; False: in absolute order, as in the authors' program (docs/sources.md, S29)."""
-    environment_dropout: float = 0.0
-    """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35)."""
-    evaluation_temperature: float = 0.0
-    """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
-    the distribution, between them it is sharpened. An agent that is often wrong and always takes its
-    likeliest action walks in circles (docs/sources.md, S36)."""
-    ask_threshold: float = 0.5
-    """When judged, the learned rule asks where REQUEST is more probable than this."""
-    validation_tasks: int = 200
-    """Tasks of each validation."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "model", MODELS)
         require_word(self, "ask_rule", tuple(sorted(RULES)))
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
-        require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps", "evaluation_batch", "instruction_length")
-        require(self, NOT_NEGATIVE, "alpha", "weight_decay", "evaluation_temperature", "training_houses")
-        require(self, NOT_ALL, "dropout", "environment_dropout", "curiosity_floor")
-        require(self, SHARE, "ask_threshold", "cooldown", "guided_asking")
+        require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps")
+        require(self, NOT_NEGATIVE, "alpha")
+        require(self, NOT_ALL, "dropout", "curiosity_floor")
+        require(self, SHARE, "guided_asking")
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""

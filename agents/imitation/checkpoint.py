@@ -81,8 +81,14 @@ def refuse_changes(
         )
 
 
-def save_run(path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
-    """Write the state of a run that trains `agent`, atomically; an interruption leaves the checkpoint before it."""
+def save_run(
+    path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.Optimizer, progress: Progress, pictures: str = ""
+) -> None:
+    """Write the state of a run that trains `agent`, atomically; an interruption leaves the checkpoint before it.
+
+    Args:
+      pictures: how the pictures were drawn that it learns from; '' leaves that out.
+    """
     body = {
         "config": agent.config.to_json(),
         "encoder": agent.encoder_digest,
@@ -90,21 +96,28 @@ def save_run(path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.
         "network": agent.network.state_dict(),
         "optimizer": optimizer.state_dict(),
         "progress": vars(progress),
+        **({"pictures": pictures} if pictures else {}),
     }
     write_checkpoint(path, kind, body)
 
 
 def load_run(
-    path: Path, kind: str, agent: TrainedAgent, optimizer: torch.optim.Optimizer, may_change: Collection[str]
+    path: Path,
+    kind: str,
+    agent: TrainedAgent,
+    optimizer: torch.optim.Optimizer,
+    may_change: Collection[str],
+    pictures: str = "",
 ) -> Progress:
     """Put a run back into `agent` and `optimizer` and say where it was.
 
     Args:
       may_change: settings that may differ without changing what was learned so far.
+      pictures: as in `save_run`.
 
     Raises:
       CheckpointError: truncated, of another version, or of a run with other settings, another
-        vocabulary or another encoder.
+        vocabulary, another encoder or other pictures.
     """
     fields = ("encoder", "vocabulary", "config", "network", "optimizer", "progress")
     body = read_checkpoint(Path(path), kind, fields)
@@ -112,6 +125,11 @@ def load_run(
         raise CheckpointError(
             f"{path}: this run learned from encoder {body['encoder'][:12]}, the data set has features of "
             f"{agent.encoder_digest[:12]}; use the same data set and encoder, or another run folder"
+        )
+    if body.get("pictures", pictures) != pictures:
+        raise CheckpointError(
+            f"{path}: this run learned from pictures {body['pictures']}, the data set has {pictures}; "
+            "say --quality, or use another run folder"
         )
     if tuple(body["vocabulary"]) != agent.vocabulary.words:
         raise CheckpointError(f"{path}: the data set has other words than this run began with; use another run folder")

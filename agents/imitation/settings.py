@@ -82,3 +82,47 @@ class ValidatedRunSettings(RunSettings):
         super().__post_init__()
         require(self, AT_LEAST_ONE, "iterations", "validate_every", "validation_tasks")
         require(self, POSITIVE, "learning_rate")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImitationSettings(ValidatedRunSettings):
+    """Of agents that look at features, imitate a teacher, and learn when to ask."""
+
+    cooldown: float = 0.0
+    """The last share of the updates, over which the learning rate falls to zero (docs/sources.md, S32, S113)."""
+    weight_decay: float = 5e-4
+    """The authors' programs'; the text does not mention it (docs/sources.md, S28)."""
+    training_houses: int = 0
+    """Learn from so many of the data set's training houses; 0: from all."""
+    environment_dropout: float = 0.0
+    """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
+    instruction_length: int = 50
+    """Words of an instruction that are read."""
+    evaluation_temperature: float = 0.0
+    """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
+    the distribution, between them it is sharpened. An agent that is often wrong and always takes its
+    likeliest action walks in circles (docs/sources.md, S36)."""
+    ask_threshold: float = 0.5
+    """When judged, the learned rule asks where asking is more probable than this."""
+    evaluation_batch: int = 32
+    """Has no influence on results here, only on speed."""
+    validation_tasks: int = 200
+    """Tasks of each validation."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "instruction_length", "evaluation_batch")
+        require(self, NOT_NEGATIVE, "weight_decay", "evaluation_temperature", "training_houses")
+        require(self, NOT_ALL, "environment_dropout")
+        require(self, SHARE, "cooldown", "ask_threshold")
+
+
+MAY_CHANGE = (
+    "iterations",
+    "cooldown",
+    "checkpoint_minutes",
+    "evaluation_batch",
+    "evaluation_temperature",
+    "ask_threshold",
+)
+"""Of ImitationSettings, those that may differ on resuming without changing what was learned so far."""

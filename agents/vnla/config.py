@@ -7,15 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.imitation.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    SHARE,
-    ValidatedRunSettings,
-    require,
-    require_word,
-)
+from agents.imitation.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
 from embodied.records import from_json
 
 ASKERS = ("none", "first", "random", "teacher", "learned")
@@ -38,7 +30,7 @@ ASK_RULES: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaSettings(ValidatedRunSettings):
+class VnlaSettings(ImitationSettings):
     """The defaults are the program's; SCALES holds smaller ones."""
 
     hidden_size: int = 512
@@ -57,34 +49,16 @@ class VnlaSettings(ValidatedRunSettings):
     """Share of units that are silent in training."""
     iterations: int = 100_000
     """Updates of the weights; the program's direct-mute agents: 70,000."""
-    cooldown: float = 0.0
-    """The last share of the updates, over which the learning rate falls linearly to zero (docs/sources.md, S113)."""
-    weight_decay: float = 5e-4
-    """Of Adam."""
     batch: int = 100
     """Episodes per update."""
-    training_houses: int = 0
-    """Learn from so many of the data set's training houses; 0: from all."""
-    instruction_length: int = 50
-    """Words of an instruction that are read, the end included."""
     asker: str = "learned"
     """Who decides when to ask, in training and when judged: 'none', 'first', 'random', 'teacher' or 'learned'."""
     ask_rules: str = "all"
     """Rules of the asking teacher: 'all', 'a and e' or 'b to d'."""
     rules: str = "indirect"
     """Rule of play that it is judged under: indirect, direct, direct-mute, goal-aware or algorithm-6."""
-    environment_dropout: float = 0.0
-    """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S113)."""
-    evaluation_temperature: float = 0.0
-    """How navigation actions are chosen when judged: 0 takes the likeliest, as the program; 1 draws."""
-    ask_threshold: float = 0.5
-    """When judged, the learned asker asks where asking is more probable than this."""
-    evaluation_batch: int = 64
-    """Has no influence on results here, only on speed."""
     validate_every: int = 1000
     """Updates between validations."""
-    validation_tasks: int = 200
-    """Tasks of each validation."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -92,10 +66,8 @@ class VnlaSettings(ValidatedRunSettings):
         require_word(self, "ask_rules", tuple(ASK_RULES))
         require_word(self, "rules", tuple(TRAINED_UNDER))
         require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
-        require(self, AT_LEAST_ONE, "budget_embedding", "coverage", "instruction_length", "evaluation_batch")
-        require(self, NOT_NEGATIVE, "weight_decay", "evaluation_temperature", "training_houses")
-        require(self, NOT_ALL, "dropout", "environment_dropout")
-        require(self, SHARE, "cooldown", "ask_threshold")
+        require(self, AT_LEAST_ONE, "budget_embedding", "coverage")
+        require(self, NOT_ALL, "dropout")
 
     def to_json(self) -> str:
         return json.dumps(dataclasses.asdict(self), sort_keys=True)
@@ -117,17 +89,7 @@ SCALES: dict[str, VnlaSettings] = {
         environment_dropout=0.4,
         instruction_length=40,
         validate_every=250,
-        validation_tasks=200,
     ),
     "paper": VnlaSettings(),
 }
 """'mini': some 20 minutes of one core; 'paper': the program's, for one GPU (docs/sources.md, S113)."""
-MAY_CHANGE = (
-    "iterations",
-    "cooldown",
-    "checkpoint_minutes",
-    "evaluation_batch",
-    "evaluation_temperature",
-    "ask_threshold",
-)
-"""Settings that may differ on resuming without changing what was learned so far."""

@@ -20,8 +20,9 @@ from agents.imitation.lessons import Split
 from agents.imitation.loop import Clock, Note, Progress, seed_of, tasks_of_update
 from agents.imitation.losses import negative_log_likelihood
 from agents.imitation.playing import play_remembering
+from agents.imitation.settings import MAY_CHANGE
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
-from agents.vnla.config import MAY_CHANGE, TRAINED_UNDER
+from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training
 from embodied.envs.vnla import teacher_of
 from embodied.evaluation import metrics
@@ -89,10 +90,10 @@ class VnlaLearner:
         save_agent(self.agent, path)
 
     def save(self, path: Path, progress: Progress) -> None:
-        save_run(path, FORMAT, self.agent, self.optimizer, progress)
+        save_run(path, FORMAT, self.agent, self.optimizer, progress, self.agent.pictures)
 
     def load(self, path: Path) -> Progress:
-        return load_run(path, FORMAT, self.agent, self.optimizer, MAY_CHANGE)
+        return load_run(path, FORMAT, self.agent, self.optimizer, MAY_CHANGE, self.agent.pictures)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 from embodied.cli.common import bar, note, show
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from embodied.evaluation.tables import Row
     from embodied.interface import Episode
 
 
@@ -44,18 +45,12 @@ def run_vnla(args: argparse.Namespace) -> int:
     from agents.vnla.agent import load_agent
     from agents.vnla.judging import COLUMNS, judge
     from agents.vnla.run import vnla_data
-    from embodied.evaluation.tables import as_json, markdown, save
-    from embodied.records import episodes_file, save_lines
 
     if args.agent == SHIPPED_AGENT:
         raise ValueError("no VNLA agent ships yet; name yours with --agent (`embodied train vnla`)")
     use_threads(args.threads)
     agent = load_agent(args.agent)
     lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality)
-
-    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
-        if args.out:
-            save_lines(Path(args.out) / episodes_file(split, name), episodes)
 
     rows = judge(
         lessons,
@@ -65,14 +60,10 @@ def run_vnla(args: argparse.Namespace) -> int:
         limit=args.tasks,
         batch=args.batch,
         only=args.only or (),
-        keep=keep,
+        keep=lambda split, name, episodes: _keep(args, split, name, episodes),
         watch=lambda agents: bar(agents, "agents", "agent"),
     )
-    if args.out:
-        save(rows, args.out, "table")
-        note(f"table and episodes in {args.out}")
-    facts = {"rows": json.loads(as_json(rows)), "rules": agent.config.rules, "learned from": agent.pictures}
-    show(args, facts, f"{markdown(rows, COLUMNS)}\nrules: {agent.config.rules}; learned from pictures {agent.pictures}")
+    _tell(args, rows, COLUMNS, {"rules": agent.config.rules, "learned from": agent.pictures})
     return 0
 
 
@@ -83,16 +74,10 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT
     from embodied.datasets.store import Dataset
-    from embodied.evaluation.tables import as_json, markdown, save
-    from embodied.records import episodes_file, save_lines
 
     if args.agent == SHIPPED_AGENT:
         raise ValueError("no HARI agent ships yet; name yours with --agent (`embodied train hari`)")
     use_threads(args.threads)
-
-    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
-        if args.out:
-            save_lines(Path(args.out) / episodes_file(split, name), episodes)
 
     rows = judge(
         Dataset(args.data),
@@ -101,11 +86,27 @@ def run_hari(args: argparse.Namespace) -> int:
         seed=args.seed,
         limit=args.tasks,
         only=args.only or (),
-        keep=keep,
+        keep=lambda split, name, episodes: _keep(args, split, name, episodes),
         watch=lambda agents: bar(agents, "agents", "agent"),
     )
+    _tell(args, rows, COLUMNS, {})
+    return 0
+
+
+def _keep(args: argparse.Namespace, split: str, name: str, episodes: Sequence[Episode]) -> None:
+    """Write the episodes of a row, where that is wanted."""
+    from embodied.records import episodes_file, save_lines
+
+    if args.out:
+        save_lines(Path(args.out) / episodes_file(split, name), episodes)
+
+
+def _tell(args: argparse.Namespace, rows: Sequence[Row], columns: Sequence[str], facts: Mapping[str, str]) -> None:
+    """Write and print the table, and facts about the agent."""
+    from embodied.evaluation.tables import as_json, markdown, save
+
     if args.out:
         save(rows, args.out, "table")
         note(f"table and episodes in {args.out}")
-    show(args, {"rows": json.loads(as_json(rows))}, markdown(rows, COLUMNS))
-    return 0
+    said = "".join(f"\n{name}: {value}" for name, value in facts.items())
+    show(args, {"rows": json.loads(as_json(rows)), **facts}, markdown(rows, columns) + said)
