@@ -78,7 +78,7 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     rooms = (tmp_path / "table_rooms.md").read_text()
     assert "| learned, trained with rooms |" in rooms
     before = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}
-    assert run(*words) == 0 and len(before) == 5
+    assert run(*words) == 0 and len(before) == 6
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}, "what is done is not done again"
 
 
