@@ -22,13 +22,27 @@ from embodied.navigation.graph import RADIUS, build_graph, from_matterport, grap
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 
 
+BARE_SEEDS, FURNISHED_SEEDS = range(6), range(100, 106)
+FEW = (0, 1, 100)
+"""Seeds of the houses that `-m "not slow"` looks at; the whole suite looks at the others, too."""
+
+
 @functools.cache
+def pair_of(seed: int):
+    """(house, graph): a bare or a furnished one."""
+    bare = seed in BARE_SEEDS
+    house = generate_house(seed, stages=BARE) if bare else generate_house(seed, catalogue=load_catalogue())
+    return house, build_graph(house)
+
+
 def pairs():
-    """(house, graph): bare and furnished ones."""
-    catalogue = load_catalogue()
-    houses = [generate_house(seed, stages=BARE) for seed in range(6)]
-    houses += [generate_house(seed, catalogue=catalogue) for seed in range(100, 106)]
-    return tuple((h, build_graph(h)) for h in houses)
+    return tuple(pair_of(seed) for seed in (*BARE_SEEDS, *FURNISHED_SEEDS))
+
+
+@pytest.fixture(scope="module", params=["few", pytest.param("more", marks=pytest.mark.slow)])
+def some(request):
+    others = sorted({*BARE_SEEDS, *FURNISHED_SEEDS} - {*FEW})
+    return tuple(pair_of(seed) for seed in (FEW if request.param == "few" else others))
 
 
 def line() -> tuple:
@@ -58,23 +72,23 @@ def test_two_rooms_are_joined_through_their_door():
 
 
 @pytest.mark.slow
-def test_every_room_has_a_node_in_it():
-    for house, graph in pairs():
+def test_every_room_has_a_node_in_it(some):
+    for house, graph in some:
         assert set(graph.room_of_node) == {r.id for r in house.rooms}
         for p, room in zip(graph.positions, graph.room_of_node):
             assert shapely.Polygon(house.room_by_id[room].polygon).distance(shapely.Point(p[:2])) < 1e-6
 
 
-def test_distance_is_a_metric():
-    for _, graph in pairs():
+def test_distance_is_a_metric(some):
+    for _, graph in some:
         d = graph.distance
         assert np.isfinite(d).all() and (d == d.T).all() and (np.diag(d) == 0).all()
         for k in range(len(d)):
             assert (d <= d[:, [k]] + d[[k], :] + 1e-9).all()
 
 
-def test_every_hop_is_an_edge_and_hops_add_up_to_the_distance():
-    for _, graph in pairs():
+def test_every_hop_is_an_edge_and_hops_add_up_to_the_distance(some):
+    for _, graph in some:
         lengths = {tuple(e): x for e, x in zip(graph.edges.tolist(), graph.lengths.tolist())}
         n = len(graph.ids)
         for i in range(0, n, 3):
@@ -84,8 +98,8 @@ def test_every_hop_is_an_edge_and_hops_add_up_to_the_distance():
                 assert total == pytest.approx(graph.distance[i, j])
 
 
-def test_each_edge_is_walkable_for_the_agents_radius_and_sees_its_other_end():
-    for house, graph in pairs():
+def test_each_edge_is_walkable_for_the_agents_radius_and_sees_its_other_end(some):
+    for house, graph in some:
         floor, sight = free_floor(house, 0), sight_floor(house, 0)
         for i, j in graph.edges:
             way = shapely.LineString(graph.positions[[i, j], :2])
@@ -93,6 +107,7 @@ def test_each_edge_is_walkable_for_the_agents_radius_and_sees_its_other_end():
             assert sight.covers(way), (house.seed, i, j)
 
 
+@pytest.mark.slow
 def test_edge_lengths_are_those_of_matterport3d():
     """Mean 2.27 m, median 2.06 m over the 90 public graphs (docs/sources.md, S8)."""
     lengths = np.concatenate([graph.lengths for _, graph in pairs()])
@@ -100,6 +115,7 @@ def test_edge_lengths_are_those_of_matterport3d():
     assert np.quantile(lengths, 0.95) < 5.0
 
 
+@pytest.mark.slow
 def test_viewpoints_have_choices():
     """A tree has degree 2; Matterport3D's graphs have about 4, ours lie between because rooms are smaller."""
     for _, graph in pairs():
@@ -115,7 +131,7 @@ def test_a_large_house_has_about_125_nodes():
 
 
 def test_the_graph_is_the_same_every_time():
-    house, graph = pairs()[-1]
+    house, graph = pair_of(100)
     again = build_graph(house)
     assert (again.positions == graph.positions).all() and (again.edges == graph.edges).all()
 
@@ -143,7 +159,7 @@ def test_a_shut_door_cuts_and_an_open_one_does_not():
 
 
 def test_connectivity_files_survive_the_round_trip(tmp_path):
-    house, graph = pairs()[0]
+    house, graph = pair_of(0)
     to_matterport(graph, house, tmp_path / "house_connectivity.json")
     items = json.loads((tmp_path / "house_connectivity.json").read_text())
     assert set(items[0]) >= {"image_id", "pose", "included", "visible", "unobstructed", "height"}
@@ -169,8 +185,8 @@ def test_visible_is_a_line_of_sight_over_furniture_and_through_doors_not_through
     assert (seen == seen.T).all() and not seen.diagonal().any()
 
 
-def test_one_sees_wherever_one_walks_and_further(tmp_path):
-    for number, (house, graph) in enumerate(pairs()):
+def test_one_sees_wherever_one_walks_and_further(some, tmp_path):
+    for number, (house, graph) in enumerate(some):
         path = tmp_path / f"{number}_connectivity.json"
         to_matterport(graph, house, path)
         items = json.loads(path.read_text())
