@@ -94,7 +94,7 @@ embodied.cli <- agents.shipped embodied.gl viz.sinks agents.imitation assets.imp
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
-    embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.failures
+    embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.iliad agents.failures
     agents.judging agents.study
 embodied.__main__ <- embodied.cli
 agents.shipped <-
@@ -111,6 +111,8 @@ agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teac
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
     embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
     embodied.locks
+agents.iliad <- agents.imitation embodied.action_spaces embodied.interface embodied.navigation embodied.teachers
+    embodied.evaluation agents.vision agents.hanna agents.tensor_file embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
 agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface

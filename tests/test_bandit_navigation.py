@@ -10,7 +10,8 @@ import pytest
 import torch
 from hand_worlds import grid_world
 
-from agents.bandit import navigation, runs
+from agents.bandit import navigation
+from agents.bandit.config import RUN_FORMAT
 from agents.bandit.navigation import (
     Decided,
     StateCritic,
@@ -141,7 +142,7 @@ def test_a_killed_run_goes_on_exactly(split, tmp_path, monkeypatch):
     again = agent_for(split)
     found = learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with=before, note=silent)
     assert fingerprint(again) == fingerprint(whole)
-    assert found == read_checkpoint(tmp_path / "whole" / "checkpoint.pt", runs.FORMAT)["history"]
+    assert found == read_checkpoint(tmp_path / "whole" / "checkpoint.pt", RUN_FORMAT)["history"]
     with pytest.raises(CheckpointError, match="agent"):
         learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with="other", note=silent)
 

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 import torch
 
-from agents.bandit import corpus, libreoffice, runs
-from agents.bandit.config import BanditConfig
+from agents.bandit import corpus, libreoffice
+from agents.bandit.config import RUN_FORMAT, BanditConfig
 from agents.bandit.corpus import CorpusError, Pair, Sizes
 from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
 from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct, run_study
 from agents.bandit.training import bandit, material, pretrain, teach_critic
-from agents.bandit.translate import batches, decode, drawn_with, greedy, padded, perplexity
+from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
 from agents.imitation.checkpoint import CheckpointError, read_checkpoint
+from agents.imitation.decoding import drawn_with
+from agents.imitation.runs import Run
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
@@ -286,7 +288,7 @@ def test_ratings_alone_improve_translations(data, trained, tmp_path):
 def weights(folder: Path) -> dict[str, torch.Tensor]:
     return {
         f"{k}.{n}": t
-        for k, m in read_checkpoint(folder / "checkpoint.pt", runs.FORMAT)["modules"].items()
+        for k, m in read_checkpoint(folder / "checkpoint.pt", RUN_FORMAT)["modules"].items()
         for n, t in m.items()
     }
 
@@ -299,17 +301,17 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     )
     rater = Rater(granularity=5, variance=0.5)
     whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
-    save = runs.Run.save
+    save = Run.save
 
     def killed(run, progress):
         save(run, progress)
         if progress.update == 13:
             raise SystemExit
 
-    monkeypatch.setattr(runs.Run, "save", killed)
+    monkeypatch.setattr(Run, "save", killed)
     with pytest.raises(SystemExit):
         bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
-    monkeypatch.setattr(runs.Run, "save", save)
+    monkeypatch.setattr(Run, "save", save)
     parts = bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
     assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [
         {k: v for k, v in p.items() if k != "seconds"} for p in whole

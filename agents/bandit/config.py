@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
 
 UNITS = ("words", "pieces")
+RUN_FORMAT = "embodied-bandit-run-1"
+"""Of the checkpoints of all stages."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,9 +18,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from agents.bandit.config import RUN_FORMAT
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
-from agents.bandit.runs import Run
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
@@ -29,6 +29,7 @@ from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
 from agents.imitation.lessons import Split
 from agents.imitation.loop import Note, seed_of, tasks_of_update
+from agents.imitation.runs import Run
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -170,6 +171,7 @@ def learn_from_stars(
         {**kept, "rater": dataclasses.asdict(rater), "agent": begun_with},
         {"agent": agent.network, "critic": critic},
         optimizers,
+        RUN_FORMAT,
     )
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])

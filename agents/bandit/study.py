@@ -7,20 +7,30 @@ per learner and rater. Runs that tables share are made once, and everything goes
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import joblib
 import torch
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.figures import curves_figure, gains_figure
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
-from assets.cache import write_bytes, write_json
+from agents.imitation.studies import (
+    beside,
+    history_of,
+    refuse_unknown,
+    run_all,
+    seeds_with,
+    shown,
+    table,
+    write_all,
+    write_markdown,
+)
+from assets.cache import write_json
 from embodied.evaluation.tables import Estimate, across_seeds
 
 Note = Callable[[str], None]
@@ -101,15 +111,12 @@ def run_study(
     Raises:
       ValueError: an unknown study, or a corpus that cannot be read.
     """
-    if unknown := [n for n in names if n not in STUDIES]:
-        raise ValueError(f"unknown studies {unknown}; there are {list(STUDIES)}")
+    refuse_unknown(names, STUDIES)
     jobs = distinct([job for name in names for job in STUDIES[name]()])
     references = dict.fromkeys(job.reference for job in jobs)
-    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
-    for seed in parallel(joblib.delayed(_prepare)(setting, seed, tuple(references), note) for seed in setting.repeats):
-        note(f"seed {seed}: references and critics are ready")
-    for line in parallel(joblib.delayed(_run)(setting, seed, job, note) for job in jobs for seed in setting.repeats):
-        note(line)
+    seeds, ready = setting.repeats, functools.partial(_prepare, setting, references=tuple(references), note=note)
+    run_all([""], seeds, lambda seed, _: ready(seed), workers=workers, note=note)
+    run_all(jobs, seeds, lambda seed, job: _run(setting, seed, job, note), workers=workers, note=note)
     return report(setting, names)
 
 
@@ -125,19 +132,19 @@ def distinct(jobs: Sequence[Job]) -> list[Job]:
 
 def report(setting: BanditStudySetting, names: Sequence[str]) -> dict[str, Path]:
     """Write the tables and figures of runs that are there; sweeps show the settings that all seeds have."""
-    return {name: {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps}[name](setting) for name in names}
+    writers = {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps}
+    return write_all(names, {name: functools.partial(write, setting) for name, write in writers.items()})
 
 
 def history(setting: BanditStudySetting, seed: int, job: Job) -> list[dict[str, float]]:
     """What each finished pass of a run gave; nothing if it has not all its passes."""
-    path = folder_of(setting, seed, job) / "result.json"
-    found = json.loads(path.read_text())["history"] if path.exists() else []
+    found = history_of(folder_of(setting, seed, job))
     return found[: job.passes] if len(found) >= job.passes else []
 
 
 def done(setting: BanditStudySetting, *jobs: Job) -> list[int]:
     """The seeds that have all these runs."""
-    return [s for s in setting.repeats if all(history(setting, s, job) for job in jobs)]
+    return seeds_with(setting.repeats, lambda s: all(history(setting, s, job) for job in jobs))
 
 
 def gains(setting: BanditStudySetting, job: Job, column: str, turn: int = 0) -> list[float]:
@@ -151,13 +158,13 @@ def folder_of(setting: BanditStudySetting, seed: int, job: Job) -> Path:
     return setting.out / f"seed_{seed}" / job.reference / job.name
 
 
-def _prepare(setting: BanditStudySetting, seed: int, references: Sequence[str], note: Note) -> int:
+def _prepare(setting: BanditStudySetting, seed: int, references: Sequence[str], note: Note) -> str:
     torch.set_num_threads(setting.threads)
     m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
     pretrain(m, home / "pretrain", note=note)
     for reference in references:
         teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference / "critic", note=note)
-    return seed
+    return f"seed {seed}: references and critics are ready"
 
 
 def _run(setting: BanditStudySetting, seed: int, job: Job, note: Note) -> str:
@@ -179,13 +186,7 @@ def _run(setting: BanditStudySetting, seed: int, job: Job, note: Note) -> str:
 
 
 def _write_table(setting: BanditStudySetting) -> Path:
-    lines = [
-        "# Table 3.2: translation scores and their improvement by one round of ratings",
-        "",
-        "| | seeds | reference | Δ supervised | Δ NED-A2C |",
-        "|---|---|---|---|---|",
-    ]
-    facts = {}
+    rows, facts = [], {}
     for reference in REFERENCES:
         jobs = [Job(reference, learner) for learner in LEARNERS]
         seeds = done(setting, *jobs)
@@ -196,11 +197,14 @@ def _write_table(setting: BanditStudySetting) -> Path:
             base = each[0]
             found = [across_seeds(base), *(across_seeds([b - a for a, b in zip(base, e)]) for e in each[1:])]
             facts[f"{reference}, {column}"] = [dataclasses.asdict(e) for e in found]
-            cells = [f"{shown(e)} ({p})" for e, p in zip(found, PRINTED[reference, column], strict=True)]
+            cells = [beside(shown(e), p) for e, p in zip(found, PRINTED[reference, column], strict=True)]
             label = f"{'fully' if reference == 'full' else 'weakly'} pre-trained, {column}"
-            lines.append(f"| {label} | {len(seeds)} | " + " | ".join(cells) + " |")
+            rows.append([label, str(len(seeds)), *cells])
     write_json(setting.out / "table_3.2.json", facts, indent=1)
-    return _markdown(setting, "table_3.2.md", lines)
+    title = "Table 3.2: translation scores and their improvement by one round of ratings"
+    return _markdown(
+        setting, "table_3.2.md", title, table(["", "seeds", "reference", "Δ supervised", "Δ NED-A2C"], rows)
+    )
 
 
 def _write_curves(setting: BanditStudySetting) -> Path:
@@ -209,17 +213,13 @@ def _write_curves(setting: BanditStudySetting) -> Path:
         raise ValueError(f"{setting.out}: no seed has the {PASSES} passes of Figure 3.4 yet; run it without --report")
     curves = {c: [across_seeds(gains(setting, job, c, turn)) for turn in range(PASSES)] for c in (SENTENCE, HELD_OUT)}
     curves_figure(curves, setting.out / "figure_3.4.png")
-    lines = [
-        "# Figure 3.4: NED-A2C for five passes, gain over the fully pre-trained reference",
-        "",
-        "| | seeds | " + " | ".join(f"pass {k + 1}" for k in range(PASSES)) + " |",
-        "|---|---|" + "---|" * PASSES,
-    ]
-    lines += [f"| Δ {c} | {e[0].n} | " + " | ".join(shown(x) for x in e) + " |" for c, e in curves.items()]
+    heads = ["", "seeds", *(f"pass {k + 1}" for k in range(PASSES))]
+    lines = table(heads, [[f"Δ {c}", str(e[0].n), *map(shown, e)] for c, e in curves.items()])
     facts = {c: [dataclasses.asdict(e) for e in v] for c, v in curves.items()}
     write_json(setting.out / "figure_3.4.json", facts, indent=1)
     printed = "The dissertation (De-En): +6.73 per-sentence BLEU in the fifth pass."
-    return _markdown(setting, "figure_3.4.md", [*lines, "", printed])
+    title = "Figure 3.4: NED-A2C for five passes, gain over the fully pre-trained reference"
+    return _markdown(setting, "figure_3.4.md", title, [*lines, "", printed])
 
 
 def _write_sweeps(setting: BanditStudySetting) -> Path:
@@ -230,16 +230,8 @@ def _write_sweeps(setting: BanditStudySetting) -> Path:
         raise ValueError(f"{setting.out}: no seed has learned from clean ratings yet; run it without --report")
     band = {c: across_seeds(gains(setting, clean, c)) for c in columns}
     found: dict[str, dict[float, dict[str, Estimate]]] = {name: {} for name in SWEEPS}
-    missing, lines = (
-        [],
-        [
-            "# Figure 3.5: gain by NED-A2C under imperfect ratings",
-            "",
-            f"| rater | seeds | Δ {SENTENCE} | share of the clean rater's, same seeds | Δ {HELD_OUT} |",
-            "|---|---|---|---|---|",
-            f"| clean | {band[SENTENCE].n} | {shown(band[SENTENCE])} | 100 % | {shown(band[HELD_OUT])} |",
-        ],
-    )
+    missing: list[str] = []
+    rows = [["clean", str(band[SENTENCE].n), shown(band[SENTENCE]), "100 %", shown(band[HELD_OUT])]]
     for name, value in ((name, value) for name, values in SWEEPS.items() for value in values):
         job = Job("full", "a2c", rater_of(name, value))
         if not gains(setting, job, SENTENCE):
@@ -247,9 +239,7 @@ def _write_sweeps(setting: BanditStudySetting) -> Path:
             continue
         e = found[name][value] = {c: across_seeds(gains(setting, job, c)) for c in columns}
         share = 100 * sum(gains(setting, job, SENTENCE)) / sum(_clean_gains(setting, job))
-        lines.append(
-            f"| {name} {value:g} | {e[SENTENCE].n} | {shown(e[SENTENCE])} | {share:.0f} % | {shown(e[HELD_OUT])} |"
-        )
+        rows.append([f"{name} {value:g}", str(e[SENTENCE].n), shown(e[SENTENCE]), f"{share:.0f} %", shown(e[HELD_OUT])])
     if any(found.values()):
         swept = {name: values for name, values in found.items() if values}
         gains_figure(swept, band, setting.out / "figure_3.5.png")
@@ -257,7 +247,9 @@ def _write_sweeps(setting: BanditStudySetting) -> Path:
         n: {f"{v:g}": {c: vars(x) for c, x in e.items()} for v, e in values.items()} for n, values in found.items()
     }
     write_json(setting.out / "figure_3.5.json", facts, indent=1)
-    return _markdown(setting, "figure_3.5.md", lines + (["", f"Not run yet: {', '.join(missing)}."] if missing else []))
+    heads = ["rater", "seeds", f"Δ {SENTENCE}", "share of the clean rater's, same seeds", f"Δ {HELD_OUT}"]
+    title = "Figure 3.5: gain by NED-A2C under imperfect ratings"
+    return _markdown(setting, "figure_3.5.md", title, table(heads, rows), missing)
 
 
 def _clean_gains(setting: BanditStudySetting, job: Job) -> list[float]:
@@ -267,12 +259,9 @@ def _clean_gains(setting: BanditStudySetting, job: Job) -> list[float]:
     return [history(setting, s, clean)[0][SENTENCE] - history(setting, s, base)[0][SENTENCE] for s in seeds]
 
 
-def shown(e: Estimate) -> str:
-    """'1.82 ± 0.08'."""
-    return f"{e.mean:.2f}" if math.isnan(e.half) else f"{e.mean:.2f} ± {e.half:.2f}"
-
-
-def _markdown(setting: BanditStudySetting, name: str, lines: Sequence[str]) -> Path:
+def _markdown(
+    setting: BanditStudySetting, name: str, title: str, lines: Sequence[str], missing: Sequence[str] = ()
+) -> Path:
     c = setting.config
     splits = (
         json.loads((setting.data / "corpus.json").read_text())["splits"]
@@ -287,6 +276,4 @@ def _markdown(setting: BanditStudySetting, name: str, lines: Sequence[str]) -> P
         "with its own pre-training, and Student's 95 % interval; differences are taken seed by seed. In brackets the "
         "dissertation's numbers (De-En TED talks, hidden size 500, 167,000 ratings): comparable in shape, not in level."
     )
-    path = setting.out / name
-    write_bytes(path, "\n".join([*lines, "", how, ""]).encode())
-    return path
+    return write_markdown(setting.out / name, title, lines, how, missing)

@@ -21,16 +21,17 @@ import torch
 from torch import Tensor
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
-from agents.bandit.config import BanditConfig
+from agents.bandit.config import RUN_FORMAT, BanditConfig
 from agents.bandit.corpus import corpus_digest, load
 from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import CLEAN, Rater
-from agents.bandit.runs import Run
 from agents.bandit.store import load_weights, save_weights
-from agents.bandit.translate import Numbered, batches, decode, drawn_with, greedy, numbered, padded, perplexity
+from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
 from agents.bandit.words import BUILDERS, WordNumbers
 from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.imitation.decoding import drawn_with
 from agents.imitation.loop import Note
+from agents.imitation.runs import Run
 from embodied.locks import locked
 from embodied.seeds import stream
 
@@ -115,7 +116,7 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
     config, data = m.config, m.splits["supervised"]
     translator = m.translator()
     optimizer = adam(translator, config.pretraining_rate)
-    run = Run(folder, m.identity(), {"translator": translator}, {"translator": optimizer})
+    run = Run(folder, m.identity(), {"translator": translator}, {"translator": optimizer}, RUN_FORMAT)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source, target = rows(data.source, chosen), rows(data.target, chosen)
@@ -152,7 +153,8 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
     translator, critic = m.translator(), m.critic()
     load_weights(translator, reference)
     optimizer = adam(critic, config.pretraining_rate)
-    run = Run(folder, m.identity("critic_passes", reference=reference.stem), {"critic": critic}, {"critic": optimizer})
+    identity = m.identity("critic_passes", reference=reference.stem)
+    run = Run(folder, identity, {"critic": critic}, {"critic": optimizer}, RUN_FORMAT)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source = rows(data.source, chosen)
@@ -206,7 +208,7 @@ def bandit(
     }
     about = {"reference": reference.stem, "learner": learner, "rater": dataclasses.asdict(rater)}
     fields = ("critic_passes", "bandit_rate", "bandit_set")
-    run = Run(folder, m.identity(*fields, ratings=m.bandit_digest, **about), modules, optimizers)
+    run = Run(folder, m.identity(*fields, ratings=m.bandit_digest, **about), modules, optimizers, RUN_FORMAT)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said = sampled(translator, m, data, chosen, "bandit", turn)

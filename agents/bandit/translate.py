@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,8 @@ from torch import Tensor
 
 from agents.bandit.network import Translator
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, WordNumbers
+from agents.imitation.decoding import Choice, likeliest
 
-Choice = Callable[[Tensor, Tensor, int], Tensor]
-"""(logits (k, V), rows (k,) of the batch, step) to chosen words (k,)."""
 POOL = 20
 """Batches that are sorted by length together."""
 
@@ -62,26 +61,6 @@ def in_order(lengths: Sequence[int], size: int) -> Iterator[np.ndarray]:
     """All sentences by length, in batches, for judging."""
     order = np.argsort(np.asarray(lengths), kind="stable")
     return (order[i : i + size] for i in range(0, len(order), size))
-
-
-def likeliest(logits: Tensor, rows: Tensor, step: int) -> Tensor:
-    """Eq A.6."""
-    return logits.argmax(-1)
-
-
-def drawn_with(uniforms: np.ndarray) -> Choice:
-    """Sample each word with one number of `uniforms` (B, steps) in [0, 1), by inverting the distribution.
-
-    Each sentence brings its own numbers, so what is drawn for it does not depend on its batch.
-    """
-    numbers = torch.from_numpy(uniforms).float()
-
-    def choose(logits: Tensor, rows: Tensor, step: int) -> Tensor:
-        edges = logits.softmax(-1).cumsum(-1)
-        wanted = numbers[rows, step, None] * edges[:, -1:]
-        return torch.searchsorted(edges, wanted, right=True)[:, 0].clamp(max=logits.shape[1] - 1)
-
-    return choose
 
 
 @torch.no_grad()

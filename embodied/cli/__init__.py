@@ -39,6 +39,7 @@ COMMANDS = (
     "eval",
     "judge",
     "study",
+    "iliad",
     "bench",
 )
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""

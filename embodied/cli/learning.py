@@ -14,6 +14,8 @@ from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
+from agents.iliad.config import LearnerConfig
+from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import NETWORKS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
@@ -268,6 +270,53 @@ def add_study_bandit(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
+
+
+def add_train_iliad(parser: argparse.ArgumentParser) -> None:
+    """One world after the other."""
+    worlds = parser.add_subparsers(dest="world", metavar="WORLD", required=True)
+    regex = worlds.add_parser("regex", help="change words as a request says, by regular expressions")
+    _add_iliad(regex)
+    regex.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    add_fields(regex, LearnerConfig, scales=LEARNER_SCALES)
+    add_fields(regex, RegexConfig, scales=REGEX_SCALES)
+
+
+def add_study_iliad(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="3.4, 3.5, C.1, 'figure 3.7' or describer")
+    _add_iliad(parser)
+    parser.add_argument(
+        "--seeds", type=whole(), default=3, metavar="N", help="students per row, from --seed on (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", type=whole(), default=1, metavar="N", help="students side by side (default: %(default)s)"
+    )
+    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
+    add_fields(parser, LearnerConfig, scales=LEARNER_SCALES, skip=("learner", "mixing", "anneal_every"))
+    add_fields(parser, RegexConfig, scales=REGEX_SCALES, skip=("wrong",))
+
+
+def _add_iliad(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        required=True,
+        metavar="DIR",
+        help="data, teacher and students; the same command goes on",
+    )
+    parser.add_argument(
+        "--scale", choices=sorted(REGEX_SCALES), default="mini", help="settings to start from (default: %(default)s)"
+    )
+    parser.add_argument("--words", type=any_path, metavar="FILE", help="words, one a line (default: made-up ones)")
+    parser.add_argument(
+        "--templates",
+        type=any_path,
+        metavar="FILE",
+        help="requests of your own, JSON: rule -> texts with BEFORE and AFTER (default: the grammar's)",
+    )
+    parser.add_argument(
+        "--threads", type=whole(), default=1, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+    )
 
 
 def add_study_stars(parser: argparse.ArgumentParser) -> None:

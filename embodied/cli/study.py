@@ -5,12 +5,14 @@
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
+    embodied study iliad 3.4 3.5 C.1 --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
 number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's: `askers`,
 `interventions`, `rooms` (wants --without-rooms) and `rules`. `bandit` is a translator
 that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
-agent learn from ratings in the same way, in houses. Rows that tables share are
+agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it did: Tables 3.4,
+3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions. Rows that tables share are
 trained once. Interrupt it whenever you like: the same command goes on.
 """
 
@@ -31,10 +33,18 @@ def add(parser: argparse.ArgumentParser) -> None:
     learning.add_study_vnla(kinds.add_parser("vnla", help="agents that ask an advisor within a budget"))
     learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
     learning.add_study_stars(kinds.add_parser("stars", help="HANNA agents that learn from ratings of their walks"))
+    learning.add_study_iliad(kinds.add_parser("iliad", help="students that learn from descriptions"))
 
 
 def run(args: argparse.Namespace) -> int:
-    runs = {"hanna": run_hanna, "hari": run_hari, "vnla": run_vnla, "bandit": run_bandit, "stars": run_stars}
+    runs = {
+        "hanna": run_hanna,
+        "hari": run_hari,
+        "vnla": run_vnla,
+        "bandit": run_bandit,
+        "stars": run_stars,
+        "iliad": run_iliad,
+    }
     for path in runs[args.what](args):
         print(path.read_text(encoding="utf-8"))
     return 0
@@ -130,3 +140,22 @@ def run_stars(args: argparse.Namespace) -> list[Path]:
         args.threads,
     )
     return [run_navigation_study(setting, args.only, note=note)]
+
+
+def run_iliad(args: argparse.Namespace) -> list[Path]:
+    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES
+    from agents.iliad.study import IliadStudySetting, report, run_study
+    from embodied.cli.options import chosen
+
+    setting = IliadStudySetting(
+        args.out,
+        chosen(args, REGEX_SCALES[args.scale]),
+        chosen(args, LEARNER_SCALES[args.scale]),
+        args.seeds,
+        args.words,
+        args.templates,
+        args.threads,
+    )
+    if args.report:
+        return list(report(setting, args.tables).values())
+    return list(run_study(setting, args.tables, workers=args.workers, note=note).values())

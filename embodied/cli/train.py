@@ -1,4 +1,4 @@
-"""Teach: the encoder that sees (vision), or an agent that navigates and asks for help (hanna, vnla, hari).
+"""Teach: the encoder that sees, agents that ask for help (hanna, vnla, hari), one that hears what it did (iliad).
 
 Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
 not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
@@ -39,6 +39,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     learning.add_train_vnla(vnla)
     hari = kinds.add_parser("hari", help="the agent that learns which question to ask", description=run_hari.__doc__)
     learning.add_train_hari(hari)
+    iliad = kinds.add_parser(
+        "iliad", help="a student that learns from descriptions of what it did", description=run_iliad.__doc__
+    )
+    learning.add_train_iliad(iliad)
     for parser in (hanna, vnla):
         parser.add_argument(
             "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
@@ -46,7 +50,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    return {"vision": run_vision, "hanna": run_hanna, "vnla": run_vnla, "hari": run_hari}[args.what](args)
+    return {"vision": run_vision, "hanna": run_hanna, "vnla": run_vnla, "hari": run_hari, "iliad": run_iliad}[
+        args.what
+    ](args)
 
 
 def run_vision(args: argparse.Namespace) -> int:
@@ -101,6 +107,21 @@ def run_hari(args: argparse.Namespace) -> int:
     else:
         asking = chosen(args, INTENTION_SCALES[args.scale])
         train_intention(data, args.execution, asking, args.out, minutes=args.minutes, note=note)
+    return 0
+
+
+def run_iliad(args: argparse.Namespace) -> int:
+    """Teach a student to change words as a request says, by descriptions (ADEL), demonstrations or rewards."""
+    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, students_of
+    from agents.iliad.regex.run import learn, prepare
+    from agents.imitation.parallel import use_threads
+    from embodied.cli.options import chosen
+
+    use_threads(args.threads)
+    regex = chosen(args, REGEX_SCALES[args.scale])
+    grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
+    learner = chosen(args, LEARNER_SCALES[args.scale])
+    learn(grounds, learner, args.out / "students" / students_of(regex), minutes=args.minutes, note=note)
     return 0
 
 

@@ -12,13 +12,11 @@ from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_c
 from agents.imitation.loop import Note, Progress, Session
 from assets.cache import write_json
 
-FORMAT = "embodied-bandit-run-1"
-
 
 class Run:
     """Owns what changes in a stage: modules, optimizers, and where it is.
 
-    Randomness needs no state: every draw is named by seed, pass and sentence.
+    Randomness needs no state: every draw is named by seed and update.
     """
 
     def __init__(
@@ -27,18 +25,23 @@ class Run:
         identity: Mapping[str, object],
         modules: Mapping[str, nn.Module],
         optimizers: Mapping[str, torch.optim.Optimizer],
+        kind: str,
     ) -> None:
         """Begin, or go on from the checkpoint in `folder`.
+
+        Args:
+          kind: name and version of such checkpoints.
 
         Raises:
           CheckpointError: damaged, or of a run with other settings or another corpus.
         """
         self.folder, self.identity, self.modules, self.optimizers = Path(folder), dict(identity), modules, optimizers
+        self.kind = kind
         self.progress = Progress()
         self.sums: dict[str, float] = {}
-        """Of the pass at hand."""
+        """Of what is being counted, a pass or the updates since a validation."""
         self.history: list[dict[str, float]] = []
-        """One entry per finished pass."""
+        """What was found so far, such as one entry per finished pass."""
         if self.path.exists():
             self._load()
 
@@ -62,11 +65,11 @@ class Run:
             "modules": {k: m.state_dict() for k, m in self.modules.items()},
             "optimizers": {k: o.state_dict() for k, o in self.optimizers.items()},
         }
-        write_checkpoint(self.path, FORMAT, body)
+        write_checkpoint(self.path, self.kind, body)
         write_json(self.folder / "result.json", {"identity": self.identity, "history": self.history}, indent=1)
 
     def _load(self) -> None:
-        body = read_checkpoint(self.path, FORMAT)
+        body = read_checkpoint(self.path, self.kind)
         refuse_changes(self.path, body["identity"], self.identity)
         for name, module in self.modules.items():
             module.load_state_dict(body["modules"][name])
@@ -78,7 +81,7 @@ class Run:
             body["history"],
         )
 
-    def session(self, total: int, minutes: float, note: Note) -> Session:
-        """Go on until `total` updates are done, saving every so many `minutes`."""
+    def session(self, total: int, minutes: float, note: Note, stop_after: float | None = None) -> Session:
+        """Go on until `total` updates are done, or for `stop_after` minutes, saving every so many `minutes`."""
         say = lambda line: note(f"{self.folder}: {line}")
-        return Session(self.progress, total, self.save, checkpoint_minutes=minutes, note=say)
+        return Session(self.progress, total, self.save, minutes=stop_after, checkpoint_minutes=minutes, note=say)

@@ -1,0 +1,78 @@
+"""Settings of the learners of ILIAD, whatever the world (Table C.2)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+LEARNERS = ("adel", "dagger", "binary", "continuous")
+"""ADEL (Algorithm 9), DAgger, and REINFORCE with a reward of success or of nearness (C.1, C.2)."""
+
+
+@dataclass(frozen=True)
+class LearnerConfig:
+    """The defaults are those of the dissertation for REGEX."""
+
+    learner: str = "adel"
+    """Who learns: adel, dagger, binary or continuous (REINFORCE with either reward)."""
+    iterations: int = 30_000
+    """Updates of the weights."""
+    batch: int = 32
+    """Episodes per update."""
+    learning_rate: float = 1e-3
+    """Of Adam; REINFORCE takes a tenth of it, as in the dissertation."""
+    mixing: float = 0.5
+    """Lambda, the weight of executions from the marginal (Algorithm 9)."""
+    anneal_every: int = 0
+    """L, updates after which lambda is multiplied by `anneal_rate`; 0 for never (Table C.1)."""
+    anneal_rate: float = 0.5
+    """Beta of Algorithm 5."""
+    least_mixing: float = 0.1
+    """Lambda never falls below it when it is annealed."""
+    entropy: float = 0.1
+    """Weight of the policy's entropy in REINFORCE."""
+    clip: float = 5.0
+    """Norm to which gradients are cut; the dissertation does not cut (docs/sources.md, S92)."""
+    cooldown: float = 0.0
+    """Share of the updates, the last ones, over which the learning rate falls linearly."""
+    threshold: float = 0.85
+    """c, the validation success whose episodes are counted (Table 3.4)."""
+    validate_every: int = 500
+    """Updates between validations."""
+    checkpoint_minutes: float = 2.0
+    """How often the run is saved."""
+    seed: int = 0
+    """Of everything that is drawn while learning."""
+
+    def __post_init__(self) -> None:
+        if self.learner not in LEARNERS:
+            raise ValueError(f"learner must be one of {LEARNERS}, got {self.learner!r}")
+        for name in ("iterations", "batch", "validate_every"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("learning_rate", "clip", "checkpoint_minutes"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        for name in ("mixing", "anneal_rate", "least_mixing", "cooldown", "threshold"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"{name} must lie in [0, 1], got {getattr(self, name)}")
+        if self.anneal_every < 0 or self.entropy < 0:
+            raise ValueError(f"anneal_every {self.anneal_every} and entropy {self.entropy} must not be negative")
+
+    @property
+    def rate(self) -> float:
+        """Adam's learning rate for this learner."""
+        return self.learning_rate * (0.1 if self.learner in ("binary", "continuous") else 1.0)
+
+
+def mixing_at(config: LearnerConfig, update: int) -> float:
+    """Lambda at an update: max(least, lambda beta) every L updates (Table C.1), or constant."""
+    if not config.anneal_every:
+        return config.mixing
+    return max(config.least_mixing, config.mixing * config.anneal_rate ** (update // config.anneal_every))
+
+
+def as_dict(config: object) -> Mapping[str, object]:
+    """Field to value, as it is written into checkpoints and weights."""
+    return dataclasses.asdict(config)  # type: ignore[call-overload]

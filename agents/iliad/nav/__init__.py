@@ -1,0 +1,1 @@
+"""NAV: following requests through houses (3.2.4.2)."""

@@ -1,0 +1,123 @@
+"""Who describes walks: a describer with an executor (3.2.4.1), or the people who word routes here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.hanna.vocabulary import PAD, Vocabulary
+from agents.iliad.describing import by_the_program, by_the_text, kept
+from agents.iliad.nav.network import WORD_END, WalkDescriber
+from agents.iliad.nav.student import NavEyes, NavStudent, Track
+from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
+from agents.iliad.protocol import NOTHING
+from agents.imitation.decoding import drawn_with, likeliest
+from embodied.evaluation.metrics import sdtw
+from embodied.interface import SeenPlace
+
+THRESHOLD = 0.5
+"""Tau of Eq 3.15 and 3.16, of SDTW (C.1.1)."""
+LONGEST = 50
+"""Words of a description."""
+
+
+def performance(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Sequence[int]) -> float:
+    """perf: SDTW of two walks in the house of a trip."""
+    return sdtw(tuple(found), tuple(wanted), world.graph(trip), RADIUS)
+
+
+def walked(eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk]) -> tuple[Tensor, Tensor, Tensor]:
+    """What a describer reads: (B, T, 36, D) panoramas, (B, T, E) actions taken there, (B, T) which there are."""
+    tracks, views, actions = [Track(eyes, t) for t in trips], [], []
+    longest = max(len(w.steps) for w in walks)
+    mask = torch.tensor([[t < len(w.steps) for t in range(longest)] for w in walks])
+    for t in range(longest):
+        seen = eyes.see(trips, [k.pose for k in tracks], torch.stack([k.previous for k in tracks]))
+        numbers = [k.number(w.steps[t]) if t < len(w.steps) else 0 for k, w in zip(tracks, walks)]
+        views.append(seen.views)
+        actions.append(seen.actions[torch.arange(len(walks)), torch.tensor(numbers)])
+        for row, (track, number) in enumerate(zip(tracks, numbers)):
+            track.go(number, seen.actions[row])
+    return torch.stack(views, 1), torch.stack(actions, 1), mask
+
+
+def said(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
+    """Descriptions of (B, T) words, up to each end."""
+    found = []
+    for row in numbers.tolist():
+        end = row.index(WORD_END) if WORD_END in row else len(row)
+        found.append(" ".join(vocabulary.words[n] for n in row[:end] if vocabulary.words[n] != PAD))
+    return found
+
+
+class LearnedNavTeacher:
+    """Eq 3.15 and 3.16 with two networks."""
+
+    def __init__(
+        self, world: NavWorld, describer: WalkDescriber, executor: NavStudent, candidates: int, pragmatics: str
+    ) -> None:
+        self.world, self.describer, self.executor = world, describer.eval(), executor
+        self.eyes, self.candidates, self.pragmatics = executor.eyes, candidates, pragmatics
+
+    def describe(
+        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        uniforms = rng.random((len(tasks), self.candidates, LONGEST))
+        found: list[str | None] = [None] * len(tasks)
+        left = []
+        for i, (trip, walk) in enumerate(zip(tasks, executions, strict=True)):
+            if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
+                found[i] = self.world.request(trip, rng=rng)
+            else:
+                left.append(i)
+        if left:
+            trips, walks = [tasks[i] for i in left], [executions[i] for i in left]
+            for i, pragmatic in zip(left, self._pragmatic(trips, walks, uniforms[left])):
+                text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
+                found[i] = text or None
+        return found
+
+    def _pragmatic(self, trips: Sequence[Trip], walks: Sequence[NavWalk], uniforms: np.ndarray) -> list[list[str]]:
+        """D_prag of each walk: the likeliest description first."""
+        inputs = walked(self.eyes, trips, walks)
+        words = self.eyes.vocabulary
+        likely = said(words, self.describer.write(*inputs, likeliest, LONGEST))
+        drawn: list[str] = []
+        if self.candidates:
+            choose = drawn_with(uniforms.reshape(-1, LONGEST))
+            drawn = said(words, self.describer.write(*inputs, choose, LONGEST, self.candidates))
+        k = self.candidates
+        several = [[d, *drawn[i * k : (i + 1) * k]] for i, d in enumerate(likely)]
+        cases = [(trip, walk, d) for trip, walk, many in zip(trips, walks, several) for d in many]
+        done = self.executor.greedy([c[0] for c in cases], [c[2] or NOTHING for c in cases])
+        scores = iter([performance(self.world, c[0], e.nodes, c[1].nodes) for c, e in zip(cases, done)])
+        return [kept(many, [next(scores) for _ in many], THRESHOLD) for many in several]
+
+
+class Wording(Protocol):
+    """embodied.language's RouteDescriber, or its like."""
+
+    def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str: ...
+
+
+class PeopleNavTeacher:
+    """A second teacher: whoever words routes here describes every walk, truly."""
+
+    def __init__(self, world: NavWorld, places: Mapping[str, SeenPlace], wording: Wording) -> None:
+        self.world, self.places, self.wording = world, places, wording
+
+    def describe(
+        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        return [self._one(trip, walk, rng=rng) for trip, walk in zip(tasks, executions, strict=True)]
+
+    def _one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
+        if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
+            return self.world.request(trip, rng=rng)
+        if len(walk.nodes) < 2:
+            return None
+        return self.wording.describe(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)

@@ -1,0 +1,81 @@
+"""What the learners of ILIAD need of a problem (Algorithm 3): a world, a teacher, a marginal and a student.
+
+Tasks and executions are the problem's own records; everything is done a batch at a time, because
+networks are quicker that way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+from torch import Tensor, nn
+
+Q = TypeVar("Q")
+"""A task q = (R, s_1, d*)."""
+E = TypeVar("E")
+"""An execution e = (s_1, a_1, .., s_H, a_H)."""
+NOTHING = ""
+"""The empty description."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExecutionScores:
+    """What a policy thinks of B executions of at most T actions; zero behind the end of each."""
+
+    log_probabilities: Tensor
+    """(B, T) log pi(a_t | s_t, d); carries the gradient."""
+    entropies: Tensor
+    """(B, T) of pi(. | s_t, d), nats; carries the gradient."""
+    mask: Tensor
+    """(B, T) bool, False behind the end."""
+
+
+class RequestWorld(Protocol[Q, E]):
+    """Where requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
+
+    def request(self, task: Q, *, rng: np.random.Generator) -> str:
+        """d*: one of the task's requests."""
+
+    def success(self, task: Q, execution: E) -> bool:
+        """Whether the task is fulfilled."""
+
+    def reward(self, task: Q, execution: E) -> float:
+        """Nearness to the goal, at most 1 (C.1, C.2)."""
+
+    def demonstrate(self, task: Q, execution: E) -> E:
+        """The best actions in the states of an execution, one for each, the last one stopping."""
+
+
+class DescribingTeacher(Protocol[Q, E]):
+    """P_T(d | e)."""
+
+    def describe(self, tasks: Sequence[Q], executions: Sequence[E], *, rng: np.random.Generator) -> list[str | None]:
+        """What was done; None where the teacher has nothing to say."""
+
+
+class Marginal(Protocol[Q, E]):
+    """P_omega(e | s_1), which knows nothing of requests."""
+
+    def draw(self, tasks: Sequence[Q], *, rng: np.random.Generator) -> list[E]:
+        """An execution that begins where each task begins."""
+
+
+class Student(Protocol[Q, E]):
+    """pi(a | s, d)."""
+
+    def sample(self, tasks: Sequence[Q], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
+        """e ~ P_pi(. | s_1, d)."""
+
+    def greedy(self, tasks: Sequence[Q], requests: Sequence[str]) -> list[E]:
+        """The likeliest action in every state."""
+
+    def scores(
+        self, tasks: Sequence[Q], requests: Sequence[str], executions: Sequence[E], actions: Sequence[E] | None = None
+    ) -> ExecutionScores:
+        """Of the actions of executions, or of other `actions` in their states."""
+
+    def network(self) -> nn.Module:
+        """What is trained."""

@@ -1,0 +1,104 @@
+"""Letters, characters of rules and words of requests as numbers, for the networks of REGEX."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.hanna.vocabulary import Vocabulary, build_vocabulary
+from agents.iliad.regex.rules import ALPHABET, LETTERS, columns
+
+PAD, END = 0, 1
+"""Of characters; END also stands before the first one."""
+CHARACTERS = 2 + len(ALPHABET)
+GAP = CHARACTERS
+"""In the columns of a change: no letter here."""
+LONGEST_REQUEST = 32
+"""Words of a request that are read."""
+WORD_END = 2
+"""Of a request's words (agents.hanna.vocabulary); 0 is padding."""
+_NUMBERS = np.zeros(256, dtype=np.int64)
+_NUMBERS[np.frombuffer(ALPHABET.encode(), np.uint8)] = np.arange(2, CHARACTERS)
+_TEXT = np.array(["", "", *ALPHABET])
+
+
+def characters(texts: Sequence[str]) -> Tensor:
+    """(B, longest + 1) int64 characters, each with its END, padded."""
+    out = np.full((len(texts), max(map(len, texts), default=0) + 1), PAD, dtype=np.int64)
+    for row, text in enumerate(texts):
+        out[row, : len(text)] = _NUMBERS[np.frombuffer(text.encode(), np.uint8)]
+        out[row, len(text)] = END
+    return torch.from_numpy(out)
+
+
+def texts(numbers: Tensor) -> list[str]:
+    """What was written (B, T), up to each END."""
+    found = numbers.numpy()
+    ends = np.where((found == END).any(1), (found == END).argmax(1), found.shape[1])
+    return ["".join(_TEXT[row[:end]]) for row, end in zip(found, ends)]
+
+
+@dataclass(frozen=True)
+class Requests:
+    """Requests as numbers, remembered: the same ones come again and again."""
+
+    vocabulary: Vocabulary
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_known", {})
+
+    def __call__(self, requests: Sequence[str]) -> Tensor:
+        """(B, longest) int64 words, each with its END if it fits, padded."""
+        rows = [self._row(r) for r in requests]
+        out = np.zeros((len(rows), max(map(len, rows))), dtype=np.int64)
+        for k, row in enumerate(rows):
+            out[k, : len(row)] = row
+        return torch.from_numpy(out)
+
+    def say(self, numbers: Tensor) -> list[str]:
+        """Requests of (B, T) words, up to each END."""
+        words, found = self.vocabulary.words, []
+        for row in numbers.tolist():
+            end = row.index(WORD_END) if WORD_END in row else len(row)
+            found.append(" ".join(words[n] for n in row[:end] if n))
+        return found
+
+    def _row(self, request: str) -> np.ndarray:
+        known: dict[str, np.ndarray] = self._known  # type: ignore[attr-defined]
+        if request not in known:
+            if len(known) > 200_000:
+                known.clear()
+            row = self.vocabulary.encode(request, LONGEST_REQUEST)
+            known[request] = row[: int((row != 0).sum())]
+        return known[request]
+
+
+def request_words(requests: Iterable[str]) -> Requests:
+    """Numbers for the words of these requests and for single letters."""
+    return Requests(build_vocabulary([*requests, " ".join(LETTERS)]))
+
+
+def changes(pairs: Sequence[Sequence[tuple[str, str]]]) -> Tensor:
+    """(B, J, T, 2) int64: J words before and after, side by side, between two columns of END, padded.
+
+    Args:
+      pairs: of each of B executions, J words (before, after).
+    """
+    rows = [[_columns(a, b) for a, b in several] for several in pairs]
+    longest = max(len(r) for several in rows for r in several)
+    out = np.full((len(rows), len(rows[0]), longest, 2), PAD, dtype=np.int64)
+    for k, several in enumerate(rows):
+        for j, row in enumerate(several):
+            out[k, j, : len(row)] = row
+    return torch.from_numpy(out)
+
+
+@functools.lru_cache(maxsize=120_000)
+def _columns(before: str, after: str) -> np.ndarray:
+    number = lambda c: int(_NUMBERS[ord(c)]) if c else GAP
+    return np.array([(END, END), *((number(a), number(b)) for a, b in columns(before, after)), (END, END)])

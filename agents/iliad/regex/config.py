@@ -1,0 +1,114 @@
+"""Settings of REGEX: data, networks and the simulated teacher (3.2.4.3, C.1.2, Table C.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.iliad.config import LearnerConfig
+
+TEACHERS = ("learned", "grammar")
+PRAGMATICS = ("program", "text")
+
+
+@dataclass(frozen=True)
+class RegexConfig:
+    """The defaults are the dissertation's."""
+
+    items: int = 114_503
+    """Data points of the simulation split, each with three requests."""
+    held_out_items: int = 6_429
+    """Data points of validation and of test each, with one request."""
+    vocabulary: int = 8_000
+    """Words that rules are carried out on, where they are made up."""
+    examples: int = 5
+    """J, words that a teacher sees changed; all of them must fit (tau = J)."""
+    hidden_size: int = 512
+    """Width of all recurrent networks."""
+    word_size: int = 128
+    """Width of the embeddings of words of a request."""
+    character_size: int = 32
+    """Width of the embeddings of letters and of a rule's characters."""
+    teacher: str = "learned"
+    """'learned': a describer and an executor of the data (3.2.4.1); 'grammar': whoever made the requests."""
+    wrong: float = 0.0
+    """Share of the grammar teacher's descriptions that tell of another rule."""
+    pragmatics: str = "program"
+    """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the best one ('program', docs/sources.md, S93)."""
+    candidates: int = 10
+    """Sampled descriptions besides the likeliest one."""
+    executor_iterations: int = 30_000
+    """Updates of the teacher's executor."""
+    describer_iterations: int = 40_000
+    """Updates of the teacher's describer."""
+    pretraining_iterations: int = 10_000
+    """Updates of the student on rules without requests, before it learns; 0 for none, as the text has it."""
+    teacher_batch: int = 256
+    """Data points per update of the three."""
+    teacher_rate: float = 1e-3
+    """Adam's learning rate for the three."""
+    data_seed: int = 0
+    """Of data and teacher, which all students share."""
+
+    def __post_init__(self) -> None:
+        if self.teacher not in TEACHERS:
+            raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        if self.pragmatics not in PRAGMATICS:
+            raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
+        if not (0 <= self.wrong <= 1 and self.teacher_rate > 0):
+            raise ValueError(f"wrong {self.wrong} must lie in [0, 1], teacher_rate {self.teacher_rate} above 0")
+        for name in ("items", "held_out_items", "examples", "hidden_size", "word_size", "character_size"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("executor_iterations", "describer_iterations", "teacher_batch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if min(self.candidates, self.pretraining_iterations) < 0 or self.vocabulary < 1000:
+            raise ValueError(
+                f"candidates {self.candidates} and pretraining_iterations {self.pretraining_iterations} must not be "
+                f"negative, vocabulary {self.vocabulary} not below 1000"
+            )
+
+
+REGEX_SCALES: dict[str, RegexConfig] = {
+    "mini": RegexConfig(
+        items=20_000,
+        held_out_items=1_000,
+        hidden_size=128,
+        word_size=64,
+        executor_iterations=4_000,
+        describer_iterations=4_000,
+        pretraining_iterations=1_500,
+        teacher_batch=64,
+        teacher_rate=2e-3,
+    ),
+    "tiny": RegexConfig(
+        items=20_000,
+        held_out_items=1_000,
+        hidden_size=64,
+        word_size=48,
+        character_size=24,
+        executor_iterations=3_000,
+        describer_iterations=3_000,
+        pretraining_iterations=500,
+        teacher_batch=64,
+        teacher_rate=4e-3,
+    ),
+    "paper": RegexConfig(),
+}
+LEARNER_SCALES: dict[str, LearnerConfig] = {
+    "mini": LearnerConfig(iterations=6_000, learning_rate=2e-3, cooldown=0.3, validate_every=250),
+    "tiny": LearnerConfig(iterations=2_000, learning_rate=3e-3, cooldown=0.3, validate_every=200),
+    "paper": LearnerConfig(),
+}
+"""'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""
+
+
+def students_of(config: RegexConfig) -> str:
+    """Folder of a teacher's students."""
+    return f"grammar_{config.wrong:g}" if config.teacher == "grammar" else config.teacher
+
+
+def data_of(config: RegexConfig) -> dict[str, object]:
+    """The settings that decide the data."""
+    names = ("items", "held_out_items", "vocabulary", "examples", "data_seed")
+    return {name: getattr(config, name) for name in names}

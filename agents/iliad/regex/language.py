@@ -1,0 +1,230 @@
+"""How people put a rule into words: templates for every shape, made from a grammar of (condition, object, operation).
+
+A template is a request with slots for letters: '{b1}' is the first letter that is looked for,
+'{a2}' the second that is written. 'every [{b1}] becomes [{a1}]' stands for '()(n)()@c' and others.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, VOWEL, RuleShape
+from embodied.seeds import stream
+
+SPECIFIC = 12
+"""Templates of a shape that say all of it."""
+HELD_OUT = 0.1
+"""Share of the vague texts that are held out for validation and test each."""
+SLIP = 0.05
+"""Share of templates that are written with a slip."""
+SLIPS: Mapping[str, str] = {
+    "letter": "lettter",
+    "vowel": "vowl",
+    "consonant": "consonent",
+    "beginning": "begining",
+    "replace": "replce",
+    "followed": "folowed",
+    "the word": "word",
+    "should be": "shoud be",
+}
+"""What is meant, and what is written."""
+PARTS = ("train", "validation", "test")
+
+
+@dataclass(frozen=True)
+class RequestTemplate:
+    """One way of asking for rules of one shape."""
+
+    text: str
+    shape: RuleShape
+    vague: bool = False
+    """Whether other shapes would be asked for in the same words."""
+
+    def fill(self, before: str, after: str) -> str:
+        """The request with these letters."""
+        slots = {f"b{k}": c for k, c in enumerate(before, 1)} | {f"a{k}": c for k, c in enumerate(after, 1)}
+        return self.text.format(**slots)
+
+
+def templates(*, seed: int) -> dict[str, list[RequestTemplate]]:
+    """Part to its templates; no two parts share a text, every shape has specific templates in each of them."""
+    found: dict[str, list[RequestTemplate]] = {part: [] for part in PARTS}
+    taken: set[str] = set()
+    for shape in SHAPES:
+        mine = [t for t in _specific(shape, seed=seed) if t.text not in taken]
+        taken |= {t.text for t in mine}
+        shared = [t for t in mine if _extreme(shape) in t.text]  # others are asked for in the same words, vaguely
+        mine = [t for t in mine if t not in shared]
+        held = [int(i) for i in stream(seed, "regex", "part", shape.name).permutation(len(mine))[:2]]
+        for number, template in enumerate(mine):
+            part = "validation" if number == held[0] else "test" if number == held[1] else "train"
+            found[part].append(template)
+        for template in shared:
+            found[_part_of(template.text, seed=seed)].append(template)
+        for text in sorted(set(_vague_sayings(shape))):
+            found[_part_of(text, seed=seed)].append(RequestTemplate(text, shape, vague=True))
+    return found
+
+
+def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
+    """A shape's templates: a draw from all that the grammar can say, some with a slip."""
+    rng, found = stream(seed, "regex", "templates", shape.name), {}
+    sayings = sorted(set(_sayings(shape)))
+    for k in rng.permutation(len(sayings))[:SPECIFIC]:
+        text = sayings[int(k)]
+        slips = [(right, wrong) for right, wrong in SLIPS.items() if right in text]
+        if slips and rng.random() < SLIP:
+            right, wrong = slips[int(rng.integers(len(slips)))]
+            text = text.replace(right, wrong, 1)
+        found[text] = RequestTemplate(text, shape)
+    return list(found.values())
+
+
+def _part_of(text: str, *, seed: int) -> str:
+    """The part that a vague text belongs to, whichever shape is meant by it."""
+    at = stream(seed, "regex", "vague", text).random()
+    return "validation" if at < HELD_OUT else "test" if at < 2 * HELD_OUT else "train"
+
+
+# What is looked for -------------------------------------------------------------------------------
+
+
+def _one(symbol: str, number: int) -> list[str]:
+    """A symbol as a noun phrase; `number` is that of its letter."""
+    slot = f"{{b{number}}}"
+    return {
+        LETTER: [f"[{slot}]", f"the letter [{slot}]", f"an [{slot}]"],
+        ANY: ["a letter", "any letter"],
+        VOWEL: ["a vowel", "any vowel"],
+    }.get(symbol, ["a consonant", "any consonant"])
+
+
+def _bare(symbol: str, number: int) -> list[str]:
+    """The same without an article."""
+    slot = f"{{b{number}}}"
+    return {LETTER: [f"[{slot}]", f"letter [{slot}]"], ANY: ["letter", "character"], VOWEL: ["vowel"]}.get(
+        symbol, ["consonant"]
+    )
+
+
+def _pair(block: str, one: bool) -> list[str]:
+    """Two symbols, as a noun phrase with (`one`) or without an article."""
+    a, b = block
+    nouns = _one if one else _bare
+    second = 1 + (a == LETTER)
+    found = [
+        f"{x} {link.format(y)}"
+        for x, y in itertools.product(nouns(a, 1), _one(b, second))
+        for link in ("followed by {}", "and {} right after it", "with {} behind it")
+    ]
+    if block == LETTER + LETTER:
+        found = ["[{b1} {b2}]", "sequence [{b1} {b2}]" if not one else "the letters [{b1} {b2}]", *found[:3]]
+    if block == ANY + ANY:
+        return ["two letters", "any two letters"] if one else ["pair of letters", "two letters"]
+    if a == ANY:
+        found += [f"{y} and the letter before it" for y in nouns(b, second)]
+    if b == ANY:
+        found += [f"{x} and the letter {w} it" for x in nouns(a, 1) for w in ("after", "that follows")]
+    return found
+
+
+def _phrases(block: str, one: bool) -> list[str]:
+    if len(block) == 2:
+        return _pair(block, one)
+    return (_one if one else _bare)(block, 1)
+
+
+# What is done to it -------------------------------------------------------------------------------
+
+
+def _operations(replacement: str, what: str) -> list[str]:
+    """Imperatives: what to do to `what`."""
+    new = _new(replacement)
+    return {
+        "": [f"delete {what}", f"remove {what}", f"drop {what}", f"take out {what}"],
+        "SS": [f"double {what}", f"repeat {what}", f"write {what} twice"],
+        "LS": [f"add {new} before {what}", f"put {new} in front of {what}", f"insert {new} before {what}"],
+        "SL": [f"add {new} after {what}", f"put {new} behind {what}", f"insert {new} after {what}"],
+    }.get(
+        replacement,
+        [
+            f"replace {what} with {new}",
+            f"change {what} to {new}",
+            f"turn {what} into {new}",
+            f"write {new} instead of {what}",
+            f"substitute {new} for {what}",
+        ],
+    )
+
+
+def _passives(replacement: str, what: str) -> list[str]:
+    """What happens to `what`."""
+    new = _new(replacement)
+    return {
+        "": [f"{what} should be removed", f"{what} is deleted", f"{what} must go"],
+        "SS": [f"{what} should be doubled", f"{what} is repeated", f"{what} appears twice"],
+        "LS": [f"{what} should get {new} in front", f"{new} is added before {what}"],
+        "SL": [f"{what} should get {new} behind it", f"{new} is added after {what}"],
+    }.get(replacement, [f"{what} should be replaced by {new}", f"{what} becomes {new}", f"{what} is changed to {new}"])
+
+
+def _result(replacement: str) -> str:
+    """What stands there afterwards, in the fewest words."""
+    return {"": "nothing", "SS": "twice", "LS": f"{_new('L')} + same", "SL": f"same + {_new('L')}"}.get(
+        replacement, _new(replacement)
+    )
+
+
+def _new(replacement: str) -> str:
+    return "[{a1} {a2}]" if replacement.count(LETTER) == 2 else "[{a1}]"
+
+
+# Whole requests -----------------------------------------------------------------------------------
+
+
+def _sayings(shape: RuleShape) -> Iterator[str]:
+    """Everything that the grammar can say for a shape: conditional, imperative, passive and terse."""
+    ones, bares = _phrases(shape.block, True), _phrases(shape.block, False)
+    for condition in _conditions(shape.anchor, ones):
+        for operation in _operations(shape.replacement, "it" if len(shape.block) == 1 else "them"):
+            yield f"{condition} , {operation}"
+    for place in _places(shape, ones, bares):
+        yield from _operations(shape.replacement, place)
+        yield from _passives(shape.replacement, place)
+    where = {ANYWHERE: "", START: "start : "}.get(shape.anchor, "end : ")
+    yield from (f"{where}{x} -> {_result(shape.replacement)}" for x in ones)
+
+
+def _vague_sayings(shape: RuleShape) -> Iterator[str]:
+    """As if any letter were meant that stands at the shape's end of the word; nothing for other shapes."""
+    if shape.anchor and set(shape.block) != {ANY}:
+        place = _extreme(shape)
+        yield from _operations(shape.replacement, place)
+        yield from _passives(shape.replacement, place)
+
+
+def _conditions(anchor: str, ones: Sequence[str]) -> list[str]:
+    forms = {
+        ANYWHERE: ("wherever there is {}", "for every occurrence of {}", "each time you see {}"),
+        START: ("if the word starts with {}", "when a word begins with {}", "words beginning with {}"),
+    }.get(anchor, ("if the word ends with {}", "when a word ends in {}", "words ending with {}"))
+    return [form.format(x) for form in forms for x in ones]
+
+
+def _places(shape: RuleShape, ones: Sequence[str], bares: Sequence[str]) -> list[str]:
+    """The object of an operation, with where it stands."""
+    if shape.anchor == ANYWHERE:
+        every = [f"{word} {x}" for word in ("every", "each") for x in bares]
+        return every + [f"all instances of {x}" for x in ones]
+    words = ("start", "beginning", "leading") if shape.anchor == START else ("end", "back", "final")
+    found = [f"{x} at the {word} of the word" for x in ones for word in words[:2]]
+    found += [f"the {words[2]} {x}" for x in bares]
+    return [_extreme(shape)] if set(shape.block) == {ANY} else found
+
+
+def _extreme(shape: RuleShape) -> str:
+    """'the first letter', 'the last two letters'."""
+    side = "first" if shape.anchor == START else "last"
+    return f"the {side} letter" if len(shape.block) == 1 else f"the {side} two letters"

@@ -1,0 +1,91 @@
+"""The networks of REGEX (Figure C.5): a speller reads a word and a request and writes; a describer reads changes.
+
+B data points, W letters of a word, S words of a request, T characters or words that are written, h
+hidden size. The student is a speller of rules, the teacher's executor a speller of words.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD, WORD_END
+from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
+from agents.imitation.decoding import Choice
+
+
+class Speller(nn.Module):
+    """p(characters | word, request): the word's last state begins the request's LSTM, whose last begins the writer
+    (docs/sources.md, S98)."""
+
+    stop = END
+
+    def __init__(self, words: int, size: int, word_size: int, character_size: int) -> None:
+        super().__init__()
+        self.letters = nn.Embedding(CHARACTERS, character_size)
+        self.words = nn.Embedding(words, word_size)
+        self.read_word = nn.LSTM(character_size, size, batch_first=True)
+        self.read_request = nn.LSTM(word_size, size, batch_first=True)
+        self.to_request, self.to_writer = Bridge(size), Bridge(size)
+        self.writer = Writer(CHARACTERS, character_size, size, memories=2)
+
+    def read(self, word: Tensor, request: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
+        """(B, W) letters and (B, S) words to the writer's first state and memories."""
+        letters, _ = self.read_word(self.letters(word))
+        words, _ = self.read_request(self.words(request), self.to_request(last(letters, word != PAD)))
+        of_word, of_request = self.writer.attend
+        memories = [of_word.remember(letters, word != PAD), of_request.remember(words, request != 0)]
+        return self.to_writer(last(words, request != 0)), memories
+
+    def forward(self, word: Tensor, request: Tensor, written: Tensor) -> Tensor:
+        """Logits (B, T, V) before each of the given characters (B, T)."""
+        state, memories = self.read(word, request)
+        return self.writer(before(written, END), state, memories)[0]
+
+    @torch.no_grad()
+    def write(self, word: Tensor, request: Tensor, choose: Choice, longest: int) -> Tensor:
+        """(B, at most `longest`) characters, END last unless cut, padded."""
+        state, memories = self.read(word, request)
+        return write(self.writer, state, memories, choose, longest, END)
+
+
+class ChangeDescriber(nn.Module):
+    """p(words | J changed words): a window over each column of a change and its neighbours, read with attention
+    (docs/sources.md, S96)."""
+
+    def __init__(self, words: int, size: int, word_size: int, character_size: int) -> None:
+        super().__init__()
+        self.before = nn.Embedding(CHARACTERS + 1, character_size, padding_idx=PAD)
+        self.after = nn.Embedding(CHARACTERS + 1, character_size, padding_idx=PAD)
+        assert GAP == CHARACTERS
+        self.window = nn.Linear(6 * character_size, size)
+        self.column = nn.Linear(size, size)
+        self.summary = nn.Linear(2 * size, size)
+        self.begin = Bridge(size)
+        self.writer = Writer(words, word_size, size, memories=1)
+
+    def read(self, changed: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
+        """(B, J, T, 2) columns to the writer's first state and memory of J T columns."""
+        mask = changed[..., 0] != PAD
+        pairs = torch.cat([self.before(changed[..., 0]), self.after(changed[..., 1])], -1)
+        padded = nn.functional.pad(pairs, (0, 0, 1, 1))
+        near = torch.cat([padded[:, :, :-2], pairs, padded[:, :, 2:]], -1)  # a column with both its neighbours
+        columns = torch.relu(self.column(torch.relu(self.window(near)))) * mask[..., None]
+        flat, flags = columns.flatten(1, 2), mask.flatten(1)
+        mean = flat.sum(1) / flags.sum(1, keepdim=True)
+        first = torch.tanh(self.summary(torch.cat([mean, flat.amax(1)], -1)))
+        return self.begin(first), [self.writer.attend[0].remember(flat, flags)]
+
+    def forward(self, changed: Tensor, written: Tensor) -> Tensor:
+        """Logits (B, T, V) before each of the given words (B, T)."""
+        state, memories = self.read(changed)
+        return self.writer(before(written, WORD_END), state, memories)[0]
+
+    @torch.no_grad()
+    def write(self, changed: Tensor, choose: Choice, longest: int, copies: int = 1) -> Tensor:
+        """(copies B, at most `longest`) words; the copies of one description stand one behind the other."""
+        (hidden, cell), memories = self.read(changed)
+        if copies > 1:
+            rows = torch.arange(len(changed)).repeat_interleave(copies)
+            hidden, cell, memories = hidden[:, rows], cell[:, rows], [m.select(rows) for m in memories]
+        return write(self.writer, (hidden, cell), memories, choose, longest, WORD_END)

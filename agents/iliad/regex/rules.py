@@ -1,0 +1,189 @@
+"""Rules 'pattern@replacement': their shapes, and how one is carried out on a word, whoever wrote it (C.1.2).
+
+A rule of our own is three groups, of which the outer ones hold an anchor or nothing:
+'(^)(Ca)()@x\\2' puts an x before a consonant and an a at the start of a word. C and V stand for any
+consonant and any vowel.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+LETTERS = "abcdefghijklmnopqrstuvwxyz"
+VOWELS = "aeiou"
+SYMBOLS = "^$.()@\\2CV"
+ALPHABET = LETTERS + SYMBOLS
+"""All characters that a rule may have. None of them repeats or chooses, so matching never goes back."""
+LONGEST = 40
+"""H, the most characters of a rule (Table C.2)."""
+LONGEST_OUTPUT = 60
+"""Letters of the longest word that counts as one."""
+_CLASSES = {"C": "[b-df-hj-np-tv-z]", "V": "[aeiou]"}
+START, END, ANYWHERE = "^", "$", ""
+ANCHORS = (ANYWHERE, START, END)
+LETTER, ANY, VOWEL, CONSONANT = "L", ".", "V", "C"
+BLOCKS = tuple("".join(p) for n in (1, 2) for p in itertools.product((LETTER, ANY, VOWEL, CONSONANT), repeat=n))
+"""What is looked for: one or two symbols."""
+SAME = "S"
+"""In a replacement: what was found, written \\2 in a rule."""
+REPLACEMENTS = ("", "L", "LL", "LS", "SL", "SS")
+"""What is written instead; SAME alone would change nothing."""
+
+
+@dataclass(frozen=True, order=True)
+class RuleShape:
+    """A rule without its letters."""
+
+    anchor: str
+    block: str
+    replacement: str
+
+    @property
+    def name(self) -> str:
+        """Such as '^LV@SL'."""
+        start, end = (self.anchor, "") if self.anchor == START else ("", self.anchor)
+        return f"{start}{self.block}{end}@{self.replacement}"
+
+    @property
+    def before(self) -> int:
+        """Letters that it looks for."""
+        return self.block.count(LETTER)
+
+    @property
+    def after(self) -> int:
+        """Letters that it writes."""
+        return self.replacement.count(LETTER)
+
+    def rule(self, before: str, after: str) -> str:
+        """The rule with these letters in this shape."""
+        letters, new = iter(before), iter(after)
+        block = "".join(next(letters) if s == LETTER else s for s in self.block)
+        text = "".join(next(new) if s == LETTER else "\\2" for s in self.replacement)
+        start, end = (self.anchor, "") if self.anchor == START else ("", self.anchor)
+        return f"({start})({block})({end})@{text}"
+
+
+SHAPES = tuple(RuleShape(a, b, r) for a in ANCHORS for b in BLOCKS for r in REPLACEMENTS)
+"""360 of the 420 products of the three parts: 60 would change nothing."""
+
+
+def apply(rule: str, word: str) -> str | None:
+    """The word that `rule` makes of `word`; None if it is no rule.
+
+    Safe for whatever a network says: a rule has at most LONGEST characters, all of ALPHABET, which
+    has no repetition, choice or counter; so each of them is matched at most once per place of the
+    word, and the output is at most LONGEST times as long as the word. Matching cannot explode (docs/sources.md, S100).
+    """
+    made = compiled(rule)
+    if made is None:
+        return None
+    pattern, replacement = made
+    try:
+        out = pattern.sub(replacement, word)
+    except (re.error, IndexError):  # a replacement that names a group that is not there
+        return None
+    return out if len(out) <= LONGEST_OUTPUT else None
+
+
+@functools.lru_cache(maxsize=20_000)
+def compiled(rule: str) -> tuple[re.Pattern[str], str] | None:
+    """Pattern and replacement of a rule; None if it is none.
+
+    Valid is, as in the authors' program, what has exactly one '@', no C, V or parenthesis behind
+    it, and compiles; and, here, what has at most LONGEST characters, all of ALPHABET.
+    """
+    if len(rule) > LONGEST or rule.count("@") != 1 or not set(rule) <= set(ALPHABET):
+        return None
+    pattern, replacement = rule.split("@")
+    if set(replacement) & set("CV()"):
+        return None
+    try:
+        return re.compile("".join(_CLASSES.get(c, c) for c in pattern)), replacement
+    except (re.error, OverflowError):
+        return None
+
+
+def outputs(rule: str, words: Sequence[str]) -> tuple[str, ...] | None:
+    """What a rule makes of several words; None if it is no rule for one of them."""
+    found = [apply(rule, w) for w in words]
+    return None if any(f is None for f in found) else tuple(f for f in found if f is not None)
+
+
+def random_shape(*, rng: np.random.Generator) -> RuleShape:
+    """A shape: any anchor, one symbol as often as two, half of them letters, any replacement."""
+    kinds = (LETTER, ANY, VOWEL, CONSONANT)
+    count = int(rng.integers(1, 3))
+    block = "".join(kinds[int(k)] for k in rng.choice(4, size=count, p=(0.5, 1 / 6, 1 / 6, 1 / 6)))
+    anchor = ANCHORS[int(rng.integers(len(ANCHORS)))]
+    return RuleShape(anchor, block, REPLACEMENTS[int(rng.integers(len(REPLACEMENTS)))])
+
+
+def random_rule(shape: RuleShape, words: Sequence[str], *, rng: np.random.Generator) -> tuple[str, str, str] | None:
+    """A rule of this shape that changes some word, with its letters before and after.
+
+    Letters that are looked for are taken from a random word where the shape fits; None if it fits nowhere there.
+    """
+    word = words[int(rng.integers(len(words)))]
+    places = _places(shape, word)
+    if not places:
+        return None
+    at = places[int(rng.integers(len(places)))]
+    before = "".join(word[at + k] for k, s in enumerate(shape.block) if s == LETTER)
+    after = "".join(LETTERS[int(k)] for k in rng.integers(26, size=shape.after))
+    return shape.rule(before, after), before, after
+
+
+def _places(shape: RuleShape, word: str) -> list[int]:
+    """Where in `word` the shape's block fits, whatever its letters are."""
+    n = len(shape.block)
+    fits = {
+        LETTER: lambda c: True,
+        ANY: lambda c: True,
+        VOWEL: lambda c: c in VOWELS,
+        CONSONANT: lambda c: c not in VOWELS,
+    }
+    first = {START: [0], END: [len(word) - n]}.get(shape.anchor, range(len(word) - n + 1))
+    return [p for p in first if p >= 0 and all(fits[s](word[p + k]) for k, s in enumerate(shape.block))]
+
+
+def edit_distance(a: str, b: str) -> int:
+    """Fewest insertions, deletions and substitutions between two words."""
+    return len(a) + len(b) if not (a and b) else _distances(a, b)[-1][-1]
+
+
+def columns(before: str, after: str) -> list[tuple[str, str]]:
+    """Two words side by side by a shortest edit: pairs of letters, '' where the other word has more.
+
+    What can be paired without an edit is paired late, so an insertion stands before what follows it.
+    """
+    table, i, j, found = _distances(before, after), len(before), len(after), []
+    while i or j:
+        here = table[i][j]
+        if i and j and here == table[i - 1][j - 1] + (before[i - 1] != after[j - 1]):
+            i, j = i - 1, j - 1
+            found.append((before[i], after[j]))
+        elif i and here == table[i - 1][j] + 1:
+            i -= 1
+            found.append((before[i], ""))
+        else:
+            j -= 1
+            found.append(("", after[j]))
+    return found[::-1]
+
+
+def _distances(a: str, b: str) -> list[list[int]]:
+    """(len(a) + 1, len(b) + 1) distances between the beginnings of two words."""
+    table = [list(range(len(b) + 1))]
+    for i, x in enumerate(a, 1):
+        above, row, least = table[-1], [i], i
+        for j, y in enumerate(b, 1):
+            least = min(above[j] + 1, least + 1, above[j - 1] + (x != y))
+            row.append(least)
+        table.append(row)
+    return table

@@ -1,0 +1,151 @@
+"""What the commands of REGEX do: settings become data, teacher and student, and these a problem of ILIAD."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from agents.iliad.config import LearnerConfig, as_dict
+from agents.iliad.protocol import DescribingTeacher
+from agents.iliad.regex.coding import Requests, request_words
+from agents.iliad.regex.config import RegexConfig, data_of
+from agents.iliad.regex.data import RegexData, WordTask, make_data, read_templates, rules_without_requests
+from agents.iliad.regex.networks import Speller
+from agents.iliad.regex.stages import (
+    load_network,
+    new_network,
+    pretrain_student,
+    save_network,
+    teach_describer,
+    teach_executor,
+)
+from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
+from agents.iliad.regex.words import read_words
+from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
+from agents.iliad.training import IliadProblem, train
+from agents.imitation.loop import Note
+from assets.cache import digest, write_json
+from embodied.seeds import stream
+
+UNLABELED = 20_000
+"""Rules of the marginal's list."""
+VALIDATION = 500
+"""Data points of each validation; the last one of a run and tests have all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grounds:
+    """What all students of a study share."""
+
+    config: RegexConfig
+    data: RegexData
+    requests: Requests
+    teacher: DescribingTeacher[WordTask, Written]
+    digest: str
+    """Of the data."""
+
+
+def prepare(
+    config: RegexConfig, folder: Path, *, words: Path | None = None, templates: Path | None = None, note: Note = print
+) -> Grounds:
+    """Data and teacher, made or trained into `folder` unless they are there.
+
+    Raises:
+      ValueError: files that cannot be used; data of other settings in the folder.
+    """
+    data = _data(config, Path(folder) / "data.json", words, templates)
+    requests = request_words(r for q in data.splits["train"] for r in q.requests)
+    count = sum(len(v) for v in data.templates.values())
+    note(f"{len(data.words)} words, {count} templates, {len(requests.vocabulary)} words of requests")
+    if config.teacher == "grammar":
+        if templates:
+            raise ValueError("the grammar knows no templates but its own; use --teacher learned with --templates")
+        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(data, config.data_seed, config.wrong)
+    else:
+        executor = teach_executor(data, config, requests, Path(folder), note=note)
+        describer = teach_describer(data, config, requests, Path(folder), note=note)
+        teacher = LearnedTeacher(describer, executor, requests, config.candidates, config.pragmatics)
+    return Grounds(config, data, requests, teacher, _digest(data))
+
+
+def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print) -> IliadProblem[WordTask, Written]:
+    """A student of this seed with everything around it; it is pretrained in `folder` where the settings say so."""
+    c = grounds.config
+
+    def student() -> RegexStudent:
+        if not c.pretraining_iterations:
+            return RegexStudent(new_network(Speller, c, grounds.requests, seed, "student"), grounds.requests)
+        made = pretrain_student(grounds.data, c, grounds.requests, folder, seed, note=note)
+        return RegexStudent(made.train(), grounds.requests)
+
+    rules = tuple(rules_without_requests(grounds.data, UNLABELED, rng=stream(c.data_seed, "regex", "unlabeled")))
+    splits = grounds.data.splits
+    identity = {"world": "regex", "data": grounds.digest, **as_dict(c)}
+    return IliadProblem(
+        RegexWorld(), grounds.teacher, RegexMarginal(rules), student(), student(),
+        splits["train"], splits["validation"][:VALIDATION], identity,
+    )  # fmt: skip
+
+
+def learn(
+    grounds: Grounds, learner: LearnerConfig, folder: Path, *, minutes: float | None = None, note: Note = print
+) -> list[dict[str, float]]:
+    """Train, or go on training, the student of a run folder; keeps the best one as best.safetensors."""
+    home = Path(folder) / f"seed_{learner.seed}"
+    problem = problem_of(grounds, learner.seed, home / "pretraining", note=note)
+    student = problem.student
+    assert isinstance(student, RegexStudent)
+    keep = lambda path: save_network(path, student.speller, grounds.config, grounds.requests, as_dict(learner))
+    return train(problem, learner, home / name_of(learner), keep, minutes=minutes, note=note)
+
+
+def name_of(learner: LearnerConfig) -> str:
+    """The folder of a learner: its name and what is not as usual."""
+    if learner.learner != "adel":
+        return learner.learner
+    annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
+    return f"adel_{learner.mixing:g}{annealed}"
+
+
+def load_student(path: Path) -> tuple[RegexStudent, RegexConfig]:
+    """A student that `learn` kept.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged or of another format.
+    """
+    speller, requests, config = load_network(path, Speller)
+    return RegexStudent(speller, requests), config
+
+
+def _data(config: RegexConfig, path: Path, words: Path | None, templates: Path | None) -> RegexData:
+    """The data of a folder, made if it is not there."""
+    own = {name: p.read_text(encoding="utf-8") for name, p in (("words", words), ("templates", templates)) if p}
+    identity = {**data_of(config), **{k: digest(v) for k, v in own.items()}}
+    if path.exists():
+        body = json.loads(path.read_text(encoding="utf-8"))
+        if body["made of"] != identity:
+            raise ValueError(f"{path} was made with {body['made of']}, now it is {identity}; use another folder")
+        splits = {part: [_item(row) for row in rows] for part, rows in body["splits"].items()}
+        return RegexData(tuple(body["words"]), body["templates"], splits)
+    data = make_data(config, read_words(words) if words else (), read_templates(templates) if templates else None)
+    body = {
+        "made of": identity,
+        "words": data.words,
+        "templates": {part: [t.text for t in many] for part, many in data.templates.items()},
+        "splits": {part: [dataclasses.astuple(q) for q in items] for part, items in data.splits.items()},
+    }
+    write_json(path, body)
+    return data
+
+
+def _item(row: Sequence) -> WordTask:
+    requests, rule, words, made = row
+    return WordTask(tuple(requests), rule, tuple(words), tuple(made))
+
+
+def _digest(data: RegexData) -> str:
+    splits: Mapping[str, Sequence[WordTask]] = data.splits
+    return digest({part: [dataclasses.astuple(q) for q in items] for part, items in splits.items()})

@@ -1,0 +1,92 @@
+"""One episode of REGEX in words: what was asked, what the student did, what was said of it, what it learned."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import torch
+
+from agents.imitation.actor_critic import descend
+from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from agents.iliad.protocol import DescribingTeacher
+    from agents.iliad.regex.data import WordTask
+    from agents.iliad.regex.world import RegexStudent, Written
+
+RATE, CLIP = 1e-3, 5.0
+"""Of the one update that shows what is learned from a description."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """An episode, and how it changes a student."""
+
+    request: str
+    words: tuple[str, ...]
+    wanted: tuple[str, ...]
+    rule: str
+    """What the student wrote."""
+    outputs: tuple[str, ...] | None
+    """What it makes of the words; None where it cannot be carried out."""
+    success: bool
+    description: str | None
+    """What the teacher said of it."""
+    before: float | None
+    after: float | None
+    """Probability of the rule, given the description, before and after learning from this episode alone."""
+
+
+def tell(
+    student: RegexStudent,
+    teacher: DescribingTeacher[WordTask, Written],
+    item: WordTask,
+    *,
+    seed: int,
+    sample: bool = True,
+) -> Told:
+    """Play one episode with an item; the student itself stays as it is.
+
+    Args:
+      sample: as in training; False writes the likeliest rule.
+    """
+    rng = stream(seed, "regex", "shown", item.rule, item.words[0])
+    request = item.requests[0]
+    (done,) = student.sample([item], [request], rng=rng) if sample else student.greedy([item], [request])
+    (said,) = teacher.describe([item], [done], rng=rng)
+    before = after = None
+    if said:
+        before = _probability(student, item, said, done)
+        learner = copy.copy(student)
+        learner.speller = copy.deepcopy(student.speller).train()
+        optimizer = torch.optim.Adam(learner.speller.parameters(), RATE)
+        descend(-learner.scores([item], [said], [done]).log_probabilities.sum(), optimizer, CLIP, "shown episode")
+        after = _probability(learner, item, said, done)
+    success = done.outputs is not None and done.outputs[0] == item.outputs[0]
+    return Told(request, item.words, item.outputs, done.rule, done.outputs, success, said, before, after)
+
+
+def lines_of(told: Told) -> list[str]:
+    """The episode for people to read."""
+    width = max(map(len, told.words)) + 2
+    found = [f"request       {told.request}", f"student       {told.rule}"]
+    outputs: Sequence[str] = told.outputs or ("(no rule)",) * len(told.words)
+    for k, (word, out, wanted) in enumerate(zip(told.words, outputs, told.wanted, strict=True)):
+        mark = "right" if out == wanted else f"wanted {wanted}"
+        found.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{width + 2}}{mark}")
+    found.append(f"fulfilled     {'yes' if told.success else 'no'}")
+    if told.description is None or told.before is None or told.after is None:
+        return [*found, "teacher       (nothing to say)", "learned       nothing"]
+    return [
+        *found,
+        f"teacher       {told.description}",
+        f"learned       p(what it did | what was said) {told.before:.4f} -> {told.after:.4f} by one update",
+    ]
+
+
+def _probability(student: RegexStudent, item: WordTask, said: str, done: Written) -> float:
+    with torch.no_grad():
+        return float(student.scores([item], [said], [done]).log_probabilities.sum().exp())

@@ -1,0 +1,212 @@
+"""What is trained before a student learns: the teacher's executor and describer, and a student on rules alone.
+
+All three are maximum likelihood on batches drawn by (seed, update), resumable and exact after a kill.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from agents.hanna.vocabulary import Vocabulary
+from agents.iliad.protocol import NOTHING
+from agents.iliad.regex.coding import Requests, changes, characters, texts
+from agents.iliad.regex.config import RegexConfig
+from agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
+from agents.iliad.regex.networks import ChangeDescriber, Speller
+from agents.iliad.regex.rules import outputs
+from agents.iliad.writing import log_likelihood
+from agents.imitation.actor_critic import descend
+from agents.imitation.decoding import likeliest
+from agents.imitation.loop import Note, falling_rate
+from agents.imitation.runs import Run
+from agents.tensor_file import load_tensors, put, save_tensors
+from embodied.locks import locked
+from embodied.seeds import stream
+
+FORMAT = "embodied-iliad-stage-1"
+WEIGHTS = ("embodied-regex-1",)
+REMEDY = "delete it and train it again with `embodied train iliad regex`"
+COOLDOWN = 0.4
+"""Share of the updates, the last ones, over which the rate of these stages falls (docs/sources.md, S92)."""
+CLIP = 5.0
+REPORT = 250
+"""Updates between notes."""
+Network = TypeVar("Network", bound=nn.Module)
+
+
+def new_network(kind: Callable[..., Network], config: RegexConfig, requests: Requests, seed: int, name: str) -> Network:
+    """An untrained speller or describer; its weights follow from seed and name."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(stream(seed, "regex", "begin", name).integers(2**31)))
+        return kind(len(requests.vocabulary), config.hidden_size, config.word_size, config.character_size)
+
+
+def teach_executor(data: RegexData, config: RegexConfig, requests: Requests, folder: Path, *, note: Note) -> Speller:
+    """pi_T (3.2.4.3): words and a request to the word that comes out; on the simulation split."""
+    network = new_network(Speller, config, requests, config.data_seed, "executor")
+    items = data.splits["train"]
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        chosen = [items[int(i)] for i in rng.integers(len(items), size=config.teacher_batch)]
+        places = rng.integers(config.examples, size=len(chosen))
+        words = characters([q.words[j] for q, j in zip(chosen, places)])
+        wanted = characters([q.outputs[j] for q, j in zip(chosen, places)])
+        return _likelihood(network(words, requests(_asked(chosen, rng)), wanted), wanted)
+
+    stage = _Stage("executor", folder, config.executor_iterations, config, config.data_seed)
+    return stage.train(network, requests, loss_of, lambda: executor_success(network, requests, _sample(data)), note)
+
+
+def teach_describer(
+    data: RegexData, config: RegexConfig, requests: Requests, folder: Path, *, note: Note
+) -> ChangeDescriber:
+    """P~_T(d | e) (3.2.4.1): J words before and after to a request; on the simulation split."""
+    network = new_network(ChangeDescriber, config, requests, config.data_seed, "describer")
+    items = data.splits["train"]
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        chosen = [items[int(i)] for i in rng.integers(len(items), size=config.teacher_batch)]
+        changed = changes([list(zip(q.words, q.outputs, strict=True)) for q in chosen])
+        wanted = requests(_asked(chosen, rng))
+        return _likelihood(network(changed, wanted), wanted)
+
+    stage = _Stage("describer", folder, config.describer_iterations, config, config.data_seed)
+    return stage.train(network, requests, loss_of, dict, note)
+
+
+def pretrain_student(
+    data: RegexData, config: RegexConfig, requests: Requests, folder: Path, seed: int, *, note: Note
+) -> Speller:
+    """A student that writes rules, knowing no requests: random ones that change the word (docs/sources.md, S95)."""
+    network = new_network(Speller, config, requests, seed, "student")
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        words, rules = changing_rules(data, config.teacher_batch, rng=rng)
+        wanted = characters(rules)
+        return _likelihood(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
+
+    stage = _Stage("student", folder, config.pretraining_iterations, config, seed)
+    return stage.train(network, requests, loss_of, dict, note)
+
+
+def changing_rules(data: RegexData, count: int, *, rng: np.random.Generator) -> tuple[list[str], list[str]]:
+    """Random rules, each with a random word that it changes; a rule is drawn again until it changes its word."""
+    words: list[str] = []
+    rules: list[str] = []
+    while len(rules) < count:
+        for rule in rules_without_requests(data, count - len(rules), rng=rng):
+            word = data.words[int(rng.integers(len(data.words)))]
+            if outputs(rule, [word]) not in (None, (word,)):
+                words.append(word)
+                rules.append(rule)
+    return words, rules
+
+
+def executor_success(executor: Speller, requests: Requests, items: Sequence[WordTask]) -> dict[str, float]:
+    """Share of words that the executor changes as their request says."""
+    words = characters([q.words[0] for q in items])
+    longest = max(len(q.outputs[0]) for q in items) + 2
+    written = texts(executor.write(words, requests([q.requests[0] for q in items]), likeliest, longest))
+    return {"success": float(np.mean([w == q.outputs[0] for w, q in zip(written, items, strict=True)]))}
+
+
+def save_network(
+    path: Path, network: nn.Module, config: RegexConfig, requests: Requests, about: Mapping[str, object]
+) -> None:
+    """Write weights, settings and words, atomically."""
+    facts = {
+        "format": WEIGHTS[0],
+        "config": json.dumps(vars(config), sort_keys=True),
+        "words": json.dumps(list(requests.vocabulary.words)),
+        "about": json.dumps(dict(about), sort_keys=True),
+    }
+    save_tensors(path, network.state_dict(), facts)
+
+
+def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Requests, RegexConfig]:
+    """What `save_network` wrote.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged or of another format.
+    """
+    tensors, about = load_tensors(path, WEIGHTS, REMEDY)
+    config = RegexConfig(**json.loads(about["config"]))
+    requests = Requests(Vocabulary(tuple(json.loads(about["words"]))))
+    network = new_network(kind, config, requests, 0, "loaded")
+    put(network, tensors, path)
+    return network.eval(), requests, config
+
+
+class _Stage:
+    """One of the three: where it is kept, how long it lasts."""
+
+    def __init__(self, name: str, folder: Path, updates: int, config: RegexConfig, seed: int) -> None:
+        self.name, self.folder, self.updates, self.config, self.seed = name, Path(folder), updates, config, seed
+
+    def train(
+        self,
+        network: Network,
+        requests: Requests,
+        loss_of: Callable[[np.random.Generator], Tensor],
+        judge: Callable[[], Mapping[str, float]],
+        note: Note,
+    ) -> Network:
+        """Train `network` or go on, unless that is done; keeps it as NAME.safetensors in the folder."""
+        c, path = self.config, self.folder / f"{self.name}.safetensors"
+        optimizer = torch.optim.Adam(network.parameters(), c.teacher_rate, fused=True)
+        identity = {"stage": self.name, "updates": self.updates, "seed": self.seed, "words": len(requests.vocabulary)}
+        identity |= {k: v for k, v in vars(c).items() if k in _DECIDE}
+        run = Run(self.folder / self.name, identity, {"network": network}, {"adam": optimizer}, FORMAT)
+        if run.progress.update >= self.updates:
+            return network.eval()
+        network.train()
+        with locked(run.folder), run.session(self.updates, 2.0, note) as session:
+            for update in session:
+                for group in optimizer.param_groups:
+                    group["lr"] = falling_rate(c.teacher_rate, update, self.updates, COOLDOWN)
+                loss = loss_of(stream(self.seed, "regex", self.name, update))
+                descend(loss, optimizer, CLIP, f"{self.name}, update {update}")
+                run.add({"loss": float(loss.detach()), "updates": 1.0})
+                if (update + 1) % REPORT == 0 or update + 1 == self.updates:
+                    found = {"update": update + 1.0, "loss": run.sums["loss"] / run.sums["updates"], **judge()}
+                    run.history.append(found)
+                    run.sums = {}
+                    note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
+        save_network(path, network, c, requests, {"stage": self.name, **identity})
+        return network.eval()
+
+
+_DECIDE = (
+    "items",
+    "held_out_items",
+    "vocabulary",
+    "examples",
+    "hidden_size",
+    "word_size",
+    "character_size",
+    "teacher_batch",
+    "teacher_rate",
+    "data_seed",
+)
+"""Settings that decide what a stage gives."""
+
+
+def _likelihood(logits: Tensor, wanted: Tensor) -> Tensor:
+    """Negative log-likelihood per data point."""
+    return -log_likelihood(logits, wanted).sum() / len(wanted)
+
+
+def _asked(items: Sequence[WordTask], rng: np.random.Generator) -> list[str]:
+    """One request of each item."""
+    return [q.requests[int(rng.integers(len(q.requests)))] for q in items]
+
+
+def _sample(data: RegexData) -> Sequence[WordTask]:
+    return data.splits["validation"][:256]

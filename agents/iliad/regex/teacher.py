@@ -1,0 +1,163 @@
+"""Who describes what a rule did: a describer with an executor (3.2.4.1), or the grammar that asks for rules."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from agents.iliad.describing import by_the_program, by_the_text, kept
+from agents.iliad.protocol import NOTHING
+from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
+from agents.iliad.regex.data import Grammar, RegexData, WordTask, random_asked
+from agents.iliad.regex.networks import ChangeDescriber, Speller
+from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
+from agents.iliad.regex.world import Written
+from agents.imitation.decoding import drawn_with, likeliest
+
+_OWN_RULE = re.compile(r"\((\^?)\)\(([a-zCV.]{1,2})\)\((\$?)\)@((?:[a-z]|\\2){0,2})")
+Case = tuple[WordTask, Written, str]
+"""Task, execution, and a description of it."""
+
+
+def describable(task: WordTask, execution: Written) -> bool:
+    """Whether the rule can be carried out on all words and changes one: others are not asked about."""
+    return execution.outputs is not None and execution.outputs != task.words
+
+
+def near_optimal(task: WordTask, execution: Written) -> bool:
+    """perf >= tau of Eq 3.15: all J words became what they should (C.1.2)."""
+    return execution.outputs == task.outputs
+
+
+def human(task: WordTask, *, rng: np.random.Generator) -> str:
+    """Unif(D*)."""
+    return task.requests[int(rng.integers(len(task.requests)))]
+
+
+class LearnedTeacher:
+    """Eq 3.15 and 3.16 with two networks; it sees words before and after, never a rule."""
+
+    def __init__(
+        self, describer: ChangeDescriber, executor: Speller, requests: Requests, candidates: int, pragmatics: str
+    ) -> None:
+        self.describer, self.executor, self.requests = describer.eval(), executor.eval(), requests
+        self.candidates, self.pragmatics = candidates, pragmatics
+
+    def describe(
+        self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        uniforms = rng.random((len(tasks), self.candidates, LONGEST_REQUEST))
+        said: list[str | None] = [None] * len(tasks)
+        open_ones = []
+        for i, (q, e) in enumerate(zip(tasks, executions, strict=True)):
+            if describable(q, e):
+                if near_optimal(q, e):
+                    said[i] = human(q, rng=rng)
+                else:
+                    open_ones.append(i)
+        found = self._pragmatic([tasks[i] for i in open_ones], [executions[i] for i in open_ones], uniforms[open_ones])
+        for i, pragmatic in zip(open_ones, found, strict=True):
+            text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
+            said[i] = text or None
+        return said
+
+    def _pragmatic(
+        self, tasks: Sequence[WordTask], executions: Sequence[Written], uniforms: np.ndarray
+    ) -> list[list[str]]:
+        """D_prag of each execution; of the program's rule, which wants the first one only, no more than that."""
+        if not tasks:
+            return []
+        greedy = self.candidates_of(tasks, executions)
+        cases = [(q, e, d[0]) for q, e, d in zip(tasks, executions, greedy)]
+        found = [kept([d], [p], 1.0) for (_, _, d), p in zip(cases, self.performances(cases))]
+        rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not found[i]]
+        if rest and self.candidates:
+            several = self.candidates_of([tasks[i] for i in rest], [executions[i] for i in rest], uniforms[rest])
+            cases = [(tasks[i], executions[i], d) for i, many in zip(rest, several) for d in many]
+            performances = iter(self.performances(cases))
+            for i, many in zip(rest, several):
+                found[i] = list(dict.fromkeys(found[i] + kept(many, [next(performances) for _ in many], 1.0)))
+        return found
+
+    def candidates_of(
+        self, tasks: Sequence[WordTask], executions: Sequence[Written], uniforms: np.ndarray | None = None
+    ) -> list[list[str]]:
+        """The likeliest description of each execution, or different ones sampled with `uniforms` (B, K, steps)."""
+        changed = changes([list(zip(q.words, e.outputs or (), strict=True)) for q, e in zip(tasks, executions)])
+        copies = 1 if uniforms is None else uniforms.shape[1]
+        choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, uniforms.shape[2]))
+        said = self.requests.say(self.describer.write(changed, choose, LONGEST_REQUEST, copies))
+        several = [said[k * copies : (k + 1) * copies] for k in range(len(tasks))]
+        return [[d for d in dict.fromkeys(many) if d != NOTHING] or [NOTHING] for many in several]
+
+    def performances(self, cases: Sequence[Case]) -> list[float]:
+        """perf(e^d, e) over J: 1 where the executor, told d, makes all J words what they became, else 0.
+
+        The first word that was changed is tried first and the others only where that one fits.
+        """
+        first = [next((j for j, w in enumerate(q.words) if (e.outputs or ())[j] != w), 0) for q, e, _ in cases]
+        fits = self._reproduces([(q.words[j], (e.outputs or ())[j], d) for (q, e, d), j in zip(cases, first)])
+        left = [i for i, fit in enumerate(fits) if fit]
+        others = [
+            (i, (q.words[j], (e.outputs or ())[j], d))
+            for i in left
+            for q, e, d in [cases[i]]
+            for j in range(len(q.words))
+            if j != first[i]
+        ]
+        passed = dict.fromkeys(left, True)
+        for (i, _), fit in zip(others, self._reproduces([case for _, case in others])):
+            passed[i] &= fit
+        return [float(passed.get(i, False)) for i in range(len(cases))]
+
+    def _reproduces(self, cases: Sequence[tuple[str, str, str]]) -> list[bool]:
+        """Whether the executor, given a word and a description, writes the expected word."""
+        if not cases:
+            return []
+        longest = max(len(expected) for _, expected, _ in cases) + 2
+        words, requests = characters([w for w, _, _ in cases]), self.requests([d for _, _, d in cases])
+        written = texts(self.executor.write(words, requests, likeliest, longest))
+        return [a == expected for a, (_, expected, _) in zip(written, cases)]
+
+
+class GrammarTeacher:
+    """Whoever made the requests of the data: it can read rules of our shapes and says what they do, or errs.
+
+    A second, consistent teacher (docs/sources.md, S101): P_T(d | e) is P*(d | e) but for a share of
+    wrong descriptions.
+    """
+
+    def __init__(self, data: RegexData, seed: int, wrong: float) -> None:
+        self.grammar, self.words, self.wrong = Grammar(seed), data.words, wrong
+
+    def describe(
+        self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        return [self._one(q, e, rng=rng) for q, e in zip(tasks, executions, strict=True)]
+
+    def _one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
+        if not describable(task, execution):
+            return None
+        if rng.random() < self.wrong:
+            return random_asked(self.grammar, "train", self.words, rng=rng)
+        if near_optimal(task, execution):
+            return human(task, rng=rng)
+        parsed = parse(execution.rule)
+        return None if parsed is None else self.grammar.request("train", *parsed, rng=rng)
+
+
+def parse(rule: str) -> tuple[RuleShape, str, str] | None:
+    """Shape and letters of a rule of our own shapes, None for others."""
+    found = _OWN_RULE.fullmatch(rule)
+    if found is None or (found[1] and found[3]):
+        return None
+    block, new = found[2], found[4].replace("\\2", SAME)
+    kinds = lambda text, keep: "".join("L" if c in LETTERS else c for c in text if c in keep)
+    replacement = kinds(new, LETTERS + SAME)
+    if replacement not in REPLACEMENTS:
+        return None
+    shape = RuleShape(found[1] or found[3], kinds(block, LETTERS + "CV."), replacement)
+    letters = lambda text: "".join(c for c in text if c in LETTERS)
+    return shape, letters(block), letters(new)

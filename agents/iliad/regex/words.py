@@ -1,0 +1,59 @@
+"""The words that rules are carried out on: made up by the seed, or read from a list of the user's own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from embodied.seeds import stream
+
+_PARTS = {
+    "start": "- - - - - a e i o u re un in de dis ex en over out",
+    "onset": "b c d f g h j k l m n p r s t v w y z bl br ch cl cr dr fl fr gl gr pl pr qu sc sh sk sl sm sn sp st sw "
+    "th tr tw wh",
+    "nucleus": "a e i o u a e i o e i a ea ee ai ou oo ie au io",
+    "coda": "- - - - b d g k l m n p r s t x ck ct ft ld ll mp nd ng nk nt pt rd rk rm rn rt sh sk ss st th",
+    "ending": "- - - s ed er ing ly ness ment able al ous ive ion ist ful less ic y en",
+}
+PARTS = {name: text.split() for name, text in _PARTS.items()}
+"""Parts of made-up words; '-' is none."""
+SHORTEST, LONGEST, LONGEST_MADE_UP = 3, 14, 10
+_WORD = re.compile(f"[a-z]{{{SHORTEST},{LONGEST}}}")
+
+
+def made_up(count: int, *, seed: int) -> tuple[str, ...]:
+    """So many different words that could be English ones; the same on every machine.
+
+    The dissertation's words are the dictionary of an operating system, which differs from one to the
+    next and is often missing (docs/sources.md, S90).
+    """
+    rng, found = stream(seed, "regex", "words"), {}
+    while len(found) < count:
+        word = _word(rng=rng)
+        if SHORTEST <= len(word) <= LONGEST_MADE_UP:
+            found[word] = None
+    return tuple(found)
+
+
+def read_words(path: Path) -> tuple[str, ...]:
+    """Lower-case words of 3 to 14 letters of a file with one word a line, such as /usr/share/dict/words.
+
+    Raises:
+      ValueError: there are fewer than a thousand.
+    """
+    lines = Path(path).read_text(encoding="utf-8").split("\n")
+    found = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
+    if len(found) < 1000:
+        raise ValueError(
+            f"{path}: {len(found)} lower-case words of {SHORTEST} to {LONGEST} letters, at least 1000 are needed; "
+            "give one word a line, or leave the option out"
+        )
+    return found
+
+
+def _word(*, rng: np.random.Generator) -> str:
+    pick = lambda name: PARTS[name][int(rng.integers(len(PARTS[name])))]
+    middle = "".join(pick("onset") + pick("nucleus") + pick("coda") for _ in range(int(rng.integers(1, 3))))
+    return (pick("start") + middle + pick("ending")).replace("-", "")

@@ -1,0 +1,116 @@
+"""REGEX as a problem of ILIAD: what an execution is, what fulfils a request, and a student that writes rules."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from agents.iliad.protocol import ExecutionScores
+from agents.iliad.regex.coding import PAD, Requests, characters, texts
+from agents.iliad.regex.data import WordTask
+from agents.iliad.regex.networks import Speller
+from agents.iliad.regex.rules import LONGEST, edit_distance, outputs
+from agents.imitation.decoding import Choice, drawn_with, likeliest
+
+
+@dataclass(frozen=True)
+class Written:
+    """An execution: the rule that was written, and what it makes of the task's words."""
+
+    rule: str
+    outputs: tuple[str, ...] | None
+    """None for a rule that cannot be carried out on one of them, or that nobody has tried."""
+
+
+class RegexWorld:
+    """Requests to change words."""
+
+    def request(self, task: WordTask, *, rng: np.random.Generator) -> str:
+        return task.requests[int(rng.integers(len(task.requests)))]
+
+    def success(self, task: WordTask, execution: Written) -> bool:
+        """Whether the episode's word, the first one, became what it should."""
+        return execution.outputs is not None and execution.outputs[0] == task.outputs[0]
+
+    def reward(self, task: WordTask, execution: Written) -> float:
+        """(|w| - editdistance(found, w)) / |w| of the episode's word (C.1); 0 where there is no output."""
+        if execution.outputs is None:
+            return 0.0
+        return nearness(execution.outputs[0], task.outputs[0])
+
+    def demonstrate(self, task: WordTask, execution: Written) -> Written:
+        """The rule that was meant: its character t is shown in the state after t characters of one's own
+        (docs/sources.md, S102)."""
+        return Written(task.rule, task.outputs)
+
+
+def nearness(found: str, wanted: str) -> float:
+    """Eq C.1; may be below 0. A wanted word without letters counts as one of one letter."""
+    length = max(1, len(wanted))
+    return (length - edit_distance(found, wanted)) / length
+
+
+def carried_out(rule: str, task: WordTask) -> Written:
+    """A rule with what it makes of the task's words."""
+    return Written(rule, outputs(rule, task.words))
+
+
+class RegexMarginal:
+    """Uniform over a list of rules without requests (C.1.2)."""
+
+    def __init__(self, rules: Sequence[str]) -> None:
+        self.rules = tuple(rules)
+
+    def draw(self, tasks: Sequence[WordTask], *, rng: np.random.Generator) -> list[Written]:
+        return [Written(self.rules[int(i)], None) for i in rng.integers(len(self.rules), size=len(tasks))]
+
+
+class RegexStudent:
+    """A policy over the characters of rules; it learns them with the episode's word alone (docs/sources.md, S97)."""
+
+    def __init__(self, speller: Speller, requests: Requests) -> None:
+        self.speller, self.requests = speller, requests
+
+    def network(self) -> nn.Module:
+        return self.speller
+
+    def sample(self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator) -> list[Written]:
+        return self._write(tasks, requests, drawn_with(rng.random((len(tasks), LONGEST))))
+
+    def greedy(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> list[Written]:
+        return self._write(tasks, requests, likeliest)
+
+    def scores(
+        self,
+        tasks: Sequence[WordTask],
+        requests: Sequence[str],
+        executions: Sequence[Written],
+        actions: Sequence[Written] | None = None,
+    ) -> ExecutionScores:
+        """Of the characters of rules, at most H, END included; of other rules' characters where `actions` are given."""
+        states = characters([e.rule for e in executions])[:, :LONGEST]
+        wanted = states if actions is None else characters([e.rule for e in actions])[:, :LONGEST]
+        length = min(states.shape[1], wanted.shape[1])
+        states, wanted = states[:, :length], wanted[:, :length]
+        logits = self.speller(*self._inputs(tasks, requests), states)
+        return scores_of(logits, wanted, (states != PAD) & (wanted != PAD))
+
+    def _write(self, tasks: Sequence[WordTask], requests: Sequence[str], choose: Choice) -> list[Written]:
+        numbers = self.speller.write(*self._inputs(tasks, requests), choose, LONGEST)
+        return [carried_out(rule, task) for rule, task in zip(texts(numbers), tasks, strict=True)]
+
+    def _inputs(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> tuple[Tensor, Tensor]:
+        return characters([t.words[0] for t in tasks]), self.requests(requests)
+
+
+def scores_of(logits: Tensor, actions: Tensor, mask: Tensor) -> ExecutionScores:
+    """What logits (B, T, V) make of the actions (B, T)."""
+    logs = logits.log_softmax(-1)
+    taken = logs.gather(-1, actions[..., None])[..., 0]
+    entropies = -(logs.exp() * logs).sum(-1)
+    zero = torch.zeros(())
+    return ExecutionScores(torch.where(mask, taken, zero), torch.where(mask, entropies, zero), mask)

@@ -1,0 +1,153 @@
+"""The training loop of ILIAD, whatever the problem and the learner: resumable, validated, exact after a kill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic
+
+import numpy as np
+import torch
+
+from agents.iliad.config import LearnerConfig, as_dict, mixing_at
+from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, reinforce
+from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
+from agents.imitation.loop import Note, falling_rate, tasks_of_update
+from agents.imitation.runs import Run
+from embodied.locks import locked
+from embodied.seeds import stream
+
+FORMAT = "embodied-iliad-run-1"
+BATCH = 256
+"""Tasks that are validated side by side; no influence on results."""
+
+
+@dataclass(frozen=True, eq=False)
+class IliadProblem(Generic[Q, E]):
+    """A world with everybody in it."""
+
+    world: RequestWorld[Q, E]
+    teacher: DescribingTeacher[Q, E]
+    marginal: Marginal[Q, E]
+    student: Student[Q, E]
+    """pi_theta, which is judged."""
+    explorer: Student[Q, E]
+    """pi_beta, which only ADEL has."""
+    training: Sequence[Q]
+    validation: Sequence[Q]
+    identity: Mapping[str, object]
+    """What a run depends on besides the learner's settings."""
+
+
+def train(
+    problem: IliadProblem[Q, E],
+    config: LearnerConfig,
+    folder: Path,
+    keep: Callable[[Path], None],
+    *,
+    minutes: float | None = None,
+    note: Note = print,
+) -> list[dict[str, float]]:
+    """Learn, or go on learning, in a run folder; returns what each validation found.
+
+    Each entry has 'update', 'episodes' (with the teacher), 'success' (validation), 'training success'
+    (of all episodes so far), and since the last one 'loss' and 'described', the share of episodes with a description.
+
+    Args:
+      keep: writes the student's weights to a path; called when validation success is the best so far.
+
+    Raises:
+      CheckpointError, KeyboardInterrupt, DivergedError: see agents.imitation.
+    """
+    learner = _Learner(problem, config)
+    identity = {**problem.identity, **as_dict(config)}
+    run = Run(folder, identity, learner.modules, {"all": learner.optimizer}, FORMAT)
+    learner.restore(run.sums)
+    with locked(run.folder), run.session(config.iterations, config.checkpoint_minutes, note, minutes) as session:
+        for update in session:
+            run.add(learner.update(update))
+            done = update + 1
+            if done % config.validate_every == 0 or done == config.iterations:
+                found = success_rate(problem.world, problem.student, problem.validation)
+                best = max((h["success"] for h in run.history), default=-1.0)
+                run.history.append(_entry(done, found, config, run.sums))
+                if found > best:
+                    keep(folder / "best.safetensors")
+                run.sums = {k: v for k, v in run.sums.items() if k in ("episodes", "fulfilled", "reward")}
+                note(f"{folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
+    return run.history
+
+
+def success_rate(world: RequestWorld[Q, E], student: Student[Q, E], tasks: Sequence[Q]) -> float:
+    """Share of tasks that the student fulfils, acting greedily on their first (for held-out tasks, only) request."""
+    good = 0
+    for at in range(0, len(tasks), BATCH):
+        some = tasks[at : at + BATCH]
+        rng = np.random.Generator(np.random.PCG64(0))  # held-out tasks have one request: nothing is drawn
+        requests = [world.request(q, rng=rng) for q in some]
+        good += sum(world.success(q, e) for q, e in zip(some, student.greedy(some, requests), strict=True))
+    return good / len(tasks)
+
+
+def episodes_to(history: Sequence[Mapping[str, float]], threshold: float) -> float:
+    """Training episodes until validation success first reached `threshold`; infinite if it never did (Table 3.4)."""
+    return next((h["episodes"] for h in history if h["success"] >= threshold), float("inf"))
+
+
+class _Learner(Generic[Q, E]):
+    """Owns the optimizer and what is counted; one update of whichever learner the settings name."""
+
+    def __init__(self, problem: IliadProblem[Q, E], config: LearnerConfig) -> None:
+        self.problem, self.config = problem, config
+        self.modules = {"student": problem.student.network()}
+        if config.learner == "adel":
+            self.modules["explorer"] = problem.explorer.network()
+        weights = [p for m in self.modules.values() for p in m.parameters()]
+        self.optimizer = torch.optim.Adam(weights, config.rate, fused=True)
+        self.mean = RunningMean()
+        self.rewards = RewardsOf(problem.world, config.learner == "binary")
+
+    def restore(self, sums: Mapping[str, float]) -> None:
+        """Go on counting rewards."""
+        self.mean = RunningMean(sums.get("reward", 0.0), int(sums.get("episodes", 0)))
+
+    def update(self, update: int) -> dict[str, float]:
+        """One update; returns numbers to add up."""
+        c, world = self.config, self.problem.world
+        for group in self.optimizer.param_groups:
+            group["lr"] = falling_rate(c.rate, update, c.iterations, c.cooldown)
+        tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
+        rng = stream(c.seed, "iliad", update)
+        requests = [world.request(q, rng=rng) for q in tasks]
+        before = self.mean.total
+        lesson = self._learn(update, tasks, requests, rng)
+        fulfilled = sum(world.success(q, e) for q, e in zip(tasks, lesson.executions, strict=True))
+        numbers = {"episodes": len(tasks), "fulfilled": fulfilled, "loss": lesson.loss, "updates": 1.0}
+        if lesson.descriptions:
+            numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
+        return numbers | ({"reward": self.mean.total - before} if self.mean.count else {})
+
+    def _learn(
+        self, update: int, tasks: Sequence[Q], requests: Sequence[str], rng: np.random.Generator
+    ) -> IliadLesson[Q, E]:
+        p, c, optimizer = self.problem, self.config, self.optimizer
+        if c.learner == "adel":
+            mixing = mixing_at(c, update)
+            return adel(
+                tasks, requests, p.teacher, p.marginal, p.explorer, p.student, optimizer, mixing, c.clip, rng=rng
+            )
+        if c.learner == "dagger":
+            return dagger(tasks, requests, p.world, p.student, optimizer, c.clip)
+        return reinforce(tasks, requests, self.rewards, self.mean, p.student, optimizer, c.entropy, c.clip, rng=rng)
+
+
+def _entry(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:
+    found = {
+        "update": float(done),
+        "episodes": float(done * config.batch),
+        "success": success,
+        "training success": sums["fulfilled"] / sums["episodes"],
+        "loss": sums["loss"] / sums["updates"],
+    }
+    return found | ({"described": sums["described"] / sums["updates"]} if "described" in sums else {})

@@ -1,0 +1,277 @@
+"""ILIAD by hand: Eq 3.9 to 3.16 as they are computed here, the losses of Algorithm 9, DAgger and REINFORCE."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor, nn
+
+from agents.iliad.config import LearnerConfig, mixing_at
+from agents.iliad.describing import by_the_program, by_the_text, kept
+from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, reinforce, reinforce_loss
+from agents.iliad.protocol import NOTHING, ExecutionScores
+from agents.iliad.training import IliadProblem, episodes_to, success_rate, train
+from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.runs import Run
+from embodied.seeds import stream
+
+silent = lambda line: None
+
+
+# A bandit: H = 1, as in the theory of appendix B ---------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wish:
+    """Press button `button`."""
+
+    button: int
+
+
+class Buttons:
+    """Four buttons; a description names the one that was pressed."""
+
+    def request(self, task: Wish, *, rng: np.random.Generator) -> str:
+        return str(task.button)
+
+    def success(self, task: Wish, execution: int) -> bool:
+        return task.button == execution
+
+    def reward(self, task: Wish, execution: int) -> float:
+        return 1 - abs(task.button - execution) / 3
+
+    def demonstrate(self, task: Wish, execution: int) -> int:
+        return task.button
+
+
+class Watcher:
+    """P_T(d | e): says which button it was; has nothing to say of those in `dumb`."""
+
+    def __init__(self, dumb: tuple[int, ...] = ()) -> None:
+        self.dumb = dumb
+
+    def describe(self, tasks, executions, *, rng: np.random.Generator) -> list[str | None]:
+        return [None if e in self.dumb else str(e) for e in executions]
+
+
+class AnyButton:
+    """P_omega: uniform."""
+
+    def draw(self, tasks, *, rng: np.random.Generator) -> list[int]:
+        return [int(i) for i in rng.integers(4, size=len(tasks))]
+
+
+class Presser:
+    """A table of logits: one row per description, the fifth for the empty one."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.table = nn.Embedding(5, 4)
+        with torch.no_grad():
+            self.table.weight.copy_(torch.from_numpy(stream(seed, "presser").normal(size=(5, 4))) * 0.1)
+
+    def network(self) -> nn.Module:
+        return self.table
+
+    def logits(self, requests) -> Tensor:
+        return self.table(torch.tensor([int(r) if r else 4 for r in requests]))
+
+    def sample(self, tasks, requests, *, rng: np.random.Generator) -> list[int]:
+        chances = self.logits(requests).detach().double().softmax(-1).numpy()
+        return [int(rng.choice(4, p=p / p.sum())) for p in chances]
+
+    def greedy(self, tasks, requests) -> list[int]:
+        return self.logits(requests).argmax(-1).tolist()
+
+    def scores(self, tasks, requests, executions, actions=None) -> ExecutionScores:
+        logs = self.logits(requests).log_softmax(-1)
+        taken = torch.tensor(list(executions if actions is None else actions))
+        entropy = -(logs.exp() * logs).sum(-1, keepdim=True)
+        return ExecutionScores(logs.gather(1, taken[:, None]), entropy, torch.ones(len(taken), 1, dtype=torch.bool))
+
+
+def flat(*rows: list[float]) -> Presser:
+    """A presser with these probabilities for the descriptions "0", "1", ...; uniform for the others."""
+    made = Presser()
+    with torch.no_grad():
+        made.table.weight.zero_()
+        for k, row in enumerate(rows):
+            made.table.weight[k] = torch.tensor(row).log()
+    return made
+
+
+WISHES = [Wish(k) for k in range(4)]
+
+
+def test_losses_of_algorithm_9_by_hand():
+    student, explorer = flat([0.5, 0.25, 0.125, 0.125]), flat([0.25, 0.25, 0.25, 0.25])
+    # pi_beta did button 1, which was described as "0" (a teacher may err); the marginal gave button 2
+    loss = adel_loss([Wish(3)], [1], ["0"], [2], explorer, student, mixing=0.25)
+    by_hand = -math.log(0.25) - 0.25 * math.log(0.25) - 0.75 * math.log(0.25)
+    assert float(loss.detach()) == pytest.approx(by_hand)
+
+
+@pytest.mark.parametrize(("mixing", "moves"), [(0.0, False), (0.5, True), (1.0, True)])
+def test_without_a_description_only_the_marginal_is_learned(mixing, moves):
+    student, explorer = Presser(0), Presser(1)
+    loss = adel_loss([Wish(3)], [1], [None], [2], explorer, student, mixing)
+    loss.backward()
+    of_student, of_explorer = student.table.weight.grad, explorer.table.weight.grad
+    assert not of_student.abs().any(), "pi_theta learns from descriptions alone"
+    assert bool(of_explorer is not None and of_explorer[4].abs().any()) == moves, "with the empty description"
+
+
+def test_executions_from_the_marginal_teach_the_explorer_alone():
+    student, explorer = Presser(0), Presser(1)
+    adel_loss([Wish(0)], [1], ["1"], [2], explorer, student, mixing=1.0).backward()
+    gradient = student.table.weight.grad[1]
+    expected = student.table.weight[1].softmax(-1).detach()
+    expected[1] -= 1
+    assert torch.allclose(gradient, expected), "the gradient of cross-entropy, to the executed button only"
+    assert explorer.table.weight.grad[1].argmin() == 2, "lambda = 1: the explorer learns the marginal's button"
+
+
+def test_reinforce_by_hand():
+    logs = torch.tensor([[-1.0, -2.0], [-0.5, 0.0]], requires_grad=True)
+    mask = torch.tensor([[True, True], [True, False]])
+    scores = ExecutionScores(logs, torch.tensor([[0.6, 0.2], [0.4, 9.0]]), mask)
+    loss = reinforce_loss(scores, [1.0, 0.0], baseline=0.25, entropy=0.1)
+    by_hand = ((1 - 0.25) * (1 + 2) + (0 - 0.25) * 0.5) / 2 - 0.1 * (0.6 + 0.2 + 0.4) / 2
+    assert float(loss.detach()) == pytest.approx(by_hand)
+    loss.backward()
+    assert logs.grad[1, 1] == 0, "nothing behind the end of an execution is learned"
+
+
+def test_the_baseline_is_the_mean_of_all_rewards_this_batch_included():
+    mean, student = RunningMean(3.0, 3), flat([0.25] * 4)
+    optimizer = torch.optim.SGD(student.table.parameters(), 0.0)
+    rewards = lambda tasks, executions: [0.0]
+    lesson = reinforce([Wish(0)], ["0"], rewards, mean, student, optimizer, 0.0, 9.0, rng=stream(0, "r"))
+    assert mean.value == pytest.approx(3 / 4)
+    assert lesson.loss == pytest.approx((0 - 3 / 4) * math.log(4))
+
+
+def test_dagger_shows_the_best_action_in_states_that_the_student_came_to():
+    student = flat([0.1, 0.7, 0.1, 0.1])
+    optimizer = torch.optim.SGD(student.table.parameters(), 1.0)
+    lesson = dagger([Wish(0)], ["0"], Buttons(), student, optimizer, 9.0)
+    assert list(lesson.executions) == [1] and lesson.loss == pytest.approx(-math.log(0.1))
+    assert student.table.weight[0, 0] > math.log(0.1)
+
+
+# Eq 3.15 and 3.16 ----------------------------------------------------------------------------------
+
+
+def test_only_descriptions_that_are_executed_alike_are_pragmatic():
+    assert kept(["a", "b", "c", "a"], [1.0, 0.4, 0.5, 1.0], 0.5) == ["a", "c"], "at the threshold counts, once each"
+    assert kept(["a"], [0.49], 0.5) == []
+
+
+def test_the_text_draws_among_the_pragmatic_and_nothing_the_program_takes_the_first():
+    rng = stream(0, "draws")
+    counts = dict.fromkeys(("a", "b", NOTHING), 0)
+    for _ in range(3000):
+        counts[by_the_text(["a", "b"], rng=rng)] += 1
+    assert all(abs(n - 1000) < 100 for n in counts.values())
+    assert by_the_text([], rng=rng) == NOTHING
+    assert by_the_program(["a", "b"]) == "a" and by_the_program([]) == NOTHING
+
+
+def test_lambda_is_halved_every_l_updates_down_to_its_least():
+    never, often = LearnerConfig(), LearnerConfig(anneal_every=100)
+    assert {mixing_at(never, u) for u in (0, 99, 10_000)} == {0.5}
+    assert [mixing_at(often, u) for u in (0, 99, 100, 199, 200, 300, 10_000)] == [0.5, 0.5, 0.25, 0.25, 0.125, 0.1, 0.1]
+
+
+# The loop -------------------------------------------------------------------------------------------
+
+
+def problem(teacher: Watcher | None = None) -> IliadProblem:
+    tasks = WISHES * 8
+    return IliadProblem(
+        Buttons(), teacher or Watcher(), AnyButton(), Presser(0), Presser(1), tasks, WISHES, {"world": "b"}
+    )
+
+
+QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=20)
+
+
+@pytest.mark.parametrize(
+    ("settings", "least"), [({}, 1.0), ({"learner": "dagger"}, 1.0), ({"learner": "binary", "learning_rate": 1.0}, 0.5)]
+)
+def test_each_learner_learns_the_buttons(tmp_path, settings, least):
+    config = LearnerConfig(**{**vars(QUICK), **settings})
+    p = problem()
+    found = train(p, config, tmp_path, lambda path: path.touch(), note=silent)
+    assert found[-1]["success"] >= least
+    assert (tmp_path / "best.safetensors").exists()
+    assert [h["episodes"] for h in found] == [160, 320, 480]
+    assert success_rate(p.world, p.student, WISHES) == found[-1]["success"]
+
+
+def test_a_button_that_is_never_described_is_never_learned(tmp_path):
+    p = problem(Watcher(dumb=(2,)))
+    found = train(p, QUICK, tmp_path, lambda path: None, note=silent)
+    right = [p.student.greedy([w], [str(w.button)])[0] == w.button for w in WISHES]
+    assert right[0] and right[1] and right[3]
+    assert found[-1]["described"] < 1
+
+
+@pytest.mark.parametrize("learner", ["adel", "binary"])
+def test_a_killed_run_goes_on_exactly(tmp_path, monkeypatch, learner):
+    config = LearnerConfig(**{**vars(QUICK), "learner": learner, "checkpoint_minutes": 1e-9})
+    whole = problem()
+    expected = train(whole, config, tmp_path / "whole", lambda path: None, note=silent)
+    save, saved = Run.save, []
+
+    def killed(self, progress):
+        if len(saved) == 33:
+            raise KeyboardInterrupt
+        saved.append(progress)
+        save(self, progress)
+
+    monkeypatch.setattr(Run, "save", killed)
+    with pytest.raises(KeyboardInterrupt):
+        train(problem(), config, tmp_path / "cut", lambda path: None, note=silent)
+    monkeypatch.setattr(Run, "save", save)
+    again = problem()
+    assert train(again, config, tmp_path / "cut", lambda path: None, note=silent) == expected
+    assert torch.equal(again.student.table.weight, whole.student.table.weight)
+    with pytest.raises(CheckpointError, match="mixing"):
+        train(
+            problem(), LearnerConfig(**{**vars(config), "mixing": 0.9}), tmp_path / "cut", lambda p: None, note=silent
+        )
+
+
+def test_adel_comes_to_the_true_marginal():
+    """Theorem 1 in small: with a consistent teacher the explorer ends where the requests are, not uniform."""
+    rng, explorer, student = stream(0, "t"), Presser(1), Presser(0)
+    weights = [*explorer.table.parameters(), *student.table.parameters()]
+    optimizer = torch.optim.Adam(weights, 0.1)
+    tasks = [Wish(0)] * 16
+    for _ in range(80):
+        adel(tasks, ["0"] * 16, Watcher(), AnyButton(), explorer, student, optimizer, 0.25, 9.0, rng=rng)
+    with torch.no_grad():
+        pressed = explorer.logits(["0"]).softmax(-1)[0]
+    assert pressed[0] > 0.6 and (pressed[1:] > 0.01).all(), "mostly what was asked for, everything now and then"
+
+
+def test_episodes_to_a_threshold_are_the_first_validation_above_it():
+    history = [
+        {"episodes": 10.0, "success": 0.2},
+        {"episodes": 20.0, "success": 0.9},
+        {"episodes": 30.0, "success": 0.8},
+    ]
+    assert episodes_to(history, 0.85) == 20 and math.isinf(episodes_to(history, 0.95))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("learner", "ppo"), ("mixing", 1.5), ("batch", 0), ("learning_rate", 0.0), ("anneal_every", -1)],
+)
+def test_settings_out_of_range_are_refused(field, value):
+    with pytest.raises(ValueError, match=field):
+        LearnerConfig(**{field: value})

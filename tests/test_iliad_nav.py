@@ -1,0 +1,157 @@
+"""NAV by hand: walks, rewards and teachers on a grid, and a small student that learns its way by descriptions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hand_worlds import grid_world, line_world
+
+from agents.hanna.vocabulary import build_vocabulary
+from agents.iliad.config import LearnerConfig
+from agents.iliad.nav.network import Follower, WalkDescriber
+from agents.iliad.nav.student import LoopFree, NavEyes, NavStudent
+from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
+from agents.iliad.nav.world import HORIZON, NavMarginal, NavWalk, NavWorld, Trip, trips_of, walk_along, without_loops
+from agents.iliad.training import IliadProblem, success_rate, train
+from agents.imitation.decoding import likeliest
+from agents.vision.bank import FeatureBank
+from embodied.interface import FindObject, Pose, Route, Task
+from embodied.seeds import stream
+from embodied.tasks.vln import vln_task
+
+LINE = line_world()
+TRIP = Trip("line", Pose(0), (0, 1, 2), ("to the third", "two steps on"))
+GRID = grid_world(side=4, spacing=4.0)
+
+
+def test_a_walk_has_at_most_nine_moves():
+    assert walk_along([0, 1, 2]) == NavWalk((0, 1, 2), (1, 2, 2)), "the last action stops"
+    long = walk_along(list(range(20)))
+    assert long == NavWalk(tuple(range(HORIZON)), tuple(range(1, HORIZON))), "cut, and nobody sees it stop"
+    assert len(walk_along(range(9)).steps) == 9
+
+
+def test_loops_are_cut_out():
+    assert without_loops([0, 1, 2, 1, 3]) == (0, 1, 3)
+    assert without_loops([0, 1, 0]) == (0,)
+    assert without_loops([0, 1, 2, 3, 1, 2, 4]) == (0, 1, 2, 4)
+
+
+def test_success_reward_and_demonstration_by_hand():
+    world = NavWorld({"line": LINE})
+    assert world.success(TRIP, walk_along([0, 1])), "two metres from the end"
+    assert not world.success(TRIP, walk_along([0]))
+    assert world.reward(TRIP, walk_along([0, 1])) == pytest.approx((4 - 2) / 4), "Eq C.2"
+    assert world.reward(TRIP, walk_along([0])) == 0 and world.reward(TRIP, walk_along([0, 1, 2])) == 1
+    assert world.demonstrate(TRIP, walk_along([0, 1, 2, 3])) == NavWalk((0, 1, 2, 3), (1, 2, 2, 2))
+    stay = Trip("line", Pose(1), (1,), ("stay",))
+    assert world.reward(stay, walk_along([1])) == 1 and world.reward(stay, walk_along([1, 2])) == 0
+
+
+def test_the_marginal_walks_shortest_paths_of_two_to_six_edges():
+    marginal, trip = NavMarginal({"grid": GRID}), Trip("grid", Pose(5), (5, 6), ("x",))
+    found = marginal.draw([trip] * 200, rng=stream(0, "m"))
+    assert {len(w.nodes) - 1 for w in found} <= set(range(2, 7)) and len({len(w.nodes) for w in found}) > 2
+    for w in found:
+        assert w.nodes == GRID.graph.path(5, w.nodes[-1])
+    assert len({w.nodes[-1] for w in found}) > 8
+
+
+def test_tasks_of_one_path_are_one_trip():
+    routes = [Route(f"r{k}", (0, 1, 2), 0, 0, text) for k, text in enumerate(("a", "b", "c"))]
+    (trip,) = trips_of([vln_task("line", r) for r in routes])
+    assert trip.requests == ("a", "b", "c") and trip.path == (0, 1, 2)
+    find = Task("t", "find", "line", Pose(0), FindObject("mug", "hall", ("mug_1",)), (3,), "find", 2.0, 10)
+    with pytest.raises(ValueError, match="dataset vln"):
+        trips_of([find])
+
+
+def eyes(place, name: str, texts) -> NavEyes:
+    features = stream(0, "features").normal(size=(len(place.graph.ids), 36, 8)).astype(np.float32)
+    return NavEyes({name: place}, FeatureBank({name: features}, "hand"), build_vocabulary(texts))
+
+
+def student(look: NavEyes, seed: int = 0, kind=NavStudent) -> NavStudent:
+    torch.manual_seed(seed)
+    return kind(Follower(len(look.vocabulary), 32, 2, look.bank.size, look.action_size, HORIZON), look)
+
+
+def test_scores_are_those_of_the_steps_that_were_sampled():
+    look = eyes(GRID, "grid", ["go"])
+    walker, trips = student(look), [Trip("grid", Pose(n), (n,), ("go",)) for n in (5, 6, 0)]
+    done = walker.sample(trips, ["go"] * 3, rng=stream(0, "s"))
+    assert all(b in GRID.graph.neighbours(a) for w in done for a, b in zip(w.nodes, w.nodes[1:]))
+    found = walker.scores(trips, ["go"] * 3, done)
+    assert found.mask.sum(1).tolist() == [len(w.steps) for w in done]
+    alone = walker.scores(trips[1:2], ["go"], done[1:2]).log_probabilities[0]
+    assert torch.allclose(found.log_probabilities[1, : len(alone)], alone, atol=1e-5), "whoever walks beside"
+    stay = walker.scores(trips[:1], ["go"], [walk_along([5])])
+    others = [walker.scores(trips[:1], ["go"], [NavWalk((5,), (n,))]) for n in GRID.graph.neighbours(5)]
+    total = sum(float(s.log_probabilities.detach().exp().sum()) for s in (stay, *others))
+    assert total == pytest.approx(1, abs=1e-5), "stopping and every neighbour"
+
+
+class Scripted(LearnedNavTeacher):
+    """Its executor goes where a description says, nodes apart by blanks."""
+
+    def __init__(self, drafts: list[str], pragmatics: str) -> None:
+        self.world, self.candidates, self.pragmatics, self.drafts = NavWorld({"line": LINE}), 1, pragmatics, drafts
+
+    def _pragmatic(self, trips, walks, uniforms):
+        scores = lambda walk, d: performance(self.world, TRIP, [int(n) for n in d.split()], walk.nodes)
+        return [[d for d in self.drafts if scores(w, d) >= 0.5] for w in walks]
+
+
+def test_near_walks_get_a_persons_request_and_others_what_is_executed_alike():
+    one = lambda t, nodes: t.describe([TRIP], [walk_along(nodes)], rng=stream(0, "d"))[0]
+    assert one(Scripted([], "program"), [0, 1, 2]) in TRIP.requests, "SDTW 1"
+    assert one(Scripted(["0 1 2 3", "0"], "program"), [0]) == "0", "SDTW of the first is 0: it ends elsewhere"
+    assert one(Scripted(["0 1 2 3"], "program"), [0]) is None
+
+
+def test_walks_are_read_and_described_whoever_is_beside():
+    look = eyes(GRID, "grid", ["go to the end"])
+    torch.manual_seed(0)
+    describer = WalkDescriber(len(look.vocabulary), 32, 2, look.bank.size, look.action_size, HORIZON)
+    trips = [Trip("grid", Pose(n), (n,), ("go",)) for n in (5, 0)]
+    walks = [walk_along([5, 6, 7]), walk_along([0])]
+    both = said(look.vocabulary, describer.write(*walked(look, trips, walks), likeliest, 6))
+    alone = said(look.vocabulary, describer.write(*walked(look, trips[1:], walks[1:]), likeliest, 6))
+    assert both[1:] == alone
+    teacher = LearnedNavTeacher(NavWorld({"grid": GRID}), describer, student(look), 2, "text")
+    found = teacher.describe(trips, walks, rng=stream(0, "t"))
+    assert found[1] == "go" and (found[0] is None or isinstance(found[0], str))
+
+
+GOALS = (1, 4, 6, 9, 2)
+
+
+class NamesTheEnd:
+    """A wording that names the last node."""
+
+    def describe(self, world, path, yaw, *, rng) -> str:
+        return f"go to n{path[-1]}"
+
+
+class NearMarginal:
+    """Shortest paths to GOALS from node 5."""
+
+    def draw(self, tasks, *, rng):
+        return [walk_along(GRID.graph.path(5, GOALS[int(i)])) for i in rng.integers(len(GOALS), size=len(tasks))]
+
+
+def test_a_small_student_learns_its_way_from_descriptions(tmp_path):
+    """More than 90 % of requests, from walks that it made up and what a neighbour said of them."""
+    places = {"grid": GRID}
+    trips = [Trip("grid", Pose(5), GRID.graph.path(5, g), (f"go to n{g}",)) for g in GOALS]
+    look = eyes(GRID, "grid", [t.requests[0] for t in trips])
+    teacher = PeopleNavTeacher(NavWorld(places), places, NamesTheEnd())
+    walker, explorer = student(look), student(look, kind=LoopFree)
+    problem = IliadProblem(
+        NavWorld(places), teacher, NearMarginal(), walker, explorer, trips * 20, trips, {"world": "grid"}
+    )
+    config = LearnerConfig(iterations=80, batch=12, learning_rate=5e-3, cooldown=0.4, validate_every=40)
+    found = train(problem, config, tmp_path, lambda path: None, note=lambda line: None)
+    assert found[-1]["success"] > 0.9, found
+    assert success_rate(problem.world, walker, trips) == found[-1]["success"]

@@ -1,0 +1,487 @@
+"""REGEX: rules are safe and mean what requests say, teachers see words only, and a small student learns its task."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import time
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.iliad.config import LearnerConfig
+from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
+from agents.iliad.regex.config import RegexConfig
+from agents.iliad.regex.data import LEAST_CHANGED, WordTask, make_data, read_templates, rules_without_requests
+from agents.iliad.regex.language import PARTS, templates
+from agents.iliad.regex.networks import ChangeDescriber, Speller
+from agents.iliad.regex.rules import (
+    ALPHABET,
+    LETTERS,
+    LONGEST,
+    LONGEST_OUTPUT,
+    SHAPES,
+    apply,
+    columns,
+    edit_distance,
+    outputs,
+    random_rule,
+)
+from agents.iliad.regex.run import learn, load_student, prepare
+from agents.iliad.regex.showing import lines_of, tell
+from agents.iliad.regex.stages import new_network
+from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
+from agents.iliad.regex.words import made_up, read_words
+from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
+from agents.iliad.study import IliadStudySetting, report, run_study
+from agents.iliad.training import IliadProblem, train
+from agents.imitation.checkpoint import CheckpointError
+from agents.imitation.decoding import likeliest
+from embodied.cli import main
+from embodied.seeds import stream
+
+SMALL = RegexConfig(
+    items=400,
+    held_out_items=40,
+    vocabulary=1000,
+    hidden_size=32,
+    word_size=24,
+    character_size=16,
+    executor_iterations=2,
+    describer_iterations=2,
+    pretraining_iterations=2,
+    teacher_batch=8,
+    candidates=2,
+)
+silent = lambda line: None
+
+
+@pytest.fixture(scope="module")
+def data():
+    return make_data(SMALL)
+
+
+# Rules ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rule", "word", "expected"),
+    [
+        ("()(n)()@c", "embolden", "emboldec"),
+        ("(^)(Ca)()@x\\2", "banana", "xbanana"),
+        ("()(V)($)@", "banana", "banan"),
+        ("()(C)()@\\2\\2", "tea", "ttea"),
+        ("()(.n)()@o", "banana", "booa"),
+        ("()(y)()@q", "yes", "qes"),
+        ("()(q)()@z", "tea", "tea"),
+    ],
+)
+def test_rules_by_hand(rule, word, expected):
+    assert apply(rule, word) == expected
+
+
+NO_RULES = [
+    *("", "n", "a@b@c", "()(n()@c", "()(n)()@C", "()(n)()@(", "(a*)*b@c", "a+@b", "a|b@c", "[ab]@c", "a{9}@b", "a@\\3"),
+    "a" * 39 + "@b",
+]
+
+
+@pytest.mark.parametrize("rule", NO_RULES)
+def test_what_is_no_rule_is_none(rule):
+    assert apply(rule, "banana") is None
+
+
+@given(st.text(alphabet=ALPHABET, max_size=LONGEST), st.text(alphabet=LETTERS, max_size=14))
+@settings(max_examples=300, deadline=None)
+def test_whatever_a_network_writes_is_carried_out_quickly_or_refused(rule, word):
+    began = time.process_time()
+    out = apply(rule, word)
+    assert time.process_time() - began < 0.25, "matching never goes back: no repetition, no choice"
+    assert out is None or len(out) <= LONGEST_OUTPUT
+
+
+def test_the_worst_rules_of_the_alphabet_stay_quick():
+    worst = [
+        "(" * 17 + "." + ")" * 17 + "@a",
+        "(.)" + "\\1" * 10 + "@b",
+        "(" + "." * 33 + ")@\\1",
+        "()()@" + "\\2" * 17,
+    ]
+    began = time.process_time()
+    for rule in worst:
+        assert len(rule) <= LONGEST
+        for word in ("a" * 14, "ab" * 7, ""):
+            apply(rule, word)
+    assert time.process_time() - began < 0.5
+
+
+def test_every_shape_gives_a_rule_that_changes_a_word_and_can_be_read_back():
+    rng, words = stream(0, "shapes"), made_up(1000, seed=0)
+    assert len(SHAPES) == 360 and len({s.name for s in SHAPES}) == 360
+    for shape in SHAPES:
+        made = next(m for m in (random_rule(shape, words, rng=rng) for _ in range(500)) if m)
+        rule, before, after = made
+        assert len(before) == shape.before and len(after) == shape.after
+        assert parse(rule) == (shape, before, after)
+        assert any(apply(rule, w) not in (None, w) for w in words) or shape.replacement in ("L", "LL")
+    assert parse("()(n)()@\\2") is None and parse("(^)(n)($)@c") is None and parse("(n)@c") is None
+
+
+def test_edit_distance_and_columns_by_hand():
+    assert edit_distance("kitten", "sitting") == 3 and edit_distance("", "ab") == 2 and edit_distance("ab", "ab") == 0
+    assert columns("tea", "ttea") == [("", "t"), ("t", "t"), ("e", "e"), ("a", "a")]
+    assert columns("ab", "b") == [("a", ""), ("b", "b")]
+
+
+@given(st.text(alphabet="abc", max_size=8), st.text(alphabet="abc", max_size=8))
+@settings(max_examples=100, deadline=None)
+def test_columns_hold_both_words_and_as_many_edits_as_the_distance(a, b):
+    found = columns(a, b)
+    assert "".join(x for x, _ in found) == a and "".join(y for _, y in found) == b
+    assert sum(x != y for x, y in found) == edit_distance(a, b) == edit_distance(b, a)
+
+
+def test_reward_is_equation_c_1():
+    assert nearness("emboledc", "emboldec") == pytest.approx((8 - 2) / 8)
+    world, item = RegexWorld(), WordTask(("r",), "()(n)()@c", ("ban",), ("bac",))
+    assert world.reward(item, Written("x", None)) == 0 and world.reward(item, carried_out("()(n)()@c", item)) == 1
+    assert world.reward(item, carried_out("()(n)()@", item)) == pytest.approx(2 / 3)
+    assert world.success(item, carried_out("()(.)($)@c", item)), "another rule with the same outcome fulfils it, too"
+
+
+# Words, language, data -----------------------------------------------------------------------------
+
+
+def test_there_are_more_templates_than_the_dissertation_has_and_parts_share_none():
+    found = templates(seed=0)
+    texts_of = {part: {t.text for t in many} for part, many in found.items()}
+    assert sum(map(len, texts_of.values())) > 1111
+    assert not texts_of["train"] & texts_of["test"] and not texts_of["train"] & texts_of["validation"]
+    for part in PARTS:
+        assert {t.shape for t in found[part] if not t.vague} == set(SHAPES)
+
+
+def test_a_template_names_exactly_the_letters_of_its_shape():
+    for template in templates(seed=3)["train"]:
+        slots = set(re.findall(r"{(\w\d)}", template.text))
+        before = {f"b{k + 1}" for k in range(template.shape.before)}
+        after = {f"a{k + 1}" for k in range(template.shape.after)}
+        assert slots == (after if template.vague else before | after), template
+
+
+def test_specific_requests_of_different_shapes_differ(data):
+    shapes: dict[str, set] = {}
+    for part in PARTS:
+        for t in data.templates[part]:
+            if not t.vague:
+                shapes.setdefault(t.text, set()).add(t.shape)
+    assert all(len(s) == 1 for s in shapes.values())
+
+
+def test_data_points_are_changed_as_their_rule_says(data):
+    for part in PARTS:
+        for q in data.splits[part]:
+            assert outputs(q.rule, q.words) == q.outputs and len(set(q.words)) == SMALL.examples
+            assert q.outputs[0] != q.words[0]
+            assert sum(a != b for a, b in zip(q.words, q.outputs)) >= LEAST_CHANGED
+            assert len(q.requests) == (3 if part == "train" else 1)
+    vague = {t.text for t in templates(seed=0)["train"] if t.vague and "{" not in t.text}
+    assert vague, "some say 'delete the first letter'"
+
+
+def test_data_follow_from_the_seed_alone(data):
+    assert make_data(SMALL).splits == data.splits
+    assert make_data(dataclasses.replace(SMALL, data_seed=1)).splits != data.splits
+    fewer = make_data(dataclasses.replace(SMALL, items=100))
+    assert fewer.splits["test"] == data.splits["test"] and fewer.splits["train"] == data.splits["train"][:100]
+
+
+def test_words_of_a_file(tmp_path):
+    path = tmp_path / "words"
+    path.write_text("\n".join(["Anna", "it's", "x", *made_up(1000, seed=0)]))
+    assert read_words(path) == made_up(1000, seed=0)
+    path.write_text("one\ntwo\n")
+    with pytest.raises(ValueError, match="at least 1000"):
+        read_words(path)
+
+
+OWN = {
+    "(^)(BEFORE)()@AFTER": ["change a leading BEFORE to AFTER", "BEFORE in front: AFTER", "AFTER for a first BEFORE"],
+    "()(V)()@": ["no vowels", "drop all vowels", "vowels go"],
+}
+
+
+def test_templates_of_ones_own_are_split_and_filled(tmp_path):
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(OWN))
+    found = make_data(SMALL, own=read_templates(path))
+    for part in PARTS:
+        for q in found.splits[part]:
+            assert outputs(q.rule, q.words) == q.outputs and "BEFORE" not in q.rule + q.requests[0]
+    heads = {part: {q.requests[0].split(" ")[0] for q in found.splits[part]} for part in PARTS}
+    assert "no" in {w for words in heads.values() for w in words}
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [("[1]", "object from rules"), ("{", "not JSON"), ('{"(a*)*@b": ["x"]}', "no rule"), ('{"()(V)()@": []}', "list")],
+)
+def test_templates_that_cannot_be_used_are_refused(tmp_path, body, message):
+    path = tmp_path / "own.json"
+    path.write_text(body)
+    with pytest.raises(ValueError, match=message):
+        read_templates(path)
+
+
+# Numbers and networks ------------------------------------------------------------------------------
+
+
+def test_rules_survive_being_numbers():
+    rules = ["()(n)()@c", "", "(^)(CV)()@\\2x"]
+    assert texts(characters(rules)) == rules
+    assert (characters(rules)[1] == torch.tensor([1] + [PAD] * 13)).all()
+
+
+def test_changes_stand_side_by_side():
+    found = changes([[("ab", "b"), ("a", "a")]])
+    assert found.shape == (1, 2, 4, 2)
+    assert found[0, 0, 1].tolist() == [2, GAP] and found[0, 0, 2].tolist() == [3, 3]
+    assert found[0, 1, 3].tolist() == [PAD, PAD], "padding behind the closing END"
+
+
+def networks(data):
+    requests = request_words(r for q in data.splits["train"] for r in q.requests)
+    return (
+        new_network(Speller, SMALL, requests, 0, "a"),
+        new_network(ChangeDescriber, SMALL, requests, 0, "b"),
+        requests,
+    )
+
+
+def test_what_is_written_does_not_depend_on_who_is_beside(data):
+    speller, describer, requests = networks(data)
+    items = data.splits["train"][:16]
+    words, asked = [q.words[0] for q in items], [q.requests[0] for q in items]
+    together = texts(speller.write(characters(words), requests(asked), likeliest, 12))
+    alone = [texts(speller.write(characters([w]), requests([r]), likeliest, 12))[0] for w, r in zip(words, asked)]
+    assert together == alone
+    pairs = [list(zip(q.words, q.outputs)) for q in items]
+    said = requests.say(describer.write(changes(pairs), likeliest, 12))
+    assert said == [requests.say(describer.write(changes([p]), likeliest, 12))[0] for p in pairs]
+
+
+def test_scores_are_those_of_the_characters_written(data):
+    speller, _, requests = networks(data)
+    student, items = RegexStudent(speller, requests), data.splits["train"][:3]
+    asked = [q.requests[0] for q in items]
+    done = student.greedy(items, asked)
+    found = student.scores(items, asked, done)
+    assert found.mask.sum(1).tolist() == [min(LONGEST, len(e.rule) + 1) for e in done]
+    logits = speller(characters([q.words[0] for q in items]), requests(asked), characters([e.rule for e in done]))
+    by_hand = logits.log_softmax(-1)[0, 0].max()
+    assert float(found.log_probabilities[0, 0].detach()) == pytest.approx(float(by_hand.detach()), abs=1e-5)
+    # demonstrations are scored in the student's own states, as far as it went
+    shown = [Written("()(n)()@c", None)] * 3
+    other = student.scores(items, asked, done, shown)
+    assert other.mask.sum(1).tolist() == [min(len(e.rule), 9) + 1 for e in done]
+    assert float(other.log_probabilities[0, 0].detach()) == pytest.approx(
+        float(logits.log_softmax(-1)[0, 0, characters(["("])[0, 0]].detach()), abs=1e-5
+    )
+
+
+# Teachers ------------------------------------------------------------------------------------------
+
+
+class Scripted(LearnedTeacher):
+    """Says what it is told to say; its executor understands every description that is a rule."""
+
+    def __init__(self, greedy: str, sampled: list[str], pragmatics: str) -> None:
+        self.greedy, self.sampled, self.candidates, self.pragmatics = greedy, sampled, len(sampled), pragmatics
+
+    def candidates_of(self, tasks, executions, uniforms=None):
+        return [[self.greedy] if uniforms is None else list(self.sampled) for _ in tasks]
+
+    def _reproduces(self, cases):
+        return [apply(description, word) == expected for word, expected, description in cases]
+
+
+WORDS = ("banana", "nut", "tea", "pen", "oven")
+ITEM = WordTask(("cut n", "no n"), "()(n)()@", WORDS, outputs("()(n)()@", WORDS))
+
+
+def said(teacher, rule: str, count: int = 1) -> list:
+    return teacher.describe([ITEM] * count, [carried_out(rule, ITEM)] * count, rng=stream(0, "said"))
+
+
+@pytest.mark.parametrize("pragmatics", ["text", "program"])
+def test_a_teacher_says_what_people_said_of_what_they_wanted(pragmatics):
+    found = said(Scripted("x", [], pragmatics), "()(n)()@", 60)
+    assert set(found) == {"cut n", "no n"}, "Eq 3.15, above: any of the requests, for all J words right"
+    assert set(said(Scripted("x", [], pragmatics), "()(na)()@a", 60)) != {"cut n", "no n"}
+
+
+def test_a_teacher_is_silent_where_nothing_happened_or_could():
+    teacher = Scripted("()(z)()@", [], "program")
+    assert said(teacher, "()(z)()@y") == [None], "no word was changed"
+    assert said(teacher, "((") == [None], "no rule"
+
+
+def test_the_programs_teacher_prefers_the_likeliest_description_that_passes():
+    right, equal, wrong = "()(e)()@x", "()(e)()@x ".strip(), "()(e)()@y"
+    assert said(Scripted(right, [wrong], "program"), "()(e)()@x") == [right]
+    assert said(Scripted(wrong, [wrong, equal], "program"), "()(e)()@x") == [equal]
+    assert said(Scripted(wrong, [wrong], "program"), "()(e)()@x") == [None]
+
+
+def test_the_texts_teacher_is_silent_once_in_two_when_one_description_passes():
+    found = said(Scripted("()(e)()@x", ["()(e)()@y"], "text"), "()(e)()@x", 400)
+    assert set(found) == {None, "()(e)()@x"} and abs(found.count(None) - 200) < 50
+
+
+def test_the_threshold_is_all_words():
+    """'replace the last letter' explains four of five words; tau = J asks for all (C.1.2)."""
+    teacher = Scripted("()(.)($)@c", [], "program")
+    task = WordTask(("r",), "()(n)()@z", ("pen", "oven", "sun", "fan", "nan"), ("pez", "ovez", "suz", "faz", "zaz"))
+    execution = carried_out("()(n)()@c", task)
+    assert teacher.performances([(task, execution, "()(.)($)@c"), (task, execution, "()(n)()@c")]) == [0.0, 1.0]
+
+
+def test_the_grammar_describes_what_was_done_and_errs_as_often_as_it_should(data):
+    teacher, item = GrammarTeacher(data, 0, 0.0), data.splits["train"][0]
+    other = next(r for r in rules_without_requests(data, 500, rng=stream(0, "o")) if outputs(r, item.words) not in
+                 (None, item.words, item.outputs))  # fmt: skip
+    shape, before, after = parse(other)
+    fills = {t.fill(before, after) for t in data.templates["train"] if t.shape == shape}
+    assert set(teacher.describe([item] * 20, [carried_out(other, item)] * 20, rng=stream(0, "g"))) <= fills
+    wrong = GrammarTeacher(data, 0, 0.5).describe([item] * 400, [carried_out(other, item)] * 400, rng=stream(0, "w"))
+    assert 140 < sum(d not in fills for d in wrong) < 260
+
+
+# Learning ------------------------------------------------------------------------------------------
+
+VERBS = ("drop", "delete", "remove", "cut")
+PLACES = {"V@": "vowels", "C@": "consonants", "^V@": "leading vowel", "^C@": "leading consonant", "V$@": "final vowel"}
+HELD = {(v, r) for k, r in enumerate(PLACES) for v in (VERBS[k % 4],)}
+"""One wording of each rule that nobody uses in training."""
+
+
+class Neighbour:
+    """Says what was done, in a wording of training."""
+
+    def describe(self, tasks, executions, *, rng):
+        return [
+            None if e.outputs in (None, q.words) or e.rule not in PLACES else easy_request(e.rule, False, rng=rng)
+            for q, e in zip(tasks, executions)
+        ]
+
+
+def easy_request(rule: str, held: bool, *, rng) -> str:
+    verbs = [v for v in VERBS if ((v, rule) in HELD) == held]
+    return f"{verbs[int(rng.integers(len(verbs)))]} {PLACES[rule]}"
+
+
+def easy_items(data, held: bool, count: int) -> list[WordTask]:
+    rng, found = stream(0, "easy", int(held)), []
+    while len(found) < count:
+        rule = list(PLACES)[int(rng.integers(len(PLACES)))]
+        words = tuple(data.words[int(i)] for i in rng.permutation(len(data.words))[:2])
+        if outputs(rule, words)[0] != words[0]:
+            found.append(WordTask((easy_request(rule, held, rng=rng),), rule, words, outputs(rule, words)))
+    return found
+
+
+def test_a_small_student_learns_to_change_words_from_descriptions(data, tmp_path):
+    """More than 90 % of what is asked for in wordings that nobody used before, without one demonstration."""
+    config = dataclasses.replace(SMALL, hidden_size=32)
+    training, held = easy_items(data, False, 300), easy_items(data, True, 60)
+    requests = request_words(q.requests[0] for q in training)
+    student, explorer = (RegexStudent(new_network(Speller, config, requests, 0, "s"), requests) for _ in range(2))
+    marginal = RegexMarginal(list(PLACES))
+    problem = IliadProblem(RegexWorld(), Neighbour(), marginal, student, explorer, training, held, {"world": "easy"})
+    learner = LearnerConfig(iterations=120, batch=16, learning_rate=1e-2, cooldown=0.4, validate_every=40)
+    found = train(problem, learner, tmp_path, lambda path: None, note=silent)
+    assert found[-1]["success"] > 0.9, found
+
+
+# Runs ----------------------------------------------------------------------------------------------
+
+QUICK = LearnerConfig(iterations=4, batch=4, validate_every=2, checkpoint_minutes=1e-9)
+
+
+@pytest.fixture(scope="module")
+def grounds(tmp_path_factory):
+    """Data with a learned teacher, hardly trained."""
+    return prepare(SMALL, tmp_path_factory.mktemp("shared"), note=silent)
+
+
+@pytest.mark.parametrize("learner", ["adel", "dagger", "continuous"])
+def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
+    config = dataclasses.replace(QUICK, learner=learner)
+    expected = learn(grounds, config, tmp_path / "whole", note=silent)
+    cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+    assert len(cut) < len(expected) == 2
+    for _ in range(4):
+        cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+    assert cut == expected
+    (best,) = (tmp_path / "whole").rglob("best.safetensors")
+    student, loaded = load_student(best)
+    assert loaded == SMALL
+    items = grounds.data.splits["test"][:4]
+    assert all(isinstance(e.rule, str) for e in student.greedy(items, [q.requests[0] for q in items]))
+    with pytest.raises(CheckpointError, match="batch"):
+        learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
+
+
+def test_a_teacher_is_trained_once_and_data_of_other_settings_are_refused(grounds, tmp_path):
+    first = prepare(SMALL, tmp_path, note=silent)
+    times = {p: p.stat().st_mtime_ns for p in sorted(tmp_path.rglob("*.safetensors"))}
+    second = prepare(SMALL, tmp_path, note=silent)
+    assert len(times) == 2 and all(p.stat().st_mtime_ns == t for p, t in times.items())
+    assert first.digest == second.digest == grounds.digest
+    with pytest.raises(ValueError, match="another folder"):
+        prepare(dataclasses.replace(SMALL, items=10), tmp_path, note=silent)
+
+
+def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
+    item = grounds.data.splits["test"][0]
+    speller = new_network(Speller, SMALL, grounds.requests, 0, "told")
+    before = {k: v.clone() for k, v in speller.state_dict().items()}
+
+    class Right(RegexStudent):
+        def sample(self, tasks, requests, *, rng):
+            return [carried_out(q.rule, q) for q in tasks]
+
+    told = tell(Right(speller, grounds.requests), grounds.teacher, item, seed=0)
+    assert told.success and told.description in item.requests
+    assert told.after > told.before, "one update makes it likelier"
+    assert all(torch.equal(before[k], v) for k, v in speller.state_dict().items()), "the student stays as it is"
+    text = "\n".join(lines_of(told))
+    assert item.requests[0] in text and item.rule in text and item.outputs[0] in text
+
+
+def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
+    config = dataclasses.replace(SMALL, teacher="grammar")
+    setting = IliadStudySetting(tmp_path, config, QUICK, seeds=2)
+    pages = run_study(setting, ["3.5", "C.1"], note=silent)
+    text = pages["3.5"].read_text()
+    assert "| λ = 0.5 | 2 |" in text and "(55.7)" in text and "Not run" not in text
+    assert len(list(tmp_path.rglob("judged.json"))) == 2 * 4, "some runs are the same"
+    assert "Not run yet: DAgger" in report(setting, ["3.4"])["3.4"].read_text()
+    with pytest.raises(ValueError, match="unknown studies"):
+        run_study(setting, ["3.3"], note=silent)
+
+
+def test_commands_train_and_show(tmp_path, capsys):
+    sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics")]
+    assert main(["train", "iliad", "regex", "--out", str(tmp_path), "--iterations=2", "--batch=4", *sizes]) == 0
+    (best,) = tmp_path.rglob("best.safetensors")
+    capsys.readouterr()
+    assert main(["iliad", str(best), "--shared", str(tmp_path / "shared"), "--episodes", "1"]) == 0
+    assert "request" in capsys.readouterr().out
+    assert main(["iliad", str(best), "--request", "drop every vowel", "--word", "tea", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["word"] == "tea"
+    assert main(["iliad", str(best)]) == 2
+    assert "--shared" in capsys.readouterr().err
