@@ -417,6 +417,7 @@ def grounds(tmp_path_factory):
     return prepare(SMALL, tmp_path_factory.mktemp("shared"), note=silent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("learner", ["adel", "dagger", "continuous"])
 def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     config = dataclasses.replace(QUICK, learner=learner)
@@ -462,6 +463,7 @@ def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
     assert item.requests[0] in text and item.rule in text and item.outputs[0] in text
 
 
+@pytest.mark.slow
 def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     config = dataclasses.replace(SMALL, teacher="grammar")
     setting = IliadStudySetting(tmp_path, config, QUICK, seeds=2)
@@ -474,6 +476,7 @@ def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
         run_study(setting, ["3.3"], note=silent)
 
 
+@pytest.mark.slow
 def test_commands_train_and_show(tmp_path, capsys):
     sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics")]
     assert main(["train", "iliad", "regex", "--out", str(tmp_path), "--iterations=2", "--batch=4", *sizes]) == 0

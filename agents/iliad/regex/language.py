@@ -111,7 +111,7 @@ def _bare(symbol: str, number: int) -> list[str]:
 
 def _pair(block: str, one: bool) -> list[str]:
     """Two symbols, as a noun phrase with (`one`) or without an article."""
-    a, b = block
+    a, b = block[0], block[1]
     nouns = _one if one else _bare
     second = 1 + (a == LETTER)
     found = [

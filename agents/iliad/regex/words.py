@@ -29,7 +29,8 @@ def made_up(count: int, *, seed: int) -> tuple[str, ...]:
     The dissertation's words are the dictionary of an operating system, which differs from one to the
     next and is often missing (docs/sources.md, S90).
     """
-    rng, found = stream(seed, "regex", "words"), {}
+    rng = stream(seed, "regex", "words")
+    found: dict[str, None] = {}
     while len(found) < count:
         word = _word(rng=rng)
         if SHORTEST <= len(word) <= LONGEST_MADE_UP:
