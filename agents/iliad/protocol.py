@@ -17,6 +17,9 @@ Q = TypeVar("Q")
 """A task q = (R, s_1, d*)."""
 E = TypeVar("E")
 """An execution e = (s_1, a_1, .., s_H, a_H)."""
+Q_in = TypeVar("Q_in", contravariant=True)
+E_in = TypeVar("E_in", contravariant=True)
+"""The same where they are only taken, never given."""
 NOTHING = ""
 """The empty description."""
 
@@ -33,47 +36,53 @@ class ExecutionScores:
     """(B, T) bool, False behind the end."""
 
 
-class RequestWorld(Protocol[Q, E]):
+class RequestWorld(Protocol[Q_in, E]):
     """Where requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
 
-    def request(self, task: Q, *, rng: np.random.Generator) -> str:
+    def request(self, task: Q_in, *, rng: np.random.Generator) -> str:
         """d*: one of the task's requests."""
 
-    def success(self, task: Q, execution: E) -> bool:
+    def success(self, task: Q_in, execution: E) -> bool:
         """Whether the task is fulfilled."""
 
-    def reward(self, task: Q, execution: E) -> float:
+    def reward(self, task: Q_in, execution: E) -> float:
         """Nearness to the goal, at most 1 (C.1, C.2)."""
 
-    def demonstrate(self, task: Q, execution: E) -> E:
+    def demonstrate(self, task: Q_in, execution: E) -> E:
         """The best actions in the states of an execution, one for each, the last one stopping."""
 
 
-class DescribingTeacher(Protocol[Q, E]):
+class DescribingTeacher(Protocol[Q_in, E_in]):
     """P_T(d | e)."""
 
-    def describe(self, tasks: Sequence[Q], executions: Sequence[E], *, rng: np.random.Generator) -> list[str | None]:
+    def describe(
+        self, tasks: Sequence[Q_in], executions: Sequence[E_in], *, rng: np.random.Generator
+    ) -> list[str | None]:
         """What was done; None where the teacher has nothing to say."""
 
 
-class Marginal(Protocol[Q, E]):
+class Marginal(Protocol[Q_in, E]):
     """P_omega(e | s_1), which knows nothing of requests."""
 
-    def draw(self, tasks: Sequence[Q], *, rng: np.random.Generator) -> list[E]:
+    def draw(self, tasks: Sequence[Q_in], *, rng: np.random.Generator) -> list[E]:
         """An execution that begins where each task begins."""
 
 
-class Student(Protocol[Q, E]):
+class Student(Protocol[Q_in, E]):
     """pi(a | s, d)."""
 
-    def sample(self, tasks: Sequence[Q], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
+    def sample(self, tasks: Sequence[Q_in], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
         """e ~ P_pi(. | s_1, d)."""
 
-    def greedy(self, tasks: Sequence[Q], requests: Sequence[str]) -> list[E]:
+    def greedy(self, tasks: Sequence[Q_in], requests: Sequence[str]) -> list[E]:
         """The likeliest action in every state."""
 
     def scores(
-        self, tasks: Sequence[Q], requests: Sequence[str], executions: Sequence[E], actions: Sequence[E] | None = None
+        self,
+        tasks: Sequence[Q_in],
+        requests: Sequence[str],
+        executions: Sequence[E],
+        actions: Sequence[E] | None = None,
     ) -> ExecutionScores:
         """Of the actions of executions, or of other `actions` in their states."""
 

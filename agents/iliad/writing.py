@@ -59,6 +59,12 @@ class Writer(nn.Module):
         self.combine = nn.Linear((1 + memories) * size, size)
         self.out = nn.Linear(size, numbers)
 
+    def remember(self, which: int, values: Tensor, mask: Tensor) -> Remembered:
+        """What memory number `which` holds: (B, S, h) values, (B, S) bool which of them are there."""
+        attention = self.attend[which]
+        assert isinstance(attention, Attention)
+        return attention.remember(values, mask)
+
     def forward(self, before: Tensor, state: tuple[Tensor, Tensor], memories: list[Remembered]) -> tuple[Tensor, tuple]:
         """Logits (B, T, V) after each of the numbers `before` (B, T), and the state after the last."""
         hidden, state = self.lstm(self.embed(before), state)

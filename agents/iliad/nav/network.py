@@ -104,7 +104,7 @@ class WalkDescriber(nn.Module):
         x = torch.relu(self.enter(torch.cat([actions, looked], -1))) + self.time.weight[:t]
         x = self.feed(self.relate(x, self.relate.key(x), self.relate.value(x), mask))
         mean = (x * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
-        return self.first(mean), [self.writer.attend[0].remember(x, mask)]
+        return self.first(mean), [self.writer.remember(0, x, mask)]
 
     def forward(self, views: Tensor, actions: Tensor, mask: Tensor, written: Tensor) -> Tensor:
         """Logits (B, W, V) before each of the given words (B, W)."""

@@ -33,8 +33,8 @@ class Speller(nn.Module):
         """(B, W) letters and (B, S) words to the writer's first state and memories."""
         letters, _ = self.read_word(self.letters(word))
         words, _ = self.read_request(self.words(request), self.to_request(last(letters, word != PAD)))
-        of_word, of_request = self.writer.attend
-        memories = [of_word.remember(letters, word != PAD), of_request.remember(words, request != 0)]
+        remember = self.writer.remember
+        memories = [remember(0, letters, word != PAD), remember(1, words, request != 0)]
         return self.to_writer(last(words, request != 0)), memories
 
     def forward(self, word: Tensor, request: Tensor, written: Tensor) -> Tensor:
@@ -74,7 +74,7 @@ class ChangeDescriber(nn.Module):
         flat, flags = columns.flatten(1, 2), mask.flatten(1)
         mean = flat.sum(1) / flags.sum(1, keepdim=True)
         first = torch.tanh(self.summary(torch.cat([mean, flat.amax(1)], -1)))
-        return self.begin(first), [self.writer.attend[0].remember(flat, flags)]
+        return self.begin(first), [self.writer.remember(0, flat, flags)]
 
     def forward(self, changed: Tensor, written: Tensor) -> Tensor:
         """Logits (B, T, V) before each of the given words (B, T)."""
