@@ -17,7 +17,7 @@ from agents.imitation.lessons import split_of
 from agents.vision.config import Looked
 from agents.vision.run import encoder_of, pictures_of
 from assets.cache import digest, write_json
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, as_json, markdown, save
@@ -48,7 +48,7 @@ def run_eval(
       LockedError: another process writes to args.out.
     """
     torch.set_num_threads(args.threads)
-    data, encoder, agent = Dataset(args.data), encoder_of(args), load_agent(args.agent)
+    data, encoder, agent = dataset_of(args.data, "hanna"), encoder_of(args), load_agent(args.agent)
     rows: list[Row] = []
     extra: dict[str, object] = {}
     looked = Looked()

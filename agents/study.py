@@ -29,7 +29,7 @@ from agents.tables import side_by_side as beside
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, save, shown
@@ -274,7 +274,7 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
     """
     if unknown := [n for n in names if n not in TABLES]:
         raise ValueError(f"unknown studies {unknown}; there are {list(TABLES)}")
-    data = Dataset(setting.data)
+    data = dataset_of(setting.data, "hanna")
     tables = {n: _possible(TABLES[n], setting, len(data.names("train"))) for n in names}
     wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
     jobs = (joblib.delayed(_train)(setting, v, note if workers == 1 else None) for v in wanted)

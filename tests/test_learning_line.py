@@ -27,6 +27,7 @@ from agents.vision.run import encoder_of
 from embodied.cli import learning
 from embodied.cli.options import chosen
 from embodied.cli.view import looked_at
+from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
 from embodied.seeds import stream
 
@@ -234,6 +235,12 @@ def _empty(folder):
     path = folder / "weights.pth"
     torch.save({}, path)
     return path
+
+
+def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_makes_the_right_one(data):
+    assert dataset_of(data.folder, "hanna").digest == data.digest
+    with pytest.raises(ValueError, match="is a data set of 'hanna', a learner of 'vnla' needs .*dataset vnla --out"):
+        dataset_of(data.folder, "vnla")
 
 
 def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():

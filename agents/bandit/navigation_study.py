@@ -18,7 +18,7 @@ from agents.hanna.agent import HannaAgent, load_agent
 from agents.imitation.lessons import Split, split_of
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import dataset_of
 from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
@@ -71,7 +71,7 @@ def run_navigation_study(setting: NavigationSetting, only: Sequence[str] | None 
     if unknown := [name for name in only or () if name not in raters()]:
         raise ValueError(f"unknown raters {unknown}; there are {list(raters())}")
     torch.set_num_threads(setting.threads)
-    data = Dataset(setting.data)
+    data = dataset_of(setting.data, "hanna")
     rated, judged = split_of(data, "train", setting.encoder), split_of(data, setting.split, setting.encoder)
     return run_raters(setting, rated, judged, list(only or raters()), note=note)
 

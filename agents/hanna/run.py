@@ -16,7 +16,7 @@ from agents.imitation.lessons import Lessons
 from agents.imitation.loop import Progress
 from agents.imitation.parallel import join_launcher, one_voice
 from agents.vision.run import encoder_of
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import Episode
 from embodied.teachers.hanna import HannaTeacher
 
@@ -39,7 +39,7 @@ def run_train_hanna(
     """Train an agent on a data set's training houses, validating on its unseen validation houses."""
     torch.set_num_threads(args.threads)
     train_agent(
-        Lessons(Dataset(args.data), encoder_of(args), args.quality, join_launcher(args.device)),
+        Lessons(dataset_of(args.data, "hanna"), encoder_of(args), args.quality, join_launcher(args.device)),
         config,
         args.out,
         minutes=args.minutes,

@@ -11,7 +11,7 @@ from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
 from agents.hari.words import feature_words
 from agents.imitation.loop import Note, Progress
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
@@ -27,12 +27,7 @@ def hari_data(folder: Path) -> Dataset:
     Raises:
       ValueError: it is of another kind.
     """
-    data = Dataset(folder)
-    if data.kind != "hari":
-        raise ValueError(
-            f"{folder} is a data set of {data.kind!r}, HARI learns from its own: embodied dataset hari --out DIR"
-        )
-    return data
+    return dataset_of(folder, "hari")
 
 
 def lessons_of(data: Dataset) -> Curriculum:

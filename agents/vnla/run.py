@@ -14,7 +14,7 @@ from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from agents.vnla.training import train
 from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import Episode
 from embodied.language.plain import PlainLanguage
 
@@ -27,12 +27,7 @@ def vnla_data(folder: Path) -> Dataset:
     Raises:
       ValueError: it is of another kind.
     """
-    data = Dataset(folder)
-    if data.kind != "vnla":
-        raise ValueError(
-            f"{folder} is a data set of {data.kind!r}, VNLA learns from its own: embodied dataset vnla --out DIR"
-        )
-    return data
+    return dataset_of(folder, "vnla")
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:

@@ -270,3 +270,18 @@ class Dataset:
         key = limit_key(self.place(task.world), task.start.node, task.goal)
         horizon = max(task.horizon, limits.get(key, config.most_actions))
         return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
+
+
+def dataset_of(folder: Path, kind: str) -> Dataset:
+    """The data set in `folder`, for a learner of one kind of task.
+
+    Raises:
+      DatasetError: it is of another kind, or as Dataset.
+    """
+    data = Dataset(folder)
+    if data.kind != kind:
+        raise DatasetError(
+            f"{folder} is a data set of {data.kind!r}, a learner of {kind!r} needs its own: "
+            f"`embodied dataset {kind} --out DIR`"
+        )
+    return data
