@@ -122,11 +122,10 @@ def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float 
     return position, np.tile(np.float32([0, 0, up]), (n * n, 1)), np.full(n * n, owner)
 
 
-def sheets(*made):
+def sheets(*made, shell: bool = True):
     position, normal, owner = (np.concatenate(a) for a in zip(*made))
-    return SimpleNamespace(
-        position=position, normal=normal, owner=owner, area=np.full(len(owner), 0.025**2, np.float32)
-    )
+    area, all_ = np.full(len(owner), 0.025**2, np.float32), np.full(len(owner), shell)
+    return SimpleNamespace(position=position, normal=normal, owner=owner, area=area, shell=all_)
 
 
 def test_sites_are_one_luxel_in_nine_and_carry_a_gradient_to_all_luxels():
@@ -137,6 +136,23 @@ def test_sites_are_one_luxel_in_nine_and_carry_a_gradient_to_all_luxels():
     slope = lambda p: (1 + p[:, :1] * np.float32([0.5, 0.3, 0.1])).astype(np.float32)
     inner = ((lux.position[:, :2] > 0.1) & (lux.position[:, :2] < 0.87)).all(1)
     np.testing.assert_allclose(spread(slope(sites.position))[inner], slope(lux.position)[inner], rtol=0.02)
+
+
+def test_what_is_no_shell_can_have_fewer_sites():
+    fine, coarse = (sites_of(sheets(flat_luxels(0.0, 0), shell=shell), 2.5, things=2.0) for shell in (True, False))
+    assert len(coarse.luxel) == pytest.approx(len(fine.luxel) / 4, rel=0.25)
+
+
+def test_few_luxels_at_a_rim_take_the_site_beside_them_unless_they_face_another_way_or_belong_to_another():
+    sheet = flat_luxels(0.0, 0)
+    beside = np.float32([[-0.02, 0.3, 0.0], [-0.02, 0.6, 0.0]])
+    up, down = np.float32([[0, 0, 1]] * 2), np.float32([[0, 0, -1]] * 2)
+    for normal, owner, own in ((up, 0, False), (down, 0, True), (up, 1, True)):
+        lux = sheets(sheet, (beside, normal, np.full(2, owner)))
+        sites = sites_of(lux, 3.0)
+        rim = sites.own[-2:]
+        assert (sites.luxel[rim] >= len(sheet[2])).all() == own
+        assert own or (np.abs(sites.position[rim] - beside).max() < 0.1)
 
 
 def test_a_rug_takes_no_light_from_its_own_underside_nor_from_the_floor_below():

@@ -10,10 +10,10 @@ import pytest
 from handmade import box_mesh
 
 from assets.records import Finish, MeshPart
-from embodied.light import cover
+from embodied.light import cover, unwrap
 from embodied.light.atlas import Page, UnwrappedThing, coarsened
 from embodied.light.cover import rasterise
-from embodied.light.unwrap import areas_of, pack, unwrap_model, unwrap_planes
+from embodied.light.unwrap import ONCE, areas_of, density_of, pack, unwrap_model, unwrap_planes, with_budget
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -100,6 +100,33 @@ def test_a_ring_of_skirting_takes_four_strips_of_a_page_and_not_the_whole_floor(
     assert np.prod(flat.size) < 0.15 * (4.0 * 40.0) ** 2
     on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
     assert on_page == pytest.approx(areas_of(flat.corners) * 40.0**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("budget", [500.0, 24000.0])
+def test_another_budget_has_the_same_charts_at_another_density(budget):
+    laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.04, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(5)]
+    once, flat = unwrap_model(laths, ONCE), with_budget(unwrap_model(laths, ONCE), ONCE, budget)
+    np.testing.assert_array_equal(flat.corners, once.corners)
+    assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
+    taken = np.zeros(flat.size[::-1], int)
+    for c in range(flat.chart.max() + 1):
+        places = flat.luxels[flat.chart == c].reshape(-1, 2)
+        extent, before = np.ptp(places, axis=0), np.ptp(once.luxels[once.chart == c].reshape(-1, 2), axis=0)
+        scale = density_of(once.corners, budget) / density_of(once.corners, ONCE)
+        assert np.sort(extent) == pytest.approx(np.maximum(np.ceil(np.sort(before) * scale - 1e-2), 1), abs=1e-3)
+        (x0, y0), (x1, y1) = np.floor(places.min(0) + 1e-3).astype(int), np.ceil(places.max(0) - 1e-3).astype(int)
+        taken[y0 : y1 + 1, x0 : x1 + 1] += 1  # with the luxel beside it that reading between luxels touches
+    assert taken.max() == 1
+
+
+def test_a_model_is_unwrapped_once_for_all_budgets(tmp_path, monkeypatch):
+    laths, asked = [box_mesh((0, 0, 0), (0.05, 0.04, 1.5), (0.5, 0.4, 0.3, 1.0))], []
+    real = unwrap.unwrap_model
+    monkeypatch.setattr(unwrap, "unwrap_model", lambda *a, **k: asked.append(a) or real(*a, **k))
+    flats = [unwrap.cached_model(laths, budget, tmp_path) for budget in (6000.0, 1200.0, 14000.0, 1200.0)]
+    assert len(asked) == 1
+    assert flats[0].size.prod() > flats[1].size.prod()
+    np.testing.assert_array_equal(flats[1].luxels, flats[3].luxels)
 
 
 def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):

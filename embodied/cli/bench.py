@@ -1,7 +1,8 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help, seen with pixels; light compares the ways of drawing with a path tracer, codecs those of
+with help, seen with pixels; light compares the ways of drawing with a path tracer, growth lights
+houses of 40 to 400 m² and fits how the cost grows (fast, or --quality normal), codecs compares ways of
 storing what was drawn (choose --quality fast). Close other programs first: the numbers are only as
 good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
 and features in OUT/freeze and writes their digests; with --against it says of every part whether it
@@ -23,7 +24,7 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "codecs", "freeze")
+PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "growth", "codecs", "freeze")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -57,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
         return light(args, catalogue)
     if "codecs" in parts:
         return codecs(args, catalogue)
+    if "growth" in parts:
+        return growth(args, catalogue)
     if "freeze" in parts:
         return freeze(args, catalogue)
     lines = {
@@ -92,6 +95,18 @@ def codecs(args: argparse.Namespace, catalogue: Catalogue) -> int:
 
     report = compare(catalogue, args.cache, args.seed, args.quality)
     show(args, report.facts, report.text)
+    return 0
+
+
+def growth(args: argparse.Namespace, catalogue: Catalogue) -> int:
+    """The cost of light against area."""
+    from embodied.bench.growth import growth as measured
+    from embodied.bench.growth import table
+    from embodied.light.settings import QUALITIES
+
+    quality = args.quality if args.quality in QUALITIES else "fast"
+    facts = measured(catalogue, args.cache, args.out, seed=args.seed, quality=quality, progress=note)
+    show(args, facts, table(facts))
     return 0
 
 

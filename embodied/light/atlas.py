@@ -99,7 +99,7 @@ def things_of(
         if kind in SHELL:
             flat = unwrap_planes(meshes, density)
         else:
-            flat = cached_model(meshes, budget, cache, trusted=kind == "opening")
+            flat = cached_model(meshes, budget, cache, trusted=kind == "opening", alone=kind == "outdoor")
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)

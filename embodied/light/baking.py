@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -45,7 +46,7 @@ from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
 from embodied.light.sites import sites_of
 from embodied.light.sky import outdoors as outdoors_of
 from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, with_glow
-from embodied.light.surroundings import dome_mesh, surroundings
+from embodied.light.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.tone import expose
 from embodied.light.unwrap import areas_of
 from embodied.scene.house_meshes import house_parts, owners
@@ -84,8 +85,11 @@ def progress_bar() -> Iterator[Progress]:
 
 def key_of(house: House, catalogue: Catalogue, settings: Settings) -> str:
     """What a bake is filed under: another catalogue, model or material makes another bake."""
-    parts = looks_of(house_parts(house, catalogue))
-    return digest("light", light_code(), house.digest, owners(house), parts, dataclasses.asdict(settings))[:24]
+    return _key(house, looks_of(house_parts(house, catalogue)), settings)
+
+
+def _key(house: House, looks: str, settings: Settings) -> str:
+    return digest("light", light_code(), house.digest, owners(house), looks, dataclasses.asdict(settings))[:24]
 
 
 def looks_of(parts: Sequence[Part]) -> str:
@@ -146,15 +150,16 @@ def bake_all(
     if len({_unlit(h).digest for h in lightings}) > 1:
         raise ValueError("bake_all lights one house at several hours; what came differs in more than sky and lamps")
     shared, out = None, []
+    parts = house_parts(lightings[0], catalogue)  # which know neither sky nor lamps
+    looks = looks_of(parts)
     for house in lightings:
-        folder = _folder(cache, house, catalogue, settings)
+        folder = _folder(cache, house, looks, settings)
         done = reopened(folder, house)
         if done is None:
             folder.mkdir(parents=True, exist_ok=True)
             if shared is None:
-                shared = Shared(
-                    house, catalogue, Path(cache) / "light", settings, several=len(lightings) > 1, progress=progress
-                )
+                several = len(lightings) > 1
+                shared = Shared(house, parts, Path(cache) / "light", settings, several=several, progress=progress)
             done = _make(house, shared, folder, settings, progress)
         out.append(done)
     return tuple(out)
@@ -190,7 +195,7 @@ class Shared:
     def __init__(
         self,
         house: House,
-        catalogue: Catalogue,
+        parts: Sequence[Part],
         cache: Path,
         settings: Settings,
         *,
@@ -200,10 +205,9 @@ class Shared:
         """`cache` holds what belongs to assets alone; `several` keeps what another lighting can use."""
         self.took: dict[str, float] = {}
         clock = _Clock(self.took)
-        every = [p for p in house_parts(house, catalogue) if len(p.mesh.faces)]
-        self.outer = [p for p in every if p.kind == "outdoor"]
-        self.maps, self.cache, self.several = ColourMaps(cache), cache, several
-        clock("parts")
+        every = [p for p in parts if len(p.mesh.faces)]
+        self.maps, self._house, self._cache, self._sharpness = ColourMaps(cache), house, cache, settings.sharpness
+        self._outer = [p for p in every if p.kind == "outdoor"]
         things = things_of(
             [p for p in every if p.kind != "outdoor"],
             density=settings.density,
@@ -217,9 +221,26 @@ class Shared:
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
         clock("luxels")
-        self.sites = sites_of(self.lux, settings.every)
+        self.sites = sites_of(self.lux, settings.every, things=settings.things)
         self.memory = Memory() if several else None
         clock("sites")
+
+    @functools.cached_property
+    def outside(self) -> Outside | None:
+        """What the sun and the sky light outside."""
+        return outside_of(self._outer, self.atlas, self._cache, self.maps, self._sharpness)
+
+    @functools.cached_property
+    def meshes(self) -> tuple[list[LitMesh], list[np.ndarray]]:
+        """What renderers draw, and the gloss of its faces."""
+        first = len(self.atlas.pages)
+        meshes, gloss = _meshes(self.atlas, 0)
+        if self.outside is not None:
+            more, more_gloss = _meshes(self.outside.atlas, first)
+            meshes += [dataclasses.replace(m, kind="outdoor") for m in more]
+            gloss += more_gloss
+            first += len(self.outside.atlas.pages)
+        return [*meshes, dome_mesh(self._house, first)], gloss
 
 
 def solve_house(
@@ -269,19 +290,12 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
             one = page_of(i, composer)
             write_page(folder, i, one, settings.jpeg)
     clock("pages")
-    outer, outer_pages, dome = surroundings(
-        house, shared.outer, s.atlas, s.outdoors, s.exposure, shared.cache, shared.maps, settings.sharpness
-    )
     first = len(s.atlas.pages)
-    for i, picture in enumerate([*outer_pages, dome], first):
+    pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.sky_rays)
+    for i, picture in enumerate(pictures, first):
         write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
-    meshes, gloss = _meshes(s.atlas, 0)
-    if outer is not None:
-        more, more_gloss = _meshes(outer, first)
-        meshes += [dataclasses.replace(m, kind="outdoor") for m in more]
-        gloss += more_gloss
-    meshes.append(dome_mesh(house, first + len(outer_pages)))
     clock("surroundings")
+    meshes, gloss = shared.meshes
     write_meshes(folder, meshes, gloss)
     write_lamps(folder, s.lamps)
     clock("meshes")
@@ -289,7 +303,7 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     manifest = {
         **facts_of(s, meshes, _probes(s), folder),
         "settings": dataclasses.asdict(settings),
-        "pages": first + len(outer_pages) + 1,
+        "pages": first + len(pictures),
         "seconds": {k: round(v, 2) for k, v in took.items()},
         "total_seconds": round(time.perf_counter() - start, 1),
         "processor_seconds": round(time.process_time() - used, 1),
@@ -393,11 +407,11 @@ def gloss_of(finish: Finish) -> tuple[int, int, int]:
 
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:
     """Delete the bake of `house`, finished or not."""
-    shutil.rmtree(_folder(cache, house, catalogue, settings), ignore_errors=True)
-
-
-def _folder(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> Path:
-    """Where the bake of `house` is, or will be; its name begins with the quality's."""
     settings = settings_of(settings) if isinstance(settings, str) else settings
+    shutil.rmtree(_folder(cache, house, looks_of(house_parts(house, catalogue)), settings), ignore_errors=True)
+
+
+def _folder(cache: Path, house: House, looks: str, settings: Settings) -> Path:
+    """Where the bake of `house` is, or will be; its name begins with the quality's. `looks`: of its parts."""
     name = next((name for name, known in QUALITIES.items() if known == settings), "custom")
-    return Path(cache) / "light" / f"{name}-{key_of(house, catalogue, settings)}"
+    return Path(cache) / "light" / f"{name}-{_key(house, looks, settings)}"

@@ -41,10 +41,9 @@ from embodied.light.tone import Exposure, developed
 
 METAL = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
-DULL, SHARP_RAYS, DULL_RAYS = 0.1, 8, 96
+DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 4
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
-and
-the rays of sharp metals per texel and of dull ones per luxel."""
+and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `sky_rays`."""
 AROUND = 0.15
 """What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
 too."""
@@ -109,11 +108,14 @@ class Composer:
         return radiosity.portal_scene(portals) if portals and self.solved.outdoors.sun.any() else None
 
     @functools.cached_property
-    def seen(self) -> tuple[np.ndarray, float]:
-        """(n, 3) radiance of all luxels, and the 95th percentile of its brightness."""
+    def seen(self) -> tuple[tuple[float, Array], tuple[float, Array]]:
+        """For sharp and for dull metals the most that they show of a lamp's glint, which few rays would find, and the
+        radiance of all luxels cut to that, on the device."""
         lux, light = self.solved.lux, self.solved.light
         seen = lux.albedo * (light.soft + light.sun[:, None] * self.sun) + lux.glow
-        return seen, float(np.percentile(seen.mean(1), 95))
+        bright = float(np.percentile(seen.mean(1), 95))
+        sharp, dull = ((most * bright, floats(np.minimum(seen, most * bright))) for most in (8.0, 3.0))
+        return sharp, dull
 
 
 def page_of(number: int, composer: Composer) -> Ingredients:
@@ -123,7 +125,8 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     light = np.concatenate([composer.soft[mine], solved.light.sun[mine, None]], axis=1)
     known = filled(coarse.index, light, solved.light.good[mine], coarse.shape)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
-    c = once(composer.memory, ("cover", number), lambda: cover(page, page.fineness))
+    fine = lambda: cover(page, page.fineness, solved.lux.sheets[number])
+    c = coarse.cover if page.fineness == 1 else once(composer.memory, ("cover", number), fine)
     sun = _sharp_sun(composer, page, coarse, c, share)
     gain = spread(coarse.index, solved.exposure.at(coarse.position), coarse.shape)
     glow = glow_of(solved.house, solved.atlas, page, c.face, solved.lamps)
@@ -276,10 +279,9 @@ def _mirrored(
     cos = (normal * to_eye).sum(1, keepdims=True)
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
     p = points_of(position, normal, normal, np.zeros(len(face), bool))
-    seen, bright = composer.seen
-    rays, width = DULL_RAYS if dull else SHARP_RAYS, np.square(rough) + AROUND * dull
-    limit = (3.0 if dull else 8.0) * bright  # of a lamp's glint: few rays would find it
-    table = floats(np.minimum(seen, limit))
+    rays = max(round((DULL_RAYS if dull else SHARP_RAYS) * composer.settings.sky_rays), 1)
+    width = np.square(rough) + AROUND * dull
+    limit, table = composer.seen[dull]
     spread_of, straight = floats(width), vector(bounced)
 
     def one(k: Array) -> tuple[Array, ...]:

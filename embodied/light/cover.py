@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from embodied.light.arrays import RayScene
+from embodied.light.arrays import Array, RayScene
 from embodied.light.atlas import Page
-from embodied.light.backend import drjit, floats, mitsuba, scene_of
+from embodied.light.backend import constant, drjit, floats, mitsuba, number, scene_of
 from embodied.light.unwrap import face_normals
 
 OFFSETS = (
@@ -64,31 +65,50 @@ class Texels:
         return self.cover.shape
 
 
-def cover(page: Page, fineness: int) -> Cover:
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A page's layout in luxels, as something that rays meet."""
+
+    scene: RayScene
+    """The layouts of some pages, one above the other a metre apart."""
+    height: int
+    """Where this one lies."""
+    first: int
+    """Number of its first face."""
+
+
+def sheets_of(pages: Sequence[Page]) -> tuple[Sheet, ...]:
+    """The layouts of pages, in one scene."""
+    ends = np.cumsum([0, *(len(p.luxels) for p in pages)])
+    if not ends[-1]:
+        return tuple(Sheet(None, i, 0) for i in range(len(pages)))
+    height = np.repeat(np.arange(len(pages), dtype=np.float32), np.diff(ends))
+    flat = np.concatenate([p.luxels for p in pages])
+    scene = scene_of(np.concatenate([flat, np.broadcast_to(height[:, None, None], (*flat.shape[:2], 1))], axis=-1))
+    return tuple(Sheet(scene, i, int(first)) for i, first in enumerate(ends[:-1]))
+
+
+def cover(page: Page, fineness: int, sheet: Sheet | None = None) -> Cover:
     """Faces under texels, found by shooting rays straight down on the layout: at centres, and beside what these find
     and along the slivers that they miss at `OFFSETS`.
 
     Args:
       fineness: texels per luxel along each axis.
+      sheet: the page's layout, where it is at hand.
     """
+    sheet = sheet or sheets_of((page,))[0]
     w, h = page.width * fineness, page.height * fineness
-    at = page.luxels * fineness
-    scene = scene_of(np.concatenate([at, np.zeros((*at.shape[:2], 1), np.float32)], axis=-1))
-    face, b1, b2 = _straight_down(scene, np.arange(w * h), w, (0.0, 0.0))
-    left = _doubtful(face.reshape(h, w) >= 0, at, face)
-    for offset in OFFSETS:
-        found, *where = _straight_down(scene, left, w, offset)
-        hit = found >= 0
-        for all_, new in zip((face, b1, b2), (found, *where)):
-            all_[left[hit]] = new[hit]
-        left = left[~hit]
+    face, b1, b2 = _straight_down(sheet, np.arange(w * h), w, fineness, ((0.0, 0.0),))
+    left = _doubtful(face.reshape(h, w) >= 0, page.luxels * fineness, face)
+    for all_, new in zip((face, b1, b2), _straight_down(sheet, left, w, fineness, OFFSETS)):
+        all_[left] = new
     index = np.nonzero(face >= 0)[0]
     return Cover(index, face[index], b1[index], b2[index], (h, w))
 
 
-def rasterise(page: Page, fineness: int) -> Texels:
+def rasterise(page: Page, fineness: int, sheet: Sheet | None = None) -> Texels:
     """The surface under every covered texel."""
-    c = cover(page, fineness)
+    c = cover(page, fineness, sheet)
     return Texels(c, *surface(page, c))
 
 
@@ -120,17 +140,27 @@ def nearest(mask: np.ndarray) -> np.ndarray:
 
 
 def _straight_down(
-    scene: RayScene, spot: np.ndarray, width: int, offset: tuple[float, float]
+    sheet: Sheet, spot: np.ndarray, width: int, fineness: int, offsets: Sequence[tuple[float, float]]
 ) -> tuple[np.ndarray, ...]:
-    """Face under each texel `spot` (-1 for none), and where on it."""
+    """Face under each texel `spot` (-1 for none) at the first of `offsets` that shows one, and where on it."""
     mi, dr = mitsuba(), drjit()
-    if not len(spot):
-        return np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)
-    row, column = np.divmod(spot.astype(np.int32), np.int32(width))
-    x, y = (floats(a + np.float32(0.5 + o)) for a, o in zip((column, row), offset))
-    hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(x, y, 1.0), mi.Vector3f(0, 0, -1)), True)
-    face = dr.select(hit.is_valid(), mi.Int32(hit.prim_index), -1)
-    u, v = hit.prim_uv.x, hit.prim_uv.y
+    if not len(spot) or not len(offsets) or sheet.scene is None:
+        return np.full(len(spot), -1, np.int32), np.zeros(len(spot), np.float32), np.zeros(len(spot), np.float32)
+    row, column = (floats(a) for a in np.divmod(spot.astype(np.int32), np.int32(width)))
+    aside, step, above = floats(offsets), constant(1 / fineness), constant(sheet.height + 0.5)
+    down, first, last = mi.Vector3f(0, 0, -1), number(sheet.first), number(len(offsets))
+
+    def body(k: Array, face: Array, u: Array, v: Array) -> tuple[Array, ...]:
+        o = dr.gather(mi.Point2f, aside, k)
+        at = mi.Point3f((column + (o.x + 0.5)) * step, (row + (o.y + 0.5)) * step, above)
+        open_ = face < 0
+        hit = sheet.scene.ray_intersect_preliminary(mi.Ray3f(at, down, 0.9, 0.0, []), True, open_)
+        new = open_ & hit.is_valid()
+        face = dr.select(new, mi.Int32(hit.prim_index - first), face)
+        return k + 1, face, dr.select(new, hit.prim_uv.x, u), dr.select(new, hit.prim_uv.y, v)
+
+    none, zero = dr.zeros(mi.Int32, len(spot)) - 1, dr.zeros(mi.Float, len(spot))
+    _, face, u, v = dr.while_loop((mi.UInt32(0), none, zero, zero), lambda k, *_: k < last, body)
     dr.eval(face, u, v)
     return np.array(face), np.array(u), np.array(v)
 

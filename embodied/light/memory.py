@@ -21,6 +21,10 @@ class Memory:
         known: T = self._known[key]
         return known
 
+    def known(self, key: Hashable) -> Any:
+        """What is kept under `key`; None if nothing is."""
+        return self._known.get(key)
+
 
 def once(memory: Memory | None, key: Hashable, make: Callable[[], T]) -> T:
     """`make`, remembered where there is a memory."""

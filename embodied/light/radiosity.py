@@ -180,8 +180,11 @@ def env_lookup(space: Space, d: Array, active: Array = True) -> Array:
     return out
 
 
-def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> Array:
+def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Memory | None = None) -> Array:
     """e (a Color3f) from the outdoors through one portal, by area sampling.
+
+    Args:
+      memory: keeps which ways are free, for the same points below another sky.
 
     One sample is clamped at 10 / samples and the sum at full view of the portal: without it, things
     a few centimetres from the glass turn into fireflies.
@@ -201,11 +204,19 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int) -> Array:
         leaving = -dr.dot(n, d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
-        free = active & ~space.scene.ray_test(ray, active)
+        free = active & (~space.scene.ray_test(ray, active) if ways is None else ((ways >> k) & 1) == 1)
         g = dr.minimum(dr.select(free, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0), share)
-        return env_lookup(space, d, free) * g, g
+        found = env_lookup(space, d, free) * g, g
+        return found if ways is not None or memory is None else (*found, dr.select(free, mi.UInt32(1) << k, 0))
 
-    total, seen = added_up(samples, one, dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n))
+    nothing = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
+    memory = memory if samples <= WAYS else None
+    ways = None if memory is None else memory.known(("ways", portal.id))
+    if memory is None or ways is not None:
+        total, seen = added_up(samples, one, *nothing)
+    else:
+        total, seen, met = added_up(samples, one, *nothing, dr.zeros(mi.UInt32, p.n))
+        memory.once(("ways", portal.id), lambda: met)
     return total * dr.select(seen > 1, 1 / seen, 1)
 
 
@@ -303,6 +314,8 @@ def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
     return array(added_up(len(patches.flux), one, dr.zeros(mi.Color3f, p.n))[0])
 
 
+WAYS = 32
+"""Rays of a point that one whole number remembers."""
 NOTHING = 0xFFFFFFFF
 """In place of a luxel's number: the ray met nothing that shines."""
 

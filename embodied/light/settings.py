@@ -52,15 +52,42 @@ class Settings:
     """Relative difference from the path tracer that a luxel may have (`embodied.light.check`)."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
+    things: float = 1.0
+    """Times `every` on furniture and joinery."""
     texels: float = 29e6
     """Of all pages together, before packing; patterns of large houses are drawn coarser to keep to it
     (`atlas.coarsened`)."""
 
 
 QUALITIES = {
-    "fast": Settings(20.0, 1200.0, 2.5, 0.12, 8, 8, 4, 20, (4, 4, 4, 4, 48), 0.45, 0.2, 88),
+    "fast": Settings(
+        density=20.0,
+        budget=1200.0,
+        every=2.5,
+        things=1.4,
+        doubt=0.12,
+        sky_rays=8,
+        lamp_rays=8,
+        sun_rays=4,
+        patches=20,
+        bounces=(4, 4, 4, 40),
+        sharpness=0.45,
+        tolerance=0.2,
+        jpeg=88,
+    ),
     "normal": Settings(),
-    "high": Settings(56.0, 14000.0, 3.0, 0.02, 48, 32, 16, 96, (8, 8, 12, 16, 192), 1.0, 0.1, 94, 120e6),
+    "high": Settings(
+        density=56.0,
+        budget=14000.0,
+        doubt=0.02,
+        sky_rays=48,
+        lamp_rays=32,
+        sun_rays=16,
+        patches=96,
+        bounces=(8, 8, 12, 16, 192),
+        jpeg=94,
+        texels=120e6,
+    ),
 }
 """Named settings: for data sets, for looking, for pictures of single houses."""
 

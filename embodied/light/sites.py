@@ -16,7 +16,7 @@ import numpy as np
 
 from embodied.light.arrays import Array
 from embodied.light.backend import array, drjit, floats, mitsuba, vector, wholes
-from embodied.light.denoise import neighbours
+from embodied.light.denoise import LAYER, neighbours
 
 if TYPE_CHECKING:
     from embodied.light.solve import Luxels
@@ -26,6 +26,9 @@ AROUND = 10
 REACH = 1.6
 """How far a site's light reaches, in distances between sites."""
 
+FEW, ALIKE = 2, 0.6
+"""Cells of so few luxels take another one's site that faces their way up to this cosine: half of all cells lie at the
+rims of small things, where a site serves one luxel."""
 OWNERS = 1000.0
 """Metres put between owners, so that a rug and the floor below it are no neighbours."""
 LAYERS = 4
@@ -51,16 +54,19 @@ class Sites:
     """(k, 3) float64, position with every owner's sites far from all others'."""
 
 
-def sites_of(lux: Luxels, every: float) -> Sites:
-    """Sites for luxels, one in every cell of a grid in space, for each facing.
+def sites_of(lux: Luxels, every: float, *, things: float = 1.0) -> Sites:
+    """Sites for luxels, one in every cell of a grid in space, for each facing; cells of few luxels (`FEW`) are their
+    neighbours'.
 
     Args:
       every: luxels between neighbouring sites, along each axis.
+      things: times that on what is neither wall nor floor nor ceiling.
     """
     position, normal, side, owner = lux.position, lux.normal, np.sqrt(lux.area), lux.owner
     size = np.zeros(int(owner.max()) + 1)
     count = np.maximum(np.bincount(owner, minlength=len(size)), 1)
     size = (every * np.bincount(owner, weights=side, minlength=len(size)) / count)[owner].astype(np.float32)
+    size = np.where(lux.shell, size, size * np.float32(things))
     cell = np.floor(position / size[:, None] + 0.37)
     above = ((position - (cell + 0.13) * size[:, None]) * normal).sum(1) / size  # tells the layers of one cell apart
     parts = [*cell.astype(np.int64).T % 1021, *(np.round(normal * 1.4).astype(np.int64).T + 1)]
@@ -74,9 +80,32 @@ def sites_of(lux: Luxels, every: float) -> Sites:
     off = ((position - middle[own]) ** 2).sum(1)
     order = np.lexsort((off, own))
     luxel = order[np.cumsum(members) - members]
-    at, facing, all_ = position[luxel], normal[luxel], np.ones(len(luxel), bool)
-    apart = at + owner[luxel, None] * np.array([OWNERS, 0.0, 0.0])
-    return Sites(luxel, own, neighbours(apart, facing, all_, all_, AROUND, asked=2), size[luxel], at, facing, apart)
+    apart = position[luxel] + owner[luxel, None] * np.array([OWNERS, 0.0, 0.0])
+    whose = _joined(apart, normal[luxel], size[luxel], members)
+    kept = np.unique(whose)
+    own, luxel, apart = np.searchsorted(kept, whose[own]).astype(np.int32), luxel[kept], apart[kept]
+    facing, all_ = normal[luxel], np.ones(len(luxel), bool)
+    around = neighbours(apart, facing, all_, all_, AROUND, asked=2)
+    return Sites(luxel, own, around, size[luxel], position[luxel], facing, apart)
+
+
+def _joined(apart: np.ndarray, facing: np.ndarray, size: np.ndarray, members: np.ndarray) -> np.ndarray:
+    """(c,) int64: for each cell the one whose site it takes: a larger one of the same facing on the same layer within
+    a cell's size, where it has few luxels itself and there is such a one.
+
+    Args:
+      apart, facing: (c, 3) of the cells' sites. size: (c,) metres. members: (c,) luxels.
+    """
+    whose, small = np.arange(len(members)), members <= FEW
+    if small.all() or not small.any():
+        return whose
+    mine = np.nonzero(small)[0]
+    near = neighbours(apart, facing, ~small, small, 1, asked=4)[:, 0]
+    gap = apart[near] - apart[mine]
+    far, off = np.linalg.norm(gap, axis=1), np.abs((gap * facing[mine]).sum(1))
+    fits = (far < size[mine]) & ((facing[near] * facing[mine]).sum(1) > ALIKE) & (off < LAYER[0] * far + LAYER[1])
+    whose[mine[fits]] = near[fits]
+    return whose
 
 
 def around_good(sites: Sites, good: np.ndarray) -> Sites:
@@ -123,6 +152,12 @@ class Spread:
         spread = dr.sqrt(dr.maximum(squares / weight - dr.square(mean), 0.0))
         dr.eval(mean, spread)
         return np.array(mean), np.array(spread)
+
+    def most_apart(self, values: np.ndarray) -> np.ndarray:
+        """(k,) that the standard deviation of `moments` of numbers (k,) stays under, for the luxels of each site: half
+        of the range (Popoviciu's inequality)."""
+        around = values[self._sites.around]
+        return np.ptp(around, axis=1) / 2
 
     def _weights(self, which: np.ndarray | None) -> Iterator[tuple[Array, Array]]:
         mi, dr = mitsuba(), drjit()

@@ -78,12 +78,12 @@ def paint(sky: Sky, seed: int, height: int = HEIGHT) -> Outdoors:
         axis=-1,
     ).astype(np.float32)
     sun = _sun_strength(sky, up)
-    sky_part = _sky(sky, up, directions, towards, seed)
-    horizontal = float(np.maximum(sky_part[: height // 2] @ [0.2126, 0.7152, 0.0722], 0).mean()) * 0.9
-    lit = np.mean(sky_part[: height // 2], axis=(0, 1)) * 0.9 + sun * max(np.sin(up), 0.0)
-    picture = _ground(sky_part, directions, elevation, yaw, lit, seed)
-    picture = _far_things(picture, elevation, yaw, lit, sun, towards, horizontal, seed)
-    return Outdoors(np.maximum(picture, 1e-5).astype(np.float32), towards, sun)
+    above = _sky(sky, up, directions[: height // 2], towards, seed)
+    mean = above.mean(axis=(0, 1), dtype=np.float64)
+    horizontal, lit = float(mean @ [0.2126, 0.7152, 0.0722]) * 0.9, mean * 0.9 + sun * max(np.sin(up), 0.0)
+    picture = np.concatenate([above, _ground(above, elevation, lit, seed)])
+    _add_far_things(picture, elevation, yaw, lit, sun, towards, horizontal, seed)
+    return Outdoors(np.maximum(picture, 1e-5), towards, sun)
 
 
 def _sun_strength(sky: Sky, up: float) -> np.ndarray:
@@ -97,27 +97,32 @@ def _sun_strength(sky: Sky, up: float) -> np.ndarray:
 
 
 def _sky(sky: Sky, up: float, d: np.ndarray, towards: np.ndarray, seed: int) -> np.ndarray:
-    """Radiance of the bare sky in directions (h, w, 3)."""
+    """(h, w, 3) float32 radiance of the bare sky in directions (h, w, 3)."""
     z = np.clip(d[..., 2:], 0.0, 1.0)
     near = np.clip(d @ towards.astype(np.float32), -1, 1)[..., None]
     day = _daylight(up)
     clouds = _clouds(d, seed, sky.weather)[..., None]
     if sky.weather == "overcast":
         level = 58.0 * day * (1 + 2 * z) / 3 * (0.86 + 0.28 * clouds)
-        return level * _tint(up, np.array([0.93, 0.99, 1.07]))
-    low = np.clip(1 - up / np.radians(25), 0, 1) * np.clip(1 + up / np.radians(8), 0, 1)
-    zenith = np.array([0.42, 0.72, 1.35]) * 26.0
-    horizon = np.array([0.86, 1.0, 1.12]) * 62.0
-    glow = np.array([1.25, 0.82, 0.48]) * 60.0
+        return level * _tint(up, _colour(0.93, 0.99, 1.07))
+    low = float(np.clip(1 - up / np.radians(25), 0, 1) * np.clip(1 + up / np.radians(8), 0, 1))
+    zenith = _colour(0.42, 0.72, 1.35) * 26.0
+    horizon = _colour(0.86, 1.0, 1.12) * 62.0
+    glow = _colour(1.25, 0.82, 0.48) * 60.0
     air = zenith + (horizon - zenith) * (1 - z) ** 4
     air = air + (glow - air) * (low * 0.75 * np.exp(-z * 5) * np.clip(0.55 + 0.45 * near, 0, 1))
     air = air * (1 + 1.1 * np.exp((near - 1) * 9) + 4 * np.exp((near - 1) * 160))
-    lit = (np.array([1.0, 0.98, 0.95]) * (1 - low) + np.array([1.25, 0.86, 0.66]) * low) * 78.0
+    lit = (_colour(1.0, 0.98, 0.95) * (1 - low) + _colour(1.25, 0.86, 0.66) * low) * 78.0
     cover = 0.75 if sky.weather == "hazy" else 0.6
     mixed = air + (lit - air) * (clouds * cover)
     if sky.weather == "hazy":
-        mixed = 0.45 * mixed + 0.55 * np.array([0.98, 1.0, 1.02]) * 55.0 * (1 + 0.6 * np.exp((near - 1) * 5))
-    return mixed * day * _tint(up, np.ones(3))
+        mixed = 0.45 * mixed + 0.55 * _colour(0.98, 1.0, 1.02) * 55.0 * (1 + 0.6 * np.exp((near - 1) * 5))
+    return mixed * (day * _tint(up, _colour(1.0, 1.0, 1.0)))
+
+
+def _colour(*rgb: float) -> np.ndarray:
+    """In single precision, like the picture."""
+    return np.array(rgb, np.float32)
 
 
 def _daylight(up: float) -> float:
@@ -130,8 +135,8 @@ def _daylight(up: float) -> float:
 
 def _tint(up: float, day: np.ndarray) -> np.ndarray:
     """Twilight is blue: colour of the sky light by sun height."""
-    blue = np.clip(-np.degrees(up) / 6, 0, 1)
-    return day * (1 - blue) + np.array([0.42, 0.62, 1.35]) * blue
+    blue = float(np.clip(-np.degrees(up) / 6, 0, 1))
+    return day * (1 - blue) + _colour(0.42, 0.62, 1.35) * blue
 
 
 def _noise(rng: np.random.Generator, rows: int, columns: int, shape: tuple[int, int]) -> np.ndarray:
@@ -151,8 +156,8 @@ def _clouds(d: np.ndarray, seed: int, weather: str) -> np.ndarray:
         cv2.resize(rng.random((n, n)).astype(np.float32), (1024, 1024), interpolation=cv2.INTER_CUBIC) * w
         for n, w in ((10, 0.5), (24, 0.27), (60, 0.14), (150, 0.09))
     )
-    z = np.maximum(d[..., 2], 0.03)
-    x, y = d[..., 0] / (z + 0.12) * 110 + 512, d[..., 1] / (z + 0.12) * 110 + 512
+    z = np.maximum(d[..., 2], 0.03) + 0.12
+    x, y = d[..., 0] / z * 110 + 512, d[..., 1] / z * 110 + 512
     value = cv2.remap(
         sheet, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
     )
@@ -160,30 +165,30 @@ def _clouds(d: np.ndarray, seed: int, weather: str) -> np.ndarray:
     return np.clip((value - threshold) / 0.16, 0, 1) * np.clip(d[..., 2] * 9, 0, 1)
 
 
-def _ground(
-    picture: np.ndarray, d: np.ndarray, elevation: np.ndarray, yaw: np.ndarray, lit: np.ndarray, seed: int
-) -> np.ndarray:
-    """Lawn below the horizon: near grass is coarse, far grass smooth and hazy; a paved strip around the house."""
-    h, w = picture.shape[:2]
+def _ground(above: np.ndarray, elevation: np.ndarray, lit: np.ndarray, seed: int) -> np.ndarray:
+    """Lawn below the horizon: near grass is coarse, far grass smooth and hazy; a paved strip around the house.
+
+    Args:
+      above: (h / 2, w, 3) the sky. elevation: (h,) of the rows of the whole picture.
+    """
+    h, w = len(elevation), above.shape[1]
     rng = stream(seed, "light", "lawn")
-    below = elevation < 0
-    distance = 2.2 / np.tan(np.maximum(-elevation, 1e-3))
+    distance = 2.2 / np.tan(np.maximum(-elevation[h // 2 :], 1e-3))
     patches = (
         _noise(rng, h // 4, 80, (h, w)) * 0.5
         + _noise(rng, h, 900, (h, w)) * 0.3
         + _noise(rng, h // 24, 20, (h, w)) * 0.4
     )
-    shade = (0.72 + 0.5 * patches)[..., None]
-    grass = GRASS * shade
-    paving = np.array([0.30, 0.28, 0.25]) * (0.85 + 0.25 * patches[..., None])
-    near = (1 / (1 + np.exp(np.minimum((distance - 3.2) * 3, 60))))[:, None, None]
-    ground = (grass * (1 - near) + paving * near) * lit
-    haze = np.clip(distance / 160, 0, 0.35)[:, None, None]
-    horizon = picture[h // 2 - 2].mean(0) * 0.5
-    return np.where(below[:, None, None], ground * (1 - haze) + horizon * haze, picture)
+    patches = patches[h // 2 :, :, None]
+    near = (1 / (1 + np.exp(np.minimum((distance - 3.2) * 3, 60)))).astype(np.float32)[:, None, None]
+    haze = np.clip(distance / 160, 0, 0.35).astype(np.float32)[:, None, None]
+    horizon = above[h // 2 - 2].mean(0) * 0.5
+    shown = lit.astype(np.float32) * (1 - haze)
+    grass = (GRASS.astype(np.float32) * shown * (1 - near)) * (0.72 + 0.5 * patches)
+    return grass + (_colour(0.30, 0.28, 0.25) * shown * near) * (0.85 + 0.25 * patches) + horizon * haze
 
 
-def _far_things(
+def _add_far_things(
     picture: np.ndarray,
     elevation: np.ndarray,
     yaw: np.ndarray,
@@ -192,17 +197,17 @@ def _far_things(
     towards: np.ndarray,
     sky_level: float,
     seed: int,
-) -> np.ndarray:
-    """Hills, houses, two rows of trees and a hedge, far to near, each lit from the sun's side."""
+) -> None:
+    """Hills, houses, two rows of trees and a hedge, far to near, each lit from the sun's side, put into the picture."""
     h, w = picture.shape[:2]
     rng = stream(seed, "light", "horizon")
     facing = 0.55 + 0.45 * np.cos(yaw - np.arctan2(towards[1], towards[0]) - np.pi)
     ambient = lit - sun * max(towards[2], 0.0)
-    side = (ambient * 0.55 + sun * 0.5 * facing[:, None])[None]
+    side = (ambient * 0.55 + sun * 0.5 * facing[:, None])[None].astype(np.float32)
     air = picture[h // 2 - 3].mean(0)
     hills = np.radians(1.2 + 3.0 * _noise(rng, 1, 9, (1, w))[0] + 0.8 * _noise(rng, 1, 40, (1, w))[0])
-    picture = _layer(picture, elevation, hills, TREES * side * 0.9, air, 0.55)
-    picture = _houses(picture, elevation, side, sky_level, rng)
+    _add_layer(picture, elevation, hills, TREES * side * 0.9, air, 0.55)
+    _add_houses(picture, elevation, side, sky_level, rng)
     for top, rough, grain, haze in ((5.5, 2.6, 46, 0.25), (8.0, 4.5, 30, 0.1)):
         line = top * (_noise(rng, 1, 14, (1, w))[0] ** 1.5) + rough * _noise(rng, 1, grain, (1, w))[0]
         line = line + 0.9 * _noise(rng, 1, 260, (1, w))[0] + 0.5 * _noise(rng, 1, 800, (1, w))[0] - 1.4
@@ -212,36 +217,42 @@ def _far_things(
             + 0.25 * _noise(rng, h, 1000, (h, w))
         )
         hue = 0.8 + 0.5 * _noise(rng, 1, 50, (1, w))[0]
-        colour = (TREES * np.stack([hue, np.ones(w), hue * 0.9], 1) * crowns[..., None]) * side * 1.1
-        picture = _layer(picture, elevation, np.radians(line), colour, air, haze)
+        hues = TREES * np.stack([hue, np.ones(w), hue * 0.9], 1) * side * 1.1
+        _add_layer(picture, elevation, np.radians(line), hues, air, haze, shade=crowns)
     hedge = np.radians(-3.2 + 0.45 * _noise(rng, 1, 300, (1, w))[0])
     leaves = 0.55 + 0.7 * _noise(rng, h, 1100, (h, w))
-    return _layer(
-        picture, elevation, hedge, TREES * 1.15 * leaves[..., None] * side, air, 0.03, bottom=np.radians(-6.8)
-    )
+    _add_layer(picture, elevation, hedge, TREES * 1.15 * side, air, 0.03, bottom=float(np.radians(-6.8)), shade=leaves)
 
 
-def _layer(
+def _add_layer(
     picture: np.ndarray,
     elevation: np.ndarray,
     top: np.ndarray,
     colour: np.ndarray,
     air: np.ndarray,
     haze: float,
-    bottom: float = np.radians(-2.6),
-) -> np.ndarray:
-    """`colour` from `bottom` up to the line `top` (w,), mixed with `haze` of the air's light; edges one row soft."""
+    bottom: float = float(np.radians(-2.6)),
+    shade: np.ndarray | None = None,
+) -> None:
+    """`colour` (1, w, 3) from `bottom` up to the line `top` (w,), times `shade` (h, w), mixed with `haze` of the air's
+    light; edges one row soft."""
     row = np.pi / picture.shape[0]
-    cover = np.clip((top[None] - elevation[:, None]) / row + 0.5, 0, 1) * (elevation > bottom)[:, None]
-    return picture + (colour * (1 - haze) + air * haze * 0.8 - picture) * cover[..., None]
+    which = np.nonzero((elevation > bottom) & (elevation < top.max() + row))[0]
+    if not len(which):
+        return
+    rows = slice(which[0], which[-1] + 1)
+    cover = np.clip((top[None] - elevation[rows, None]) / row + 0.5, 0, 1).astype(np.float32)[..., None]
+    own = (colour * (1 - haze)).astype(np.float32)
+    if shade is not None:
+        own = own * shade[rows, :, None]
+    picture[rows] += (own + (air * (haze * 0.8)).astype(np.float32) - picture[rows]) * cover
 
 
-def _houses(
+def _add_houses(
     picture: np.ndarray, elevation: np.ndarray, side: np.ndarray, sky_level: float, rng: np.random.Generator
-) -> np.ndarray:
+) -> None:
     """A dozen neighbours as plain facades with pitched roofs; windows glow when the sky is dark."""
     h, w = picture.shape[:2]
-    picture = picture.copy()
     row = np.pi / h
     paints = np.array([[0.55, 0.50, 0.42], [0.62, 0.60, 0.56], [0.42, 0.24, 0.17], [0.58, 0.47, 0.30]])
     for _ in range(12):
@@ -262,4 +273,3 @@ def _houses(
         panes = wall_cover & (np.abs(across - 0.5) < 0.19)[None] & (np.abs(along - 0.5) < 0.26)[:, None]
         glow = np.array([1.0, 0.72, 0.38]) * 0.35 * (sky_level < 1.0) * (rng.random() < 0.7)
         picture[:, columns] = np.where(panes[..., None], 0.05 * light + glow, block)
-    return picture

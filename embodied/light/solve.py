@@ -16,7 +16,7 @@ from embodied.light.arrays import Array
 from embodied.light.atlas import SHELL, Atlas, Page
 from embodied.light.backend import added_up, array, drjit, fraction, mitsuba
 from embodied.light.colours import ColourMaps, albedo
-from embodied.light.cover import Texels, rasterise
+from embodied.light.cover import Sheet, Texels, rasterise, sheets_of
 from embodied.light.emitters import Lamp, Portal, portals_of
 from embodied.light.memory import Memory, once
 from embodied.light.radiosity import Patches, Points, Space, points_of
@@ -56,6 +56,8 @@ class Luxels:
     """(n,) int32: room or opening, for leaving out lights that cannot reach."""
     shell: np.ndarray
     """(n,) bool: walls, floors and ceilings."""
+    sheets: tuple[Sheet, ...]
+    """The layouts of the atlas's pages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,8 @@ class Radiosity:
 
 def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
     """What lies under every luxel; nothing glows yet (`with_glow`)."""
-    texels = tuple(rasterise(p, 1) for p in atlas.pages)
+    sheets = sheets_of(atlas.pages)
+    texels = tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets))
     pairs = list(zip(atlas.pages, texels))
     owner = np.concatenate([p.owner[t.face] for p, t in pairs])
     ends = np.cumsum([len(t.index) for t in texels])
@@ -103,6 +106,7 @@ def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
         owner,
         np.array([unit[name] for name in names], np.int32)[owner],
         np.array([k in SHELL for k in atlas.kinds])[owner],
+        sheets,
     )
 
 
@@ -168,7 +172,8 @@ class Source:
     """A light, as something that shines on luxels."""
 
     shine: Callable
-    """From luxel numbers (m,) and a number of rays, 0 for the settings', to e (m, 3)."""
+    """From luxel numbers (m,), a number of rays, 0 for the settings', and a memory to e (m, 3)."""
+    id: str
     lamp: Lamp | None = None
 
 
@@ -177,16 +182,25 @@ def sources_of(problem: Problem) -> list[Source]:
     atlas, lux, space, settings = problem.atlas, problem.lux, problem.space, problem.settings
     found = []
     for way in portals_of(problem.house):
-        sky = lambda i, rays, x=way: radiosity.sky_light(space, subset(lux, i), x, rays or settings.sky_rays)
-        found.append(Source(lambda i, rays, f=sky: array(f(i, rays))))
+        found.append(Source(_sky_of(problem, way), way.id))
     for x in problem.lamps:
         own = space
         if x.owner is not None and x.owner in atlas.owners:
             alone = functools.partial(radiosity.without, space, atlas, x.owner)
             own = once(problem.memory, ("without", x.owner), alone)
         lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, subset(lux, i), x, rays or settings.lamp_rays)
-        found.append(Source(lambda i, rays, f=lamp: array(f(i, rays)), x))
+        found.append(Source(lambda i, rays, memory=None, f=lamp: array(f(i, rays)), x.id, x))
     return found
+
+
+def _sky_of(problem: Problem, way: Portal) -> Callable:
+    """`Source.shine` of the sky through a portal."""
+
+    def shine(i: np.ndarray, rays: int, memory: Memory | None = None) -> np.ndarray:
+        p = subset(problem.lux, i)
+        return array(radiosity.sky_light(problem.space, p, way, rays or problem.settings.sky_rays, memory))
+
+    return shine
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +222,10 @@ def shone_on(problem: Problem, source: Source) -> Shone:
     unit = lux.unit[sites.luxel]
 
     def shone() -> tuple[np.ndarray, np.ndarray]:
-        which = radiosity.reached(unit, lambda i: source.shine(sites.luxel[i], 4).sum(1) > 0)
-        return which, source.shine(sites.luxel[which], 0) if len(which) else np.zeros((0, 3), np.float32)
+        seen = lambda: radiosity.reached(unit, lambda i: source.shine(sites.luxel[i], 4).sum(1) > 0)
+        which = once(problem.memory, ("reached", source.id), seen)
+        e = source.shine(sites.luxel[which], 0, problem.memory) if len(which) else np.zeros((0, 3), np.float32)
+        return which, e
 
     if source.lamp is None or problem.memory is None:
         which, e = shone()
@@ -239,14 +255,16 @@ def direct_light(
         total[x.which] += x.e
     e = spread(total)
     bright, traced = e.mean(1), np.zeros(len(e), bool)
+    enough = problem.settings.doubt * (bright + AMBIENT.mean())
     for x in shone:
-        mine = np.nonzero(np.isin(lux.unit, x.units) & good)[0]
-        if not len(mine):
-            continue
         values = np.zeros_like(total)
         values[x.which] = x.e
+        most = spread.most_apart(values.mean(1))
+        mine = np.nonzero(np.isin(lux.unit, x.units) & good & (most[sites.own] > enough))[0]
+        if not len(mine):
+            continue
         _, apart = spread.moments(values.mean(1), mine)
-        mine = mine[apart > problem.settings.doubt * (bright[mine] + AMBIENT.mean())]
+        mine = mine[apart > enough[mine]]
         if len(mine):
             e[mine] += x.source.shine(mine, 0) - spread(values, mine)
             traced[mine] = True
@@ -377,15 +395,25 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     out = np.array(seen, np.float32)
     for unit in np.unique(lux.unit):
         mine = np.nonzero(lux.unit == unit)[0]
-        order = mine[np.argsort(y[mine])]
-        rising, above = y[order], np.cumsum(lux.area[order][::-1])[::-1]
-        lost = np.cumsum((np.diff(rising, append=rising[-1]) * np.append(above[1:], 0.0))[::-1])[::-1]
-        allowed = SPARKS * float((y[order] * lux.area[order]).sum())
-        most = max(rising[min(np.searchsorted(-lost, -allowed), len(rising) - 1)], 1e-9)
+        most = max(_most(y[mine], lux.area[mine]), 1e-9)
         out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
         before, after = ((a[mine] * lux.area[mine, None]).sum(0) for a in (seen, out))
         out[mine] *= before / np.maximum(after, 1e-12)
     return out
+
+
+def _most(y: np.ndarray, area: np.ndarray) -> float:
+    """The least brightness to which luxels can be cut where that loses at most `SPARKS` of their light."""
+    allowed = SPARKS * float((y * area).sum())
+    tenth = len(y) // 10 + 1
+    bright = float(np.partition(y, -tenth)[-tenth])
+    top = np.nonzero(y >= bright)[0]
+    if float(((y[top] - bright) * area[top]).sum()) < allowed:  # too little is lost there: look at all
+        top = np.arange(len(y))
+    order = top[np.argsort(y[top])]
+    rising, above = y[order], np.cumsum(area[order][::-1])[::-1]
+    lost = np.cumsum((np.diff(rising, append=rising[-1]) * np.append(above[1:], 0.0))[::-1])[::-1]
+    return float(rising[min(int(np.searchsorted(-lost, -allowed)), len(rising) - 1)])
 
 
 def _endless(lux: Luxels, sites: Sites, once: np.ndarray, good: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,11 @@ from embodied.light.atlas import Atlas, atlas_of, things_of
 from embodied.light.backend import added_up, array, constant, drjit, floats, fraction, mitsuba, scene_of, vector
 from embodied.light.colours import ColourMaps, albedo
 from embodied.light.compose import spread
-from embodied.light.cover import Texels, cover, rasterise
+from embodied.light.cover import Cover, Texels, cover, rasterise, sheets_of
 from embodied.light.radiosity import ENV_ROWS, LIFT, points_of, sky_alone
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
-from embodied.light.unwrap import face_normals
+from embodied.light.unwrap import SPARSEST, face_normals
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
@@ -32,46 +33,63 @@ LUXELS = 110_000
 """Luxels for all outer parts together, at most."""
 
 
-def surroundings(
-    house: House,
-    parts: Sequence,
-    indoors: Atlas,
-    outdoors: Outdoors,
-    exposure: Exposure,
-    cache: Path,
-    maps: ColourMaps,
-    sharpness: float = 1.0,
-) -> tuple[Atlas | None, list[np.ndarray], np.ndarray]:
-    """Outer parts in the light of sun and sky, and the picture on the dome.
+@dataclass(frozen=True, eq=False)
+class Outside:
+    """The outer parts of a house, at any hour."""
+
+    atlas: Atlas
+    covers: tuple[Cover, ...]
+    luxels: tuple[Texels, ...]
+    albedo: tuple[np.ndarray, ...]
+    """(n, 3) float32 of the covered texels; each of these by page."""
+    blockers: RayScene
+
+
+def outside_of(
+    parts: Sequence[Part], indoors: Atlas, cache: Path, maps: ColourMaps, sharpness: float = 1.0
+) -> Outside | None:
+    """What light falls on outside; None for a house without outer parts.
 
     Args:
       parts: the house's parts of kind 'outdoor'.
       indoors: casts shadows.
       sharpness: as in `Settings`.
-
-    Returns:
-      The atlas of the outer parts (None if there are none), their pages, and the dome's page; (h, w, 3) uint8 each.
     """
-    gain = exposure.outdoors.astype(np.float32)
-    dome = display(outdoors.picture, gain)
     if not parts:
-        return None, [], dome
+        return None
     area = sum(
         float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
         for c in (p.mesh.vertices[p.mesh.faces] for p in parts)
     )
     density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
-    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=1500, cache=cache, finest=2))
-    blockers = scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass]))
-    pages = []
-    for page in atlas.pages:
-        c, coarse = cover(page, page.fineness), rasterise(page, 1)
-        e = _daylight(blockers, outdoors, coarse, page.thin[coarse.face])
-        field = spread(coarse.index, e, coarse.shape)
-        rows, columns = np.divmod(c.index, c.shape[1])
-        light = field[rows // page.fineness, columns // page.fineness]
-        pages.append(spread(c.index, display(albedo(page, c, maps) * light, gain), c.shape))
-    return atlas, pages, dome
+    budget = round(min(1500.0, (density / SPARSEST) ** 2))  # of trees and hedges, no finer than the rest
+    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=budget, cache=cache, finest=2))
+    sheets = sheets_of(atlas.pages)
+    covers = tuple(cover(p, p.fineness, s) for p, s in zip(atlas.pages, sheets))
+    return Outside(
+        atlas,
+        covers,
+        tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets)),
+        tuple(albedo(p, c, maps) for p, c in zip(atlas.pages, covers)),
+        scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass])),
+    )
+
+
+def daylit(outside: Outside | None, outdoors: Outdoors, exposure: Exposure, rays: int) -> list[np.ndarray]:
+    """The pages of the outer parts in the light of sun and sky, and the dome's; (h, w, 3) uint8 each.
+
+    Args:
+      rays: to the sky, for each luxel.
+    """
+    gain, pages = exposure.outdoors.astype(np.float32), []
+    if outside is not None:
+        for page, c, coarse, colour in zip(outside.atlas.pages, outside.covers, outside.luxels, outside.albedo):
+            e = _daylight(outside.blockers, outdoors, coarse, page.thin[coarse.face], rays)
+            field = spread(coarse.index, e, coarse.shape)
+            rows, columns = np.divmod(c.index, c.shape[1])
+            light = field[rows // page.fineness, columns // page.fineness]
+            pages.append(spread(c.index, display(colour * light, gain), c.shape))
+    return [*pages, display(outdoors.picture, gain)]
 
 
 def _flat(part: Part) -> Part:
@@ -80,7 +98,7 @@ def _flat(part: Part) -> Part:
     return dataclasses.replace(part, kind="wall") if flat else part
 
 
-def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndarray, rays: int = 24) -> np.ndarray:
+def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndarray, rays: int) -> np.ndarray:
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
     mi, dr = mitsuba(), drjit()
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)

@@ -7,8 +7,8 @@ unfolded plane by plane, so that one wall is one chart however many holes it has
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +24,10 @@ from embodied.light.arrays import Array
 from embodied.light.backend import added_up, drjit, floats, fraction, mitsuba, scene_of, vector
 
 T = TypeVar("T")
+ONCE = 6000.0
+"""Budget for which models are unwrapped; other budgets get the same charts at another density."""
+SPARSEST = 0.36
+"""Luxels per metre that large things get at least, times the square root of the budget."""
 APART = ("assets", "assets.data", "embodied", "embodied.light")
 """What the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
@@ -46,6 +50,8 @@ class Unwrapped:
     """(m,) bool, faces that are seen and lit from both sides."""
     size: np.ndarray
     """(2,) int32, atlas width and height in luxels."""
+    chart: np.ndarray
+    """(m,) int32, which connected piece of the atlas the face lies in."""
 
 
 def corners_of(parts: Sequence[MeshPart]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -98,7 +104,7 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
         sizes.append(np.ceil(flat[mine].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
     places, size = pack(np.array(sizes))
     flat += places[chart][:, None] + 1.0
-    return _unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size)
+    return _unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size, chart)
 
 
 def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = False) -> Unwrapped:
@@ -119,7 +125,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     if not len(corners):
         empty = np.zeros((0, 3, 3))
         flat = empty[..., :2]
-        return _unwrapped(empty, empty, flat, flat, part, np.zeros(0, bool), np.array([1, 1], np.int32))
+        return _unwrapped(empty, empty, flat, flat, part, np.zeros(0, bool), np.array([1, 1], np.int32), part)
     if not trusted:
         once = _without_doubles(corners)
         corners, normals, uv, part = (x[once] for x in (corners, normals, uv, part))
@@ -130,7 +136,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     thin = (front > 0.12) & (back > 0.12)
     corners[flip], normals[flip], uv[flip] = corners[flip][:, ::-1], normals[flip][:, ::-1], uv[flip][:, ::-1]
     normals = _on_the_face(corners, normals)
-    density = float(np.clip(np.sqrt(budget / areas_of(corners).sum()), 0.36 * np.sqrt(budget), 160.0))
+    density = density_of(corners, budget)
     welded, index = _weld(corners, normals)
     atlas = xatlas.Atlas()
     atlas.add_mesh(welded[:, :3].astype(np.float32), index.astype(np.uint32), welded[:, 3:].astype(np.float32))
@@ -139,30 +145,44 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     packing.texels_per_unit, packing.padding, packing.bilinear, packing.create_image = density, 1, False, False
     atlas.generate(charts, packing)
     _, faces, place = atlas[0]  # faces keep their order, so part and uv carry over per corner
-    luxels, size = _repacked(place[faces] * [atlas.width, atlas.height], faces)
-    return _unwrapped(corners, normals, luxels, uv, part, thin, size)
+    luxels, size, chart = _repacked(place[faces] * [atlas.width, atlas.height], faces)
+    return _unwrapped(corners, normals, luxels, uv, part, thin, size, chart)
 
 
-def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Charts as upright rectangles packed anew: xatlas leaves half of a sheet of strips empty.
-
-    Two luxels lie between charts, one for each, so that reading between luxels brings no light from another chart.
 
     Args:
       luxels: (m, 3, 2). faces: (m, 3) int, vertices that belong to one chart each.
 
     Returns:
-      (m, 3, 2) luxels, and (2,) int32 width and height.
+      (m, 3, 2) luxels, (2,) int32 width and height, and (m,) int32 chart of each face.
     """
     links = np.repeat(np.arange(len(faces)), 3), faces.ravel().astype(int)
     touch = coo_matrix((np.ones(len(links[0])), links)).tocsr()
-    count, chart = connected_components(touch @ touch.T, directed=False)
+    chart = connected_components(touch @ touch.T, directed=False)[1]
+    low, _ = _corners_of(luxels, chart)
+    return *_laid_out(luxels - np.floor(low)[chart][:, None], chart), chart
+
+
+def _corners_of(luxels: np.ndarray, chart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(c, 2) least and largest coordinates of each chart."""
+    count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, np.repeat(chart, 3), luxels.reshape(-1, 2))
     np.maximum.at(high, np.repeat(chart, 3), luxels.reshape(-1, 2))
-    low = np.floor(low)
-    sizes = np.ceil(high - low).astype(int) + 2
-    flat = luxels - low[chart][:, None]
+    return low, high
+
+
+def _laid_out(flat: np.ndarray, chart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 3, 2) luxels of charts packed on a sheet, and its (2,) int32 width and height.
+
+    Two luxels lie between charts, one for each, so that reading between luxels brings no light from another chart.
+
+    Args:
+      flat: (m, 3, 2) luxels from each chart's own corner on. chart: (m,) int.
+    """
+    sizes = np.ceil(_corners_of(flat, chart)[1] - 1e-4).astype(int) + 2
     lying = sizes[:, 0] > sizes[:, 1]
     turned = np.stack([flat[..., 1], sizes[chart, 0][:, None] - 2 - flat[..., 0]], axis=-1)
     flat = np.where(lying[chart][:, None, None], turned, flat)
@@ -172,17 +192,55 @@ def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
     return flat + places[chart][:, None], size
 
 
-def cached_model(parts: Sequence[MeshPart], budget: float, cache: Path, *, trusted: bool = False) -> Unwrapped:
-    """`unwrap_model`, done once per geometry; a damaged cache file is replaced."""
+def density_of(corners: np.ndarray, budget: float) -> float:
+    """Luxels per metre of a model of triangles (m, 3, 3): so many luxels for the whole, at most 160 per metre, and no
+    fewer than `SPARSEST` says."""
+    return float(np.clip(np.sqrt(budget / areas_of(corners).sum()), SPARSEST * np.sqrt(budget), 160.0))
+
+
+def with_budget(flat: Unwrapped, before: float, budget: float) -> Unwrapped:
+    """The same charts for another budget, packed anew; each stretched to whole luxels, as xatlas does it, so that what
+    is thinner than a luxel keeps one.
+
+    Args:
+      before: the budget of `flat`.
+    """
+    if not len(flat.corners):
+        return flat
+    low, high = _corners_of(flat.luxels, flat.chart)
+    scale = density_of(flat.corners, budget) / density_of(flat.corners, before)
+    extent = (high - low) * scale
+    whole = np.maximum(np.ceil(extent - 1e-2), 1.0)
+    stretch = scale * np.where(extent > 1e-6, whole / np.maximum(extent, 1e-6), 1.0)
+    luxels, size = _laid_out((flat.luxels - low[flat.chart][:, None]) * stretch[flat.chart][:, None], flat.chart)
+    return replace(flat, luxels=luxels.astype(np.float32), size=size)
+
+
+def cached_model(
+    parts: Sequence[MeshPart], budget: float, cache: Path, *, trusted: bool = False, alone: bool = False
+) -> Unwrapped:
+    """`unwrap_model`, done once per geometry, at `ONCE`, and its charts packed once per budget; a damaged cache file is
+    replaced.
+
+    Args:
+      alone: one house alone has this model: it is unwrapped for this budget.
+    """
     arrays = [(p.vertices, p.faces, p.normals, p.uv) for p in parts]
     shapes = [digest(*(np.ascontiguousarray(a).tobytes() for a in of_part)) for of_part in arrays]
-    key = digest(unwrap_code(), round(budget), trusted, shapes)
-    path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
-    if (known := load_record(Unwrapped, path)) is not None:
-        return known
-    made = unwrap_model(parts, budget, trusted=trusted)
-    save_record(made, path)
-    return made
+
+    def known(budget: float, make: Callable[[], Unwrapped]) -> Unwrapped:
+        key = digest(unwrap_code(), round(budget), trusted, alone, shapes)
+        path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
+        if (found := load_record(Unwrapped, path)) is not None:
+            return found
+        made = make()
+        save_record(made, path)
+        return made
+
+    if alone:
+        return known(budget, lambda: unwrap_model(parts, budget, trusted=trusted))
+    once = lambda: known(ONCE, lambda: unwrap_model(parts, ONCE, trusted=trusted))
+    return once() if round(budget) == ONCE else known(budget, lambda: with_budget(once(), ONCE, budget))
 
 
 def unwrap_code() -> str:
@@ -273,10 +331,12 @@ def _unwrapped(
     part: np.ndarray,
     thin: np.ndarray,
     size: np.ndarray,
+    chart: np.ndarray,
 ) -> Unwrapped:
     """The record, its coordinates in single precision."""
     single = lambda a: np.ascontiguousarray(a, np.float32)
-    return Unwrapped(single(corners), single(normals), single(luxels), single(uv), part, thin, size)
+    flat = single(corners), single(normals), single(luxels), single(uv)
+    return Unwrapped(*flat, part, thin, size, np.asarray(chart, np.int32))
 
 
 def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
