@@ -62,15 +62,15 @@ class Settings:
 QUALITIES = {
     "fast": Settings(
         density=20.0,
-        budget=1200.0,
+        budget=1800.0,
         every=2.5,
-        things=1.4,
+        things=1.2,
         doubt=0.12,
         sky_rays=8,
         lamp_rays=8,
         sun_rays=4,
         patches=20,
-        bounces=(4, 4, 4, 40),
+        bounces=(4, 4, 4, 4, 40),
         sharpness=0.45,
         tolerance=0.2,
         jpeg=88,
