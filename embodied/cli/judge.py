@@ -6,6 +6,7 @@ Which one it is follows from the data set.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,24 +73,31 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.agent import load_agent
     from agents.hari.judging import COLUMNS, TEST, judge
     from agents.imitation.parallel import use_threads
-    from agents.shipped import SHIPPED_AGENT
+    from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
+    from assets.cache import digest, write_json
     from embodied.datasets.store import Dataset
+    from embodied.locks import locked
+    from embodied.records import fingerprint
 
-    if args.agent == SHIPPED_AGENT:
-        raise ValueError("no HARI agent ships yet; name yours with --agent (`embodied train hari`)")
+    file = SHIPPED_HARI if args.agent == SHIPPED_AGENT else args.agent
+    data, agent, splits = Dataset(args.data), load_agent(file), args.split or TEST
     use_threads(args.threads)
 
-    rows = judge(
-        Dataset(args.data),
-        load_agent(args.agent),
-        args.split or TEST,
-        seed=args.seed,
-        limit=args.tasks,
-        only=args.only or (),
-        keep=lambda split, name, episodes: _keep(args, split, name, episodes),
-        watch=lambda agents: bar(agents, "agents", "agent"),
-    )
-    _tell(args, rows, COLUMNS, {})
+    with locked(args.out) if args.out else contextlib.nullcontext():
+        rows = judge(
+            data,
+            agent,
+            splits,
+            seed=args.seed,
+            limit=args.tasks,
+            only=args.only or (),
+            keep=lambda split, name, episodes: _keep(args, split, name, episodes),
+            watch=lambda agents: bar(agents, "agents", "agent"),
+        )
+        if args.out:
+            about = {"data": data.digest, "agent": digest(Path(file)), "splits": list(splits)}
+            write_json(Path(args.out) / "run.json", fingerprint(seed=args.seed, tasks=args.tasks, **about), indent=1)
+        _tell(args, rows, COLUMNS, {})
     return 0
 
 
