@@ -14,7 +14,7 @@ from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from agents.hari.policy import DO, DONE, Choice, HariPolicy, policy_of
+from agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, policy_of
 from agents.hari.pretraining import Curriculum, guided_share, pretrain, pretraining_success
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
@@ -229,6 +229,22 @@ def test_random_with_budgets_begins_with_the_goal_spends_no_more_and_keeps_its_m
     assert rule.choose(moment(taken=(0, 1, 0, 0, 0), would_stop=True, budget=(0, 1, 1, 0, 9)), rng) == SUB, (
         "not DONE first"
     )
+
+
+# Moves ------------------------------------------------------------------------------------------
+
+
+def test_do_takes_the_likeliest_move_or_draws_it_and_never_stops():
+    log_moves = torch.tensor([[0.2, 0.3, 0.0, 0.5]]).log()  # the third is padding, the last is stopping
+    considered = Considered([0], torch.zeros(1, 4), log_moves)
+    rng = np.random.default_rng(0)
+    assert {considered.move(0, None, rng) for _ in range(20)} == {1}
+    drawn = np.bincount([considered.move(0, 1.0, rng) for _ in range(2000)], minlength=3) / 2000
+    assert drawn == pytest.approx([0.4, 0.6, 0.0], abs=0.04)
+    colder = np.bincount([considered.move(0, 0.5, rng) for _ in range(2000)], minlength=3) / 2000
+    assert colder == pytest.approx([4 / 13, 9 / 13, 0.0], abs=0.04), "squares of the probabilities"
+    with pytest.raises(ValueError, match="above 0"):
+        dataclasses.replace(QUICK, move_temperature=0.0)
 
 
 # What is shared ---------------------------------------------------------------------------------

@@ -69,6 +69,8 @@ class IntentionConfig(ValidatedRunSettings):
     knows_stack: bool = True
     """Whether it is told how many goals are on the stack, which it put there itself; the dissertation's is not, and
     blames that for its critic's mistakes (4.3.6; docs/sources.md, S77)."""
+    move_temperature: float | None = None
+    """At which DO draws its move from the execution policy; None takes the likeliest (docs/sources.md, S82)."""
     stack: int = 2
     """L, the most goals on the stack."""
     longest: int = 3
@@ -91,6 +93,10 @@ class IntentionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
+        if self.move_temperature is not None and not 0 < self.move_temperature < float("inf"):
+            raise ValueError(
+                f"move_temperature should be above 0, got {self.move_temperature}; leave it out for likeliest"
+            )
 
     @property
     def updates(self) -> int:

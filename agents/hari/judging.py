@@ -30,9 +30,10 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
     Args:
       means: X_a of "random + rules": the agent's mean number of each intention on validation tasks.
     """
+    drawn = agent.config.move_temperature
     return {
-        **{name: RuleAgent(agent.executor, rule) for name, rule in RULES.items()},
-        "random + rules": RuleAgent(agent.executor, RandomWithBudgets(means)),
+        **{name: RuleAgent(agent.executor, rule, drawn) for name, rule in RULES.items()},
+        "random + rules": RuleAgent(agent.executor, RandomWithBudgets(means), drawn),
         "learned": policy_of(agent),
         "learned, likeliest": policy_of(agent, sample=False),
     }

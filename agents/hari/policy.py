@@ -6,7 +6,7 @@ belief b^s is carried on when the agent moves, as in pre-training, where nothing
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -77,10 +77,13 @@ class Considered:
     log_moves: Tensor
     """(b, C + 1) log-probabilities, stopping last."""
 
-    @property
-    def best_moves(self) -> np.ndarray:
-        """(b,) int64: the likeliest move, stopping aside."""
-        return self.log_moves[:, :-1].argmax(1).numpy()
+    def move(self, k: int, temperature: float | None, rng: np.random.Generator) -> int:
+        """Where the k-th agent would go, stopping aside: the likeliest move, or one drawn at a temperature."""
+        logits = self.log_moves[k, :-1]
+        if temperature is None:
+            return int(logits.argmax())
+        p = (logits.double() / temperature).softmax(0).numpy()
+        return int(rng.choice(len(p), p=p))
 
     @property
     def would_stop(self) -> np.ndarray:
@@ -168,6 +171,8 @@ class HariPolicy:
     actor: RecurrentHead
     sample: bool = True
     """Intentions are drawn from psi; False takes the likeliest. Open in the text: docs/sources.md, S78."""
+    temperature: float | None = None
+    """At which DO draws its move; None: it takes the likeliest (docs/sources.md, S82)."""
     choices: list[Choice] | None = field(default=None, repr=False)
     """Where each step is written down for training; None: nowhere."""
 
@@ -179,14 +184,13 @@ class HariPolicy:
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.Policy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
-        moves = considered.best_moves
-        return self._choose(observations, considered, moves, belief, memory, rngs)
+        return self._choose(observations, considered, {}, belief, memory, rngs)
 
     def _choose(
         self,
         observations: Observations,
         considered: Considered,
-        moves: np.ndarray,
+        led: Mapping[int, int],
         belief: Belief,
         memory: Mind | None,
         rngs: Sequence[np.random.Generator],
@@ -214,7 +218,8 @@ class HariPolicy:
         actions: Actions = [None] * len(observations)
         for k, i in enumerate(rows):
             thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
-            actions[i] = action_of(drawn[k], int(moves[k]), thought)
+            move = led[k] if k in led else considered.move(k, self.temperature, rngs[i]) if drawn[k] == DO else 0
+            actions[i] = action_of(drawn[k], move, thought)
         intentions = torch.tensor(drawn)
         if self.choices is not None:
             self.choices.append(Choice(rows, logits, intentions, *inputs))
@@ -238,16 +243,16 @@ class PerfectOnSubgoals(HariPolicy):
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.PrivilegedPolicy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
-        moves = considered.best_moves.copy()
+        led: dict[int, int] = {}
         for k, i in enumerate(considered.rows):
             s = situations[i]
             if s is not None and len(s.goals) > 1:
                 action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
-                moves[k] = action.candidate if isinstance(action, Move) else moves[k]
-        return self._choose(observations, considered, moves, belief, memory, rngs)
+                led |= {k: action.candidate} if isinstance(action, Move) else {}
+        return self._choose(observations, considered, led, belief, memory, rngs)
 
 
 def policy_of(agent: HariAgent, *, sample: bool = True) -> HariPolicy:
     """A trained agent as it is judged."""
     kind = PerfectOnSubgoals if agent.config.perfect else HariPolicy
-    return kind(agent.executor, agent.actor, sample)
+    return kind(agent.executor, agent.actor, sample, agent.config.move_temperature)

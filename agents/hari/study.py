@@ -23,7 +23,7 @@ from agents.hari.judging import TEST, judge
 from agents.hari.networks import INTENTIONS
 from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention
 from agents.imitation.loop import Note
-from assets.cache import write_bytes
+from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Estimate, across_seeds, as_json, save, shown
 from embodied.interface import Ask, Episode, Move
 from embodied.records import load_lines, parse_file, save_lines
@@ -36,11 +36,14 @@ VARIANTS: Mapping[str, Mapping[str, object]] = {
     "learned": {},
     "uncooperative": {"cooperative": False},
     "skyline": {"perfect": True},
+    "moves drawn": {"move_temperature": 0.5},
     "stack 1": {"stack": 1},
     "stack 3": {"stack": 3},
     **{f"cost {c:g}, H {h}": {"cost": c, "horizon": h} for c in COSTS for h in HORIZONS if (c, h) != (0.01, 30)},
 }
 """Name of a variant to what differs from the settings of the study."""
+BESIDE_RULES = ("learned", "moves drawn")
+"""Variants that are judged beside rules, whose moves are drawn as theirs are."""
 RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", "random + rules")
 PRINTED: Mapping[str, str] = {
     "no assistance": "43.4 / 16.4 / 3.0 (–, –, –, 13.1)",
@@ -87,6 +90,7 @@ class HariStudySetting:
 TABLES: Mapping[str, Sequence[str]] = {
     "4.7": ("learned", "uncooperative", "skyline"),
     "4.8": ("stack 1", "learned", "stack 3"),
+    "moves": ("learned", "moves drawn"),
     "figure 4.5": ("learned",),
     "figure 4.6": tuple(v for v in VARIANTS if v.startswith("cost ")) + ("learned",),
 }
@@ -114,8 +118,9 @@ def run_study(
     for line in parallel(joblib.delayed(_run)(setting, executor, v, s, note) for v, s in jobs):
         note(line)
     writers: Mapping[str, Callable[[HariStudySetting], Path]] = {
-        "4.7": lambda x: _write_table(x, "4.7", [*RULE_ROWS, *TABLES["4.7"]], "test"),
-        "4.8": lambda x: _write_table(x, "4.8", TABLES["4.8"], "val"),
+        "4.7": lambda x: _write_table(x, "4.7", [*BY_RULES, *map(_learned, TABLES["4.7"])], "test"),
+        "4.8": lambda x: _write_table(x, "4.8", [_stacked(v) for v in TABLES["4.8"]], "val"),
+        "moves": lambda x: _write_table(x, "moves", MOVES, "test"),
         "figure 4.5": _write_behaviour,
         "figure 4.6": _write_costs,
     }
@@ -130,24 +135,53 @@ def _run(setting: HariStudySetting, executor: Path, variant: str, seed: int, not
     quiet: Note = lambda line: None
     train_intention(data, load_executor(executor), config, folder, note=note if seed == setting.repeats[0] else quiet)
     agent, rows = load_agent(folder / "best.safetensors"), []
-    if (folder / "rows.json").exists():
+    mark, of_what = folder / "judged.json", digest(folder / "best.safetensors", setting.tasks)
+    if mark.exists() and json.loads(mark.read_text()) == of_what:
         return f"{variant}, seed {seed}: judged before"
 
     def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
         if name == "learned":
             save_lines(folder / "episodes" / f"{split}.jsonl", episodes)
 
-    only = ("learned", *(RULE_ROWS if variant == "learned" else ()))
+    only = ("learned", *(RULE_ROWS if variant in BESIDE_RULES else ()))
     rows = judge(data, agent, (*VALIDATION, *TEST), seed=seed, limit=setting.tasks, only=only, keep=keep)
     save(rows, folder, "table")
     write_bytes(folder / "rows.json", as_json(rows).encode())
+    write_json(mark, of_what)
     return f"{variant}, seed {seed}: trained and judged"
 
 
-def rows_of(setting: HariStudySetting, name: str, split: str) -> list[dict[str, float]]:
-    """The means of one row of a table on one split, per seed."""
-    variant = "learned" if name in RULE_ROWS else name
-    row = name if name in RULE_ROWS else "learned"
+@dataclass(frozen=True)
+class TableLine:
+    """A line of a table: a row of what was judged of the agents of a variant."""
+
+    variant: str
+    row: str
+    shown: str
+    printed: str = ""
+    """What the dissertation has there."""
+
+
+def _learned(variant: str) -> TableLine:
+    return TableLine(variant, "learned", variant, PRINTED[variant])
+
+
+def _stacked(variant: str) -> TableLine:
+    name = "stack 2" if variant == "learned" else variant
+    return TableLine(variant, "learned", name, PRINTED[name])
+
+
+BY_RULES = [TableLine("learned", row, row, PRINTED[row]) for row in RULE_ROWS]
+MOVES = [
+    TableLine(variant, row, f"{row}, {how}", PRINTED[row] if variant == "learned" else "")
+    for row in ("no assistance", "dense goal and state", "random + rules", "learned")
+    for variant, how in (("learned", "likeliest moves"), ("moves drawn", "moves drawn"))
+]
+"""What drawing DO's moves instead of taking the likeliest is worth; not in the dissertation."""
+
+
+def rows_of(setting: HariStudySetting, variant: str, row: str, split: str) -> list[dict[str, float]]:
+    """The means of one row of what was judged of a variant on one split, per seed."""
     found = []
     for seed in setting.repeats:
         path = setting.folder(variant, seed) / "rows.json"
@@ -159,21 +193,21 @@ def rows_of(setting: HariStudySetting, name: str, split: str) -> list[dict[str, 
     return found
 
 
-def estimates(setting: HariStudySetting, name: str, split: str, column: str) -> Estimate:
+def estimates(setting: HariStudySetting, variant: str, split: str, column: str, row: str = "learned") -> Estimate:
     """A number of a row over seeds, with Student's interval."""
-    return across_seeds([r[column] for r in rows_of(setting, name, split)])
+    return across_seeds([r[column] for r in rows_of(setting, variant, row, split)])
 
 
-def _write_table(setting: HariStudySetting, table: str, names: Sequence[str], when: str) -> Path:
+def _write_table(setting: HariStudySetting, table: str, rows: Sequence[TableLine], when: str) -> Path:
     """Success per condition, and actions over all of them, beside what the dissertation prints."""
     splits = [f"{when}_{c}" for c in CONDITIONS]
     heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    for name in names:
-        successes = [shown("success", estimates(setting, name, s, "success")) for s in splits]
-        actions = [f"{np.mean([estimates(setting, name, s, a).mean for s in splits]):.1f}" for a in heads[4:8]]
-        shown_name = "stack 2" if table == "4.8" and name == "learned" else name
-        lines.append("| " + " | ".join([shown_name, *successes, *actions, PRINTED[shown_name]]) + " |")
+    for line in rows:
+        number = lambda split, column, line=line: estimates(setting, line.variant, split, column, line.row)
+        successes = [shown("success", number(s, "success")) for s in splits]
+        actions = [f"{np.mean([number(s, a).mean for s in splits]):.1f}" for a in heads[4:8]]
+        lines.append("| " + " | ".join([line.shown, *successes, *actions, line.printed]) + " |")
     about = f"{setting.seeds} training seeds per row; ± is Student's 95 % interval over them.\n"
     path = setting.out / f"table_{table}.md"
     write_bytes(path, ("\n".join([*lines, "", about])).encode())
