@@ -1,0 +1,44 @@
+"""The HARI agent that ships: it loads, and asks and finds its way in a house it has never seen."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hand_worlds import grid_world
+
+from agents.hari.agent import HariAgent, load_agent
+from agents.hari.policy import policy_of
+from agents.shipped import SHIPPED_HARI
+from embodied.envs.hari import HariRules
+from embodied.envs.make import environment_maker
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
+from embodied.interface import Episode
+from embodied.language.plain import PlainLanguage
+from embodied.tasks.hari import hari_pool, hari_task
+
+
+@pytest.fixture(scope="module")
+def agent() -> HariAgent:
+    return load_agent(SHIPPED_HARI)
+
+
+def test_it_is_small_and_says_what_it_was_trained_as(agent):
+    assert SHIPPED_HARI.stat().st_size < 10e6
+    assert (agent.config.stack, agent.config.horizon, agent.config.cooperative) == (2, 30, True)
+    assert "object/sofa" in agent.executor.words.names
+
+
+def played(agent: HariAgent, **rules: int) -> list[Episode]:
+    world, pool = grid_world(), hari_pool(grid_world(), seed=0)
+    tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(min(16, len(pool)))]
+    make = environment_maker("hari", {"grid": world}, hari=HariRules(**rules))
+    with torch.inference_mode():
+        return play(make, policy_of(agent), tasks, seed=0, batch=8)
+
+
+def test_it_plays_asks_and_ends(agent):
+    episodes = played(agent)
+    assert all(e.ended in ("stop", "limit") and len(e.steps) <= 30 for e in episodes)
+    assert sum(e.requests for e in episodes) > len(episodes), "it asks"
+    assert any(metrics.success(e, grid_world().graph) for e in episodes), "and finds what it was asked for"
