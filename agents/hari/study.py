@@ -26,7 +26,7 @@ from agents.imitation.loop import Note
 from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Estimate, across_seeds, as_json, save, shown
 from embodied.interface import Ask, Episode, Move
-from embodied.records import load_lines, parse_file, save_lines
+from embodied.records import load_lines, parse_file, read_json, save_lines
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 COSTS = (0.01, 0.05, 0.1, 0.2, 0.5)
@@ -136,7 +136,7 @@ def _run(setting: HariStudySetting, executor: Path, variant: str, seed: int, not
     train_intention(data, load_executor(executor), config, folder, note=note if seed == setting.repeats[0] else quiet)
     agent, rows = load_agent(folder / "best.safetensors"), []
     mark, of_what = folder / "judged.json", digest(folder / "best.safetensors", setting.tasks)
-    if mark.exists() and json.loads(mark.read_text()) == of_what:
+    if mark.exists() and read_json(mark) == {"of": of_what}:
         return f"{variant}, seed {seed}: judged before"
 
     def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
@@ -147,7 +147,7 @@ def _run(setting: HariStudySetting, executor: Path, variant: str, seed: int, not
     rows = judge(data, agent, (*VALIDATION, *TEST), seed=seed, limit=setting.tasks, only=only, keep=keep)
     save(rows, folder, "table")
     write_bytes(folder / "rows.json", as_json(rows).encode())
-    write_json(mark, of_what)
+    write_json(mark, {"of": of_what})
     return f"{variant}, seed {seed}: trained and judged"
 
 
