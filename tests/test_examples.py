@@ -74,3 +74,24 @@ def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
     said = run("dataset_to_torch.py", tmp_path, "--data", str(flats))
     off, same = map(float, re.search(r"unseen house: (\d+) % off, (\d+) %", said).groups())
     assert off < same - 5
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tmp_path):
+    said = run("encode.py", tmp_path, "--quality", "unlit", "--steps", "40")
+    assert "40 looks of 192 numbers" in said
+    one, two = map(float, re.search(r"one room (\S+), from two rooms (\S+)\n", said).groups())
+    assert one > two
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    short = ("--quality", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3")
+    said = run("ppo_pixels.py", tmp_path, *short, "--out", "ppo")
+    assert re.search(r"finds it in \d+ % of 3 episodes, random walk \d+ %", said)
+    assert (tmp_path / "ppo" / "agent.zip").exists()
+    rows = (tmp_path / "ppo" / "curve.csv").read_text().splitlines()
+    assert rows[0] == "steps,episodes,success,reward" and 1 < len(rows) <= 3

@@ -145,7 +145,7 @@ def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_
 
 
 def test_lerobots_own_reader_reads_it(folder, data, episodes):
-    """Where it is installed; done by hand with LeRobot 0.4.4, see docs/pictures.md."""
+    """Where it is installed; LeRobot 0.4.4 did on 22 November 2026, frames decoded by its PyAV backend."""
     reader = pytest.importorskip("lerobot.datasets.lerobot_dataset")
     read = reader.LeRobotDataset("embodied/walks", root=folder, video_backend="pyav")
     steps = [s for e in episodes for s in e.steps]
