@@ -32,11 +32,11 @@ from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import PanoramaStore, PictureEyes, ViewSettings
 from embodied.gym.playground import make_playground
-from embodied.gym.spaces import Layout, text_of
+from embodied.gym.spaces import SpaceLayout, text_of
 from embodied.interface import Task
 from embodied.render.pictures import PictureSettings
 
-LAYOUT = Layout(candidates=5, text=200)
+LAYOUT = SpaceLayout(candidates=5, text=200)
 ACTIONS = (0, 1, 2, LAYOUT.candidates)
 """Ahead, left, right, stop, as the environment counts them."""
 HORIZON = 60

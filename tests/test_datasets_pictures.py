@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import os
+import sys
 
 import numpy as np
 import pytest
 from hand_data import build, small_house
 from handmade import HandCatalogue
+from test_cluster import FakeRay
 
 from agents.vision import run as vision
 from agents.vision.config import PLAIN
@@ -123,9 +125,9 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     names = [u.name for u in building.units(data.scale)]
     lit = PictureSettings(16, "fast")
 
-    def features(quality: str | None) -> str:
+    def features(quality: str | None, ray: str | None = None) -> str:
         lines: list[str] = []
-        args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=None)
+        args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
         args.threads, args.device, args.network, args.encoder = 1, "cpu", "random", None
         assert vision.run_features(args, lines.append) == 0
         return lines[-1]
@@ -144,5 +146,8 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     with data.open_world(name, HandCatalogue(), data.folder / "cache", lit) as world:
         wanted = encode_panoramas(encoder, [world.panorama(n) for n in range(4)])
     assert np.allclose(found[:4].astype(float), wanted.astype(float), atol=1e-2), "of the very pictures that it holds"
+    path.unlink()
+    monkeypatch.setitem(sys.modules, "ray", FakeRay())
+    assert features("fast", ray="local").startswith("1 of 3 houses made") and path.exists(), "on a cluster's nodes, too"
     with pytest.raises(ValueError, match="made from drawing fast_16"):
         load_features(path, pictures=PLAIN)
