@@ -54,7 +54,7 @@ def main() -> None:
     parser.add_argument(
         "--quality", choices=("unlit", "fast"), default="unlit", help="of pictures that are drawn first"
     )
-    parser.add_argument("--epochs", type=int, default=3)
+    parser.add_argument("--epochs", type=int, default=10)
     args = parser.parse_args()
     torch.manual_seed(0)
 
@@ -66,8 +66,9 @@ def main() -> None:
 
     network = small_network()
     optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
+    loader = DataLoader(train, batch_size=32, shuffle=True, num_workers=2, persistent_workers=True)
     for _ in range(args.epochs):
-        for batch in DataLoader(train, batch_size=32, shuffle=True, num_workers=2):
+        for batch in loader:
             colours, distance = colours_and_distance(batch)
             loss = torch.nn.functional.mse_loss(network(colours), distance)
             optimiser.zero_grad()

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 import torch
 from hand_data import build, paint, painted_panorama, small_house
+from handmade import HandCatalogue
 
 from agents.vision.pictures import ViewpointPictures
 from assets.records import ROOM_KINDS
+from embodied.datasets import build as building
+from embodied.datasets.build import Unit
 from embodied.gym.eyes import ViewSettings
 from embodied.gym.playground import pictures_of
 from embodied.render.panorama_file import PanoramaFileError
@@ -71,6 +74,20 @@ def test_workers_read_what_their_parent_reads(data, start):
             k += 1
     assert k == len(pictures)
     assert not pickle.loads(pickle.dumps(pictures))._open
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_a_program_that_drew_its_pictures_may_load_them_with_workers(tmp_path, monkeypatch):
+    """Forked workers waited for ever for the threads that OpenCV had in the process that drew."""
+    monkeypatch.setattr(building, "load_catalogue", lambda *_: HandCatalogue())
+    data = build(tmp_path / "data", tmp_path / "cache", "find", size="1x4", make_house=small_house)
+    unit = Unit("train", 0)
+    building.draw_unit(unit, data.folder, tmp_path / "cache", PictureSettings(64), ())
+    view = ViewSettings("view", 24, 32)
+    pictures = ViewpointPictures(data, "train", view=view, channels=("rgb", "depth"))
+    loader = torch.utils.data.DataLoader(pictures, batch_size=64, num_workers=2, timeout=240)
+    assert sum(len(batch["node"]) for batch in loader) == 16 * 36
 
 
 def test_an_open_file_is_not_used_by_a_forked_process(data, monkeypatch):

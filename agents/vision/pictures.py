@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 
@@ -140,7 +139,6 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         """The panoramas of a house, opened by this process."""
         if self._process != os.getpid():  # forked: the parent's files are the parent's
             self._open, self._process = OrderedDict(), os.getpid()
-            cv2.setNumThreads(1)  # a worker is one of several; OpenCV's threads do not survive a fork
         if house not in self._open:
             path = self._folder / "houses" / self.houses[house] / "panoramas.pano"
             self._open[house] = PanoramaFile(path)
