@@ -31,7 +31,7 @@ from embodied.action_spaces import MonocularMoves
 from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.playground import make_playground
+from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout, text_of
 from embodied.interface import Task
 from embodied.render.pictures import PictureSettings
@@ -97,7 +97,7 @@ class Curve(BaseCallback):
 def makers(args: argparse.Namespace) -> Callable[[], Seeker]:
     """A maker of environments that share the flat and its decoded panoramas."""
     drawn = PictureSettings(128, args.quality)
-    play = make_playground("find", None, "train", seed=args.seed, cache=default_cache(), pictures=drawn, sees=("rgb",))
+    play = flat_playground("find", args.seed, cache=default_cache(), pictures=drawn, sees=("rgb",))
     tasks = chosen(play.tasks, args.goals)
     requests = sorted({t.request for t in tasks})
     print(f"{len(tasks)} tasks: {', '.join(requests)}")
