@@ -166,8 +166,12 @@ SKIES = st.builds(
 )
 
 
+SLOW = hypothesis.HealthCheck.too_slow
+"""Speaks of the machine's load and not of what is tested."""
+
+
 @pytest.mark.slow
-@hypothesis.settings(derandomize=True, deadline=None)
+@hypothesis.settings(derandomize=True, deadline=None, suppress_health_check=[SLOW])
 @hypothesis.given(
     rugs=st.lists(RUGS, max_size=3, unique_by=lambda p: p.id),
     lamps=st.lists(LAMPS, max_size=3, unique_by=lambda x: x.id),
@@ -205,7 +209,7 @@ FURNISHED = dataclasses.replace(
 )
 
 
-@hypothesis.settings(max_examples=300, derandomize=True, deadline=None)
+@hypothesis.settings(max_examples=300, derandomize=True, deadline=None, suppress_health_check=[SLOW])
 @hypothesis.given(data=st.data())
 def test_a_house_file_with_any_value_changed_is_refused_with_a_reason_or_is_a_house(data):
     body = json.loads(FURNISHED.to_json())
