@@ -62,9 +62,9 @@ class Settings:
 QUALITIES = {
     "fast": Settings(
         density=20.0,
-        budget=1800.0,
+        budget=1200.0,
         every=2.5,
-        things=1.2,
+        things=1.4,
         doubt=0.12,
         sky_rays=8,
         lamp_rays=8,
