@@ -54,7 +54,7 @@ GROUND = {
 """Rooms that anybody above them may import; they are not named in ARROWS."""
 ARROWS = """
 assets.rows <-
-assets.materials <- assets.rows
+assets.materials <- assets.closure assets.rows
 assets.built <- assets.materials assets.rows
 assets.importing <- assets.rows
 assets.catalogue <- assets.materials assets.rows assets.built assets.importing
@@ -90,7 +90,7 @@ embodied.evaluation <- embodied.navigation embodied.interface embodied.policies 
     embodied.datasets
 embodied.gym <- assets.catalogue embodied.house embodied.generate embodied.interface embodied.language embodied.render
     embodied.world embodied.assistants embodied.envs embodied.datasets embodied.evaluation
-embodied.cli <- agents.shipped embodied.gl viz.sinks agents.imitation assets.importing assets.catalogue
+embodied.cli <- agents.shipped embodied.locks embodied.gl viz.sinks agents.imitation assets.importing assets.catalogue
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assets.closure import code_digest
 from assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
 from assets.materials.maps import fbm, herringbone, hexagons, noise, planks
 from assets.materials.registry import PAINTERS, painters_of, read_materials
@@ -213,14 +214,16 @@ def test_a_fingerprint_changes_with_the_code_that_draws(monkeypatch):
     keys, real = ("oak/0", "linen/3"), Path.read_bytes
 
     def after(changed: str) -> list[bool]:
-        monkeypatch.setattr(Path, "read_bytes", lambda p: real(p) + (b"#" if p.name == changed else b""))
+        monkeypatch.setattr(Path, "read_bytes", lambda p: real(p) + (b"\nCHANGED = 1\n" if p.name == changed else b""))
         fingerprint.cache_clear()
+        code_digest.cache_clear()
         return [fingerprint(key) != before[key] for key in keys]
 
     before = {key: fingerprint(key) for key in keys}
     seen = {name: after(name) for name in ("wood.py", "textile.py", "maps.py", "art.py")}
     monkeypatch.undo()
     fingerprint.cache_clear()
+    code_digest.cache_clear()
     assert seen == {
         "wood.py": [True, False],
         "textile.py": [False, True],

@@ -50,7 +50,6 @@ def judge(
     *,
     seed: int = 0,
     limit: int | None = None,
-    batch: int = 64,
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
@@ -76,5 +75,5 @@ def judge(
             players: Mapping[str, Agent] = {name: player(agent, bank, name)}
             kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
             whole = lessons.data.split(split, vnla=rules)
-            rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=kept)
+            rows += evaluate(whole, players, seed=seed, limit=limit, batch=agent.config.evaluation_batch, keep=kept)
     return rows

@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest, write_json
+from assets.closure import code_digest
 from assets.materials import maps
 from assets.materials.maps import Maps, normal_map
 from assets.materials.material import ROLES, Material
@@ -77,11 +77,15 @@ def _material(key: str) -> Material:
 
 @functools.cache
 def fingerprint(key: str) -> str:
-    """Hex digest of all that the maps of `key` depend on: what its recipe is told and the code that it runs."""
+    """Hex digest of all that the maps of `key` depend on: what its recipe is told and the code that it runs.
+
+    The package is left out of the code's closure, because it imports every painter, and the table of all materials,
+    of which the recipe is a line.
+    """
     material = _material(key)
     modules = {maps.__name__, *(PAINTERS[name].__module__ for name in painters_of(material.told))}
-    files = [Path(sys.modules[name].__file__ or "") for name in sorted(modules)]
-    return digest(key, material.pixels, material.tile, dict(material.told), *files)
+    code = code_digest(*sorted(modules), without=(__name__, "assets.data"))
+    return digest(key, material.pixels, material.tile, dict(material.told), code)
 
 
 def _read_mean(folder: Path) -> dict | None:

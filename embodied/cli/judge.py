@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,6 +52,7 @@ def run_vnla(args: argparse.Namespace) -> int:
         raise ValueError("no VNLA agent ships yet; name yours with --agent (`embodied train vnla`)")
     use_threads(args.threads)
     agent = load_agent(args.agent)
+    agent = dataclasses.replace(agent, config=dataclasses.replace(agent.config, evaluation_batch=args.batch))
     lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality)
 
     rows = judge(
@@ -59,7 +61,6 @@ def run_vnla(args: argparse.Namespace) -> int:
         args.split or ("test_unseen",),
         seed=args.seed,
         limit=args.tasks,
-        batch=args.batch,
         only=args.only or (),
         keep=lambda split, name, episodes: _keep(args, split, name, episodes),
         watch=lambda agents: bar(agents, "agents", "agent"),
