@@ -1,24 +1,33 @@
 """Show episodes of a student that learns from descriptions: what was asked, done, said and learned.
 
+    embodied iliad --request "drop every vowel" --word banana
+    embodied iliad --shared SHARED
     embodied iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
-    embodied iliad STUDENT --shared STUDY/shared --request "drop every vowel" --word banana
 
-The student is one of `embodied train iliad regex` or `embodied study iliad`, whose data and teacher
-are in the folder `shared` beside it.
+The student is the shipped one, or one of `embodied train iliad regex` or `embodied study iliad`, whose
+data and teacher are in the folder `shared` beside it. The shipped one's are made there if they are missing.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-from pathlib import Path
 
 from embodied.cli.common import add_json, note, show
 from embodied.cli.options import any_folder, any_path, whole
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("student", type=any_path, metavar="FILE", help="a trained student (best.safetensors)")
+    from agents.shipped import SHIPPED_STUDENT
+
+    parser.add_argument(
+        "student",
+        type=any_path,
+        nargs="?",
+        default=SHIPPED_STUDENT,
+        metavar="FILE",
+        help="a trained student, best.safetensors (default: shipped)",
+    )
     parser.add_argument("--shared", type=any_folder, metavar="DIR", help="folder with data and teacher of its study")
     parser.add_argument("--episodes", type=whole(), default=3, metavar="N", help="how many (default: %(default)s)")
     parser.add_argument("--split", choices=("train", "validation", "test"), default="test", help="whose requests")
@@ -53,9 +62,11 @@ def episodes(args: argparse.Namespace) -> int:
     """Episodes with the student's own teacher."""
     from agents.iliad.regex.run import load_student, prepare
     from agents.iliad.regex.showing import lines_of, tell
+    from agents.shipped import SHIPPED_STUDENT
     from embodied.seeds import stream
 
-    if args.shared is None or not (Path(args.shared) / "data.json").exists():
+    there = args.shared is not None and (args.student == SHIPPED_STUDENT or (args.shared / "data.json").exists())
+    if not there:
         raise ValueError(f"--shared should be a study's folder with data.json, got {args.shared}; or give --request")
     student, config = load_student(args.student)
     grounds = prepare(config, args.shared, note=note)

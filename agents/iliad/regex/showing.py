@@ -74,9 +74,10 @@ def lines_of(told: Told) -> list[str]:
     width = max(map(len, told.words)) + 2
     found = [f"request       {told.request}", f"student       {told.rule}"]
     outputs: Sequence[str] = told.outputs or ("(no rule)",) * len(told.words)
+    widest = max(map(len, outputs)) + 2
     for k, (word, out, wanted) in enumerate(zip(told.words, outputs, told.wanted, strict=True)):
         mark = "right" if out == wanted else f"wanted {wanted}"
-        found.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{width + 2}}{mark}")
+        found.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{widest}}{mark}")
     found.append(f"fulfilled     {'yes' if told.success else 'no'}")
     if told.description is None or told.before is None or told.after is None:
         return [*found, "teacher       (nothing to say)", "learned       nothing"]
