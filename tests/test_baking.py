@@ -72,23 +72,39 @@ def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
     assert report["luxels"] in (check.LUXELS, check.AGAIN) and abs(report["bias"]) < 0.1 and report["beyond"] <= 0.25
 
 
-@pytest.mark.parametrize(
-    "fault", ["all bounces a third too bright", "no bounces", "a third of the luxels dark", "lamps forgotten"]
-)
+@pytest.mark.parametrize("fault", ["all bounces a third too bright", "no bounces", "lamps forgotten"])
 def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatch):
     monkeypatch.setattr(check, "AGAIN", 40)
     light = solved.light
-    third = (np.arange(len(light.direct)) % 3 != 1)[:, None]  # of the three thirds one is met once by the first twenty
     broken = {
         "all bounces a third too bright": dataclasses.replace(light, indirect=light.indirect * 1.33),
         "no bounces": dataclasses.replace(light, indirect=light.indirect * 0),
-        "a third of the luxels dark": dataclasses.replace(
-            light, direct=light.direct * third, indirect=light.indirect * third
-        ),
         "lamps forgotten": dataclasses.replace(light, direct=light.direct * 0),
     }[fault]
     with pytest.raises(LightError, match="disagrees with the path tracer.*worst at"):
         check.check(dataclasses.replace(solved, light=broken))
+
+
+def test_a_third_of_the_luxels_dark_slips_through_one_time_in_eight_at_most(solved, monkeypatch):
+    """Whichever third it is, and whichever luxels are looked at; a bake without fault is not told off."""
+    known = check.compare(solved, luxels=200, paths_each=check.AGAIN_PATHS)
+
+    def told(dark: float, trial: int) -> bool:
+        rng = np.random.default_rng(trial)
+
+        def looked_at(solved, *, luxels=check.LUXELS, **_):
+            baked, *rest = (a[pick] for pick in [rng.choice(len(known[0]), luxels, replace=False)] for a in known)
+            return (np.where(rng.random(luxels) < dark, 0.0, baked), *rest)
+
+        monkeypatch.setattr(check, "compare", looked_at)
+        try:
+            check.check(solved)
+        except LightError:
+            return True
+        return False
+
+    assert np.mean([told(1 / 3, k) for k in range(400)]) >= 7 / 8
+    assert not any(told(0.0, k) for k in range(100))
 
 
 def test_another_look_of_a_material_makes_another_bake(lit):

@@ -221,7 +221,7 @@ class Shared:
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
         clock("luxels")
-        self.sites = sites_of(self.lux, settings.every, things=settings.things)
+        self.sites = sites_of(self.lux, settings.every, few=settings.few, things=settings.things)
         self.memory = Memory() if several else None
         clock("sites")
 

@@ -52,6 +52,8 @@ class Settings:
     """Relative difference from the path tracer that a luxel may have (`embodied.light.check`)."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
+    few: int = 2
+    """Luxels of a cell that has no site of its own but a neighbour's; 0 gives every cell one."""
     things: float = 1.0
     """Times `every` on furniture and joinery."""
     texels: float = 29e6
@@ -64,12 +66,12 @@ QUALITIES = {
         density=20.0,
         budget=1200.0,
         every=2.5,
-        things=1.4,
+        few=0,
         doubt=0.12,
         sky_rays=8,
         lamp_rays=8,
         sun_rays=4,
-        patches=20,
+        patches=48,
         bounces=(4, 4, 4, 4, 40),
         sharpness=0.45,
         tolerance=0.2,

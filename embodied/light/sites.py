@@ -26,8 +26,8 @@ AROUND = 10
 REACH = 1.6
 """How far a site's light reaches, in distances between sites."""
 
-FEW, ALIKE = 2, 0.6
-"""Cells of so few luxels take another one's site that faces their way up to this cosine: half of all cells lie at the
+ALIKE = 0.6
+"""Cells of few luxels take another one's site that faces their way up to this cosine: half of all cells lie at the
 rims of small things, where a site serves one luxel."""
 OWNERS = 1000.0
 """Metres put between owners, so that a rug and the floor below it are no neighbours."""
@@ -54,13 +54,14 @@ class Sites:
     """(k, 3) float64, position with every owner's sites far from all others'."""
 
 
-def sites_of(lux: Luxels, every: float, *, things: float = 1.0) -> Sites:
-    """Sites for luxels, one in every cell of a grid in space, for each facing; cells of few luxels (`FEW`) are their
+def sites_of(lux: Luxels, every: float, *, few: int = 2, things: float = 1.0) -> Sites:
+    """Sites for luxels, one in every cell of a grid in space, for each facing; cells of few luxels are their
     neighbours'.
 
     Args:
       every: luxels between neighbouring sites, along each axis.
-      things: times that on what is neither wall nor floor nor ceiling.
+      few: luxels of a cell that takes a neighbour's site; 0 for none.
+      things: times `every` on what is neither wall nor floor nor ceiling.
     """
     position, normal, side, owner = lux.position, lux.normal, np.sqrt(lux.area), lux.owner
     size = np.zeros(int(owner.max()) + 1)
@@ -81,7 +82,7 @@ def sites_of(lux: Luxels, every: float, *, things: float = 1.0) -> Sites:
     order = np.lexsort((off, own))
     luxel = order[np.cumsum(members) - members]
     apart = position[luxel] + owner[luxel, None] * np.array([OWNERS, 0.0, 0.0])
-    whose = _joined(apart, normal[luxel], size[luxel], members)
+    whose = _joined(apart, normal[luxel], size[luxel], members <= few)
     kept = np.unique(whose)
     own, luxel, apart = np.searchsorted(kept, whose[own]).astype(np.int32), luxel[kept], apart[kept]
     facing, all_ = normal[luxel], np.ones(len(luxel), bool)
@@ -89,14 +90,14 @@ def sites_of(lux: Luxels, every: float, *, things: float = 1.0) -> Sites:
     return Sites(luxel, own, around, size[luxel], position[luxel], facing, apart)
 
 
-def _joined(apart: np.ndarray, facing: np.ndarray, size: np.ndarray, members: np.ndarray) -> np.ndarray:
+def _joined(apart: np.ndarray, facing: np.ndarray, size: np.ndarray, small: np.ndarray) -> np.ndarray:
     """(c,) int64: for each cell the one whose site it takes: a larger one of the same facing on the same layer within
-    a cell's size, where it has few luxels itself and there is such a one.
+    a cell's size, where it is small itself and there is such a one.
 
     Args:
-      apart, facing: (c, 3) of the cells' sites. size: (c,) metres. members: (c,) luxels.
+      apart, facing: (c, 3) of the cells' sites. size: (c,) metres. small: (c,) bool.
     """
-    whose, small = np.arange(len(members)), members <= FEW
+    whose = np.arange(len(small))
     if small.all() or not small.any():
         return whose
     mine = np.nonzero(small)[0]

@@ -347,7 +347,7 @@ def _patches(lux: Luxels, flux: np.ndarray, mine: np.ndarray, most: int) -> Patc
     cut = np.cumsum(power[mine])
     if cut[-1] < 1e-4:
         return None
-    k = int(np.clip(most * min(1.0, len(mine) / 2000 + 0.1), 4, most))
+    k = int(np.clip(most * min(1.0, 0.8 * float(lux.area[mine].sum()) + 0.1), 4, most))
     pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
     strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
     extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
