@@ -56,6 +56,7 @@ def test_every_file_and_folder_that_the_page_names_is_there():
     assert not {name for name in named if not (ROOT / name).exists()}
 
 
+@pytest.mark.slow
 def test_imports_follow_the_floors_of_the_picture(drawing):
     """Up within a column, left between columns."""
     columns = ("ground", "place", "play", "use")
@@ -63,6 +64,7 @@ def test_imports_follow_the_floors_of_the_picture(drawing):
     assert not [(me, other) for me, other in arrows() if at[me][0] > 0 and not at[other] < at[me]]
 
 
+@pytest.mark.slow
 def test_the_picture_can_be_drawn_again(drawing, tmp_path):
     drawing.draw(tmp_path / "again.png")
     again, kept = cv2.imread(str(tmp_path / "again.png")), cv2.imread(str(ROOT / "docs" / "architecture.png"))

@@ -249,6 +249,7 @@ def test_there_is_no_circle_not_even_of_types():
     assert order.index("embodied.interface") < order.index("embodied.envs") < order.index("embodied.datasets")
 
 
+@pytest.mark.slow
 def test_play_knows_nothing_of_pictures():
     found = found_arrows()
     waiting, reached = list(PLAY), set()

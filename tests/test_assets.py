@@ -112,6 +112,7 @@ def test_imported_models_have_the_size_of_the_catalogue(catalogue, key):
     np.testing.assert_allclose([*(low + high)[:2] / 2, low[2]], 0.0, atol=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", SOME)
 def test_imported_meshes_are_sound(catalogue, key):
     for p in catalogue.mesh(key):
@@ -125,12 +126,14 @@ def test_imported_meshes_are_sound(catalogue, key):
         assert p.finish.texture is None or Path(p.finish.texture).is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", SOME)
 def test_things_put_on_a_surface_touch_the_mesh(catalogue, key):
     for s in catalogue.assets[key].surfaces:
         assert contact(catalogue.mesh(key), s) >= 0.95, (key, s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["scopia/saloon_lamp", "scopia/desk_lamp1", "katorlegaz/wall-spotlight"])
 def test_a_lamp_shines_from_where_its_mesh_glows(catalogue, key):
     glowing = [p for p in catalogue.mesh(key) if p.finish.emission is not None]

@@ -193,6 +193,7 @@ def test_a_flipped_byte_in_a_panorama_file_is_found(tmp_path):
         assert file.damaged() == ((1, "depth"),)
 
 
+@pytest.mark.slow
 def test_no_opengl_is_one_line():
     for environment, message in (
         ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
@@ -325,6 +326,7 @@ def test_a_full_disk_leaves_no_file(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"] and path.read_text() == "old"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 0.3, 1.0])
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""

@@ -136,6 +136,7 @@ def test_critic_gradient_is_equation_3_7():
     assert log_p.grad is None
 
 
+@pytest.mark.slow
 def test_a_loss_that_is_no_number_changes_no_weight():
     weight = torch.nn.Parameter(torch.ones(2))
     optimizer = torch.optim.Adam([weight], 0.1)

@@ -132,6 +132,7 @@ def test_stars_alone_teach_to_walk(split, tmp_path):
     assert all(h["rating"] * 64 == pytest.approx(round(h["rating"] * 64)) for h in found)  # sixteen ratings in quarters
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_exactly(split, tmp_path, monkeypatch):
     whole, parts = agent_for(split), agent_for(split)
     before = fingerprint(whole)

@@ -38,6 +38,7 @@ def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
     return code_digest(*modules, root=root, without=without)
 
 
+@pytest.mark.slow
 def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
     lit = makers(PictureSettings(quality="normal", backend="filament"))
     before = key(tree, *lit)
@@ -97,6 +98,7 @@ DECIDED_BY = {
 themselves are in its key."""
 
 
+@pytest.mark.slow
 def test_products_follow_the_code_that_makes_them_and_no_other(tree):
     before = {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
     for file, decided in DECIDED_BY.items():

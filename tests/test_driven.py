@@ -39,12 +39,14 @@ def test_every_edge_is_driven_without_a_bump(place, catalogue):
         assert np.linalg.norm(driver.position - place.graph.positions[b, :2]) < 0.1
 
 
+@pytest.mark.slow
 def test_the_body_stands_still_when_nothing_is_asked(place, catalogue):
     driver = Driver(place.house, catalogue)
     driver.place(place.graph.positions[0], 0.5)
     assert np.linalg.norm(driver.position - place.graph.positions[0, :2]) < 1e-3 and abs(driver.yaw - 0.5) < 1e-2
 
 
+@pytest.mark.slow
 def test_a_wall_in_the_way_is_bumped_into_and_not_passed(place, catalogue):
     driver = Driver(place.house, catalogue)
     driver.place(np.array([4.0, 3.0, 1.5]), 0.0)

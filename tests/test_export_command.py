@@ -21,6 +21,7 @@ def data(tmp_path):
     return build(tmp_path / "data", tmp_path / "cache", "vln")
 
 
+@pytest.mark.slow
 def test_features_are_written_as_tsv_filled_up_to_the_length_that_programs_count_on(data, tmp_path, capsys):
     encoder = load_encoder(SHIPPED_ENCODER)
     made = {}
@@ -43,6 +44,7 @@ def test_features_are_written_as_tsv_filled_up_to_the_length_that_programs_count
     assert "--pad is 8" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_missing_features_name_the_command_that_makes_them(data, tmp_path, capsys):
     order = ["export", "iliad-nav", "--data", str(data.folder), "--out", str(tmp_path / "out")]
     assert cli.main([*order, "--features"]) == 2

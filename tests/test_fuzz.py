@@ -52,6 +52,8 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.seeds import stream
 
+pytestmark = pytest.mark.slow
+
 MUTATIONS = 20
 """Of each of the KINDS; together a little over 300."""
 CLEAR = (ValueError, OSError, UnableError)

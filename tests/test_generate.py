@@ -259,6 +259,7 @@ def test_an_accent_wall_has_neither_door_nor_window(some):
                 )
 
 
+@pytest.mark.slow
 def test_fixed_sky_and_disorder_are_kept():
     house = generate_house(1, HouseConfig(hour=7.5, weather="overcast", disorder=0.9, style="classic"), stages=BARE)
     assert (house.sky.hour, house.sky.weather, house.disorder, house.style) == (7.5, "overcast", 0.9, "classic")
@@ -304,6 +305,7 @@ def test_different_seeds_give_different_houses():
     assert len({h.digest for h in houses()}) == SEEDS
 
 
+@pytest.mark.slow
 def test_a_stage_can_be_replaced():
     def square(draft: Draft) -> Draft:
         rng = stream(draft.seed, "mine")
@@ -320,6 +322,7 @@ def test_a_stage_can_be_replaced():
     assert house.area == pytest.approx(100, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_replaced_stage_is_asked_on_every_retry(monkeypatch):
     """No doors please until the fifth attempt: the plan is drawn again after four, by the stage that was given."""
     asked, refused = [], iter(["hall_1"] * 4)
@@ -340,6 +343,7 @@ def test_a_stage_that_was_left_out_is_named():
         generate_house(2, stages={name: stage for name, stage in BARE.items() if name != "rooms"})
 
 
+@pytest.mark.slow
 def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(monkeypatch):
     """As docs/houses.md promises: its name, how architects think of it, and its furniture."""
     monkeypatch.setattr("embodied.house.house.ROOM_KINDS", (*ROOM_KINDS, "music_room"))

@@ -18,6 +18,7 @@ def test_slope_is_the_exponent_of_area():
     assert growth.slope([house(a) for a in growth.AREAS]) == pytest.approx(1.1)
 
 
+@pytest.mark.slow
 def test_a_house_is_lit_once_per_code_seed_and_quality(tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr(growth, "light_code", lambda: "this code")
@@ -38,6 +39,7 @@ def test_a_house_is_lit_once_per_code_seed_and_quality(tmp_path, monkeypatch):
     assert asked[3:] == [40.0, 100.0]
 
 
+@pytest.mark.slow
 def test_a_picture_of_the_bench_is_drawn_once(tmp_path):
     rgb, plain = np.arange(24, dtype=np.uint8).reshape(2, 4, 3), np.eye(2, 4, dtype=bool)
     asked = []

@@ -81,6 +81,7 @@ def test_import_embodied_does_not_import_gymnasium():
     assert done.stdout.strip() == "set()"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vector", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
 def test_vector_environments_agree_with_single_ones(vector, tmp):
     envs = vector([functools.partial(make, "hanna", tmp) for _ in range(2)])
@@ -135,6 +136,7 @@ def test_actions_have_numbers():
         assert decode(number(action, layout), layout) == action
 
 
+@pytest.mark.slow
 def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
     for shaping in (False, True):
         env = make("find", tmp, shaping=shaping)
@@ -182,6 +184,7 @@ def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
         env.reset(seed=0)
 
 
+@pytest.mark.slow
 def test_a_learner_off_the_shelf_trains_on_it(tmp):
     env = Numbers(make("find", tmp, shaping=True))
     model = stable_baselines3.PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
@@ -192,6 +195,7 @@ def test_a_learner_off_the_shelf_trains_on_it(tmp):
     assert env.action_space.contains(int(action))
 
 
+@pytest.mark.slow
 def test_words_of_descriptions_have_the_numbers_of_the_catalogue_in_every_process():
     code = (
         "from embodied.gym.spaces import word_number, words\n"

@@ -164,6 +164,7 @@ def test_perfect_interpretation_beats_chance_by_far():
     assert rates[0] > 0.7 and rates[1] < 0.2
 
 
+@pytest.mark.slow
 def test_help_does_not_depend_on_the_batch_around_it():
     _, _, tasks, make = grid_setup(33)
     policy = PrivilegedAsking(Shortest(), ask_at_random)

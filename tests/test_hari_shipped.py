@@ -37,6 +37,7 @@ def played(agent: HariAgent, **rules: int) -> list[Episode]:
         return play(make, policy_of(agent), tasks, seed=0, batch=8)
 
 
+@pytest.mark.slow
 def test_it_plays_asks_and_ends(agent):
     episodes = played(agent)
     assert all(e.ended in ("stop", "limit") and len(e.steps) <= 30 for e in episodes)

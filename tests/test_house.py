@@ -209,6 +209,7 @@ FURNISHED = dataclasses.replace(
 )
 
 
+@pytest.mark.slow
 @hypothesis.settings(max_examples=300, derandomize=True, deadline=None, suppress_health_check=[SLOW])
 @hypothesis.given(data=st.data())
 def test_a_house_file_with_any_value_changed_is_refused_with_a_reason_or_is_a_house(data):

@@ -220,6 +220,7 @@ def test_a_button_that_is_never_described_is_never_learned(tmp_path):
     assert found[-1]["described"] < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("learner", ["adel", "binary"])
 def test_a_killed_run_goes_on_exactly(tmp_path, monkeypatch, learner):
     config = LearnerConfig(**{**vars(QUICK), "learner": learner, "checkpoint_minutes": 1e-9})

@@ -141,6 +141,7 @@ class NearMarginal:
         return [walk_along(GRID.graph.path(5, GOALS[int(i)])) for i in rng.integers(len(GOALS), size=len(tasks))]
 
 
+@pytest.mark.slow
 def test_a_small_student_learns_its_way_from_descriptions(tmp_path):
     """More than 90 % of requests, from walks that it made up and what a neighbour said of them."""
     places = {"grid": GRID}

@@ -94,6 +94,7 @@ def test_what_is_no_rule_is_none(rule):
     assert apply(rule, "banana") is None
 
 
+@pytest.mark.slow
 @given(st.text(alphabet=ALPHABET, max_size=LONGEST), st.text(alphabet=LETTERS, max_size=14))
 @settings(max_examples=300, deadline=None)
 def test_whatever_a_network_writes_is_carried_out_quickly_or_refused(rule, word):
@@ -192,6 +193,7 @@ def test_data_points_are_changed_as_their_rule_says(data):
     assert vague, "some say 'delete the first letter'"
 
 
+@pytest.mark.slow
 def test_data_follow_from_the_seed_alone(data):
     assert make_data(SMALL).splits == data.splits
     assert make_data(dataclasses.replace(SMALL, data_seed=1)).splits != data.splits
@@ -349,6 +351,7 @@ def test_the_threshold_is_all_words():
     assert teacher.performances([(task, execution, "()(.)($)@c"), (task, execution, "()(n)()@c")]) == [0.0, 1.0]
 
 
+@pytest.mark.slow
 def test_the_grammar_describes_what_was_done_and_errs_as_often_as_it_should(data):
     teacher, item = GrammarTeacher(data, 0, 0.0), data.splits["train"][0]
     other = next(r for r in rules_without_requests(data, 500, rng=stream(0, "o")) if outputs(r, item.words) not in
@@ -393,6 +396,7 @@ def easy_items(data, held: bool, count: int) -> list[WordTask]:
     return found
 
 
+@pytest.mark.slow
 def test_a_small_student_learns_to_change_words_from_descriptions(data, tmp_path):
     """More than 90 % of what is asked for in wordings that nobody used before, without one demonstration."""
     config = dataclasses.replace(SMALL, hidden_size=32)
@@ -436,6 +440,7 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
         learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
 
 
+@pytest.mark.slow
 def test_a_teacher_is_trained_once_and_data_of_other_settings_are_refused(grounds, tmp_path):
     first = prepare(SMALL, tmp_path, note=silent)
     times = {p: p.stat().st_mtime_ns for p in sorted(tmp_path.rglob("*.safetensors"))}

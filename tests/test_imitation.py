@@ -274,6 +274,7 @@ def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
     assert agent_for(split).policy(split.bank).start((0,)).channels is None
 
 
+@pytest.mark.slow
 def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
     split = setting()
     tasks = [dataclasses.replace(t, horizon=20) for t in (*split.tasks, *split.tasks, *split.tasks)]
@@ -347,6 +348,7 @@ def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
     assert [json.loads(line)["spl"] for line in a] == [json.loads(line)["spl"] for line in b]
 
 
+@pytest.mark.slow
 def test_training_writes_what_a_researcher_looks_at(tmp_path):
     seen = []
     _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
@@ -398,6 +400,7 @@ def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
         run(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
     agent, _ = run(tmp_path, dataclasses.replace(TINY, iterations=1))
     for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", load_agent)):
@@ -414,6 +417,7 @@ def test_a_second_training_in_the_same_folder_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_path):
     run(tmp_path, dataclasses.replace(TINY, iterations=2))
     before = (tmp_path / "checkpoint.pt").read_bytes()

@@ -21,6 +21,8 @@ from embodied.records import save_lines
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
 
+pytestmark = pytest.mark.slow
+
 SMALL = RecordedCamera(32, 48)
 
 

@@ -7,12 +7,15 @@ import re
 from collections import defaultdict
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("assets", "embodied", "agents", "viz")
 TWICE = {"SimState", "Simulator", "ViewPoint"}
 """Names that stand for two classes: mattersim's dialects bear those of the program that each of them imitates."""
 
 
+@pytest.mark.slow
 def test_a_public_class_name_stands_for_one_class():
     homes = defaultdict(list)
     for package in PACKAGES:

@@ -78,6 +78,7 @@ def triangle(**changes) -> dict:
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]], dtype="<f4").tobytes()
 
 
+@pytest.mark.slow
 def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
     row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
     own = write_own(
@@ -183,6 +184,7 @@ def test_a_model_that_is_gone_since_the_catalogue_was_read_is_named(tmp_path):
         catalogue.mesh("mine/box")
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_a_world_does_not_believe_what_was_seen_before_a_model_changed(tmp_path):
     own = painted(tmp_path / "own")
@@ -478,6 +480,7 @@ def fan(faces: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
+@pytest.mark.slow
 def test_normals_around_one_vertex_take_time_and_memory_like_the_number_of_faces():
     start = time.process_time()
     normals = crease_normals(*fan(200_000))

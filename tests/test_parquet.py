@@ -47,6 +47,7 @@ def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
         assert f"path: {file.relative_to(tmp_path / 'out').as_posix()}\n" in card
 
 
+@pytest.mark.slow
 def test_tables_of_routes_to_follow_hold_their_paths(tmp_path):
     data = build(tmp_path / "d", tmp_path / "c", "vln")
     export_parquet(data, tmp_path / "out")

@@ -193,5 +193,6 @@ def test_people_are_not_objects_to_look_for():
     assert CLASS not in {x.object_class for x in find_instances(there, 3.0)}
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_people():
     assert populated()[0] == populated()[0]

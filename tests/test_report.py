@@ -30,6 +30,7 @@ def test_success_on_the_page_is_that_of_the_table(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_nothing_that_an_episode_says_becomes_a_part_of_the_page(tmp_path):
     evil = "<script>alert(1)</script>"
     episode = Episode(TASK, (), evil, agent=evil)

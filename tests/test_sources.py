@@ -82,6 +82,7 @@ def test_every_link_between_pages_leads_somewhere():
     assert not broken, "\n".join(broken)
 
 
+@pytest.mark.slow
 def test_nothing_is_cited_by_numbers_of_a_document_nobody_has():
     wrong = [f"{name}: {m[0]}" for name, text in texts() for m in UNSEEN.finditer(text)]
     assert not wrong, "\n".join(wrong)

@@ -53,6 +53,7 @@ def test_nothing_leaks_before_the_goal_is_spoken_of(kind):
         x, y = a.step(move), b.step(move)
 
 
+@pytest.mark.slow
 def test_help_does_speak_of_the_goal():
     """The leak test can fail: after asking, the two tasks differ."""
     _, tasks, make = setting("vnla")
@@ -63,6 +64,7 @@ def test_help_does_speak_of_the_goal():
     assert len(heard) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_expert_solves_every_task(kind):
     world, tasks, make = setting(kind, 60)

@@ -49,6 +49,7 @@ def leafed(key: str) -> House:
     return dataclasses.replace(flat(), openings=(first, *flat().openings[1:]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_what_the_generator_makes_is_known(seed):
     check_known(generate_house(seed, catalogue=catalogue()), catalogue())
@@ -68,12 +69,14 @@ NONSENSE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", NONSENSE)
 def test_what_nobody_knows_is_refused(message):
     with pytest.raises(HouseError, match=message):
         check_known(NONSENSE[message](), catalogue())
 
 
+@pytest.mark.slow
 def test_a_slip_of_the_pen_gets_a_suggestion():
     key = next(r.floor_finish for r in flat().rooms)
     with pytest.raises(HouseError, match=f"did you mean .*{key}"):

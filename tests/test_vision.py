@@ -69,6 +69,7 @@ def test_parameters_have_torchvisions_names_and_shapes(name):
     assert {k: tuple(v.shape) for k, v in network.state_dict().items()} == torchvision_layout(name)
 
 
+@pytest.mark.slow
 def test_a_torchvision_state_dict_on_disk_loads_and_decides_the_features(tmp_path):
     rng = np.random.default_rng(0)
     weights = {}

@@ -226,6 +226,7 @@ def test_rules_that_are_none_are_refused_with_those_that_are():
         environment_maker("find", {}, vnla="direct")
 
 
+@pytest.mark.slow
 def test_asking_all_the_way_and_listening_arrives_and_the_deaf_do_not():
     world, _, tasks, make = grid_setup()
 

@@ -61,6 +61,7 @@ def test_attention_and_coverage_are_those_of_the_equations():
     assert coverage[0, :, 0].tolist() == pytest.approx(after)
 
 
+@pytest.mark.slow
 def test_words_behind_the_end_are_not_read():
     agent, *_ = lesson()
     agent.network.eval()
@@ -115,6 +116,7 @@ def test_actions_that_are_not_possible_are_never_likely():
     assert torch.equal(logits.softmax(-1) > 0, allowed) and not torch.equal(after.coverage, text.coverage)
 
 
+@pytest.mark.slow
 def test_the_paper_sizes_have_about_as_many_parameters_as_the_reference_says():
     agent = new_agent(SCALES["paper"], lesson()[0].vocabulary, "x", 192)
     assert 4.3e6 < sum(p.numel() for p in agent.network.parameters()) < 4.9e6
@@ -139,6 +141,7 @@ def moments(config=TINY):
     return training, *play_remembering(training.make_env, player, training.tasks[:8], seed=3)[:2]
 
 
+@pytest.mark.slow
 def test_in_training_it_asks_when_its_teacher_would_and_learns_from_every_move():
     training, episodes, memory = moments()
     asked = sum(e.requests for e in episodes)
@@ -148,6 +151,7 @@ def test_in_training_it_asks_when_its_teacher_would_and_learns_from_every_move()
     assert sum(len(m.ask_labels) for m in memory.moments) == sum(bool(s.can_ask) for e in episodes for s in e.steps)
 
 
+@pytest.mark.slow
 def test_labels_are_those_of_the_teacher_afterwards():
     training, episodes, memory = moments()
     teacher = teacher_of("direct")
@@ -160,6 +164,7 @@ def test_labels_are_those_of_the_teacher_afterwards():
     assert counts == {w: found.count((*WORDS, "stop").index(w)) for w in counts}
 
 
+@pytest.mark.slow
 def test_what_an_advisor_did_in_its_place_is_what_it_knows_to_have_done():
     training, episodes, _ = moments()
     for episode in episodes:
@@ -172,6 +177,7 @@ def test_what_an_advisor_did_in_its_place_is_what_it_knows_to_have_done():
             before = after
 
 
+@pytest.mark.slow
 def test_rules_of_the_teacher_can_be_left_out():
     assert rules_of(dataclasses.replace(TINY, ask_rules="b to d")) == AskRules(only=("uncertain", "unmoved", "remain"))
     _, episodes, memory = moments(dataclasses.replace(TINY, ask_rules="a and e"))
@@ -181,6 +187,7 @@ def test_rules_of_the_teacher_can_be_left_out():
 # Acting ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asker", ASKERS)
 def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
     agent, _, split = lesson()
@@ -194,6 +201,7 @@ def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
     assert max(requests) <= 2 and (asker != "none" or not any(requests)) and (asker != "first" or sum(requests) > 6)
 
 
+@pytest.mark.slow
 def test_the_asker_teacher_asks_by_the_first_pass():
     agent, _, split = lesson()
     for e in play(split.make_env, agent.player(split.bank, "teacher"), split.tasks[:4], seed=1):
@@ -211,6 +219,7 @@ def test_a_random_asker_needs_the_situation_and_says_so():
     assert not isinstance(agent.player(split.bank, "learned"), SupervisedVnla)
 
 
+@pytest.mark.slow
 def test_features_of_another_encoder_are_refused():
     agent, _, split = lesson()
     with pytest.raises(ValueError, match="the agent learned from other"):

@@ -102,6 +102,7 @@ def test_a_truncated_panorama_file_is_reported_and_drawn_again(world, caplog):
         assert len(file) == 3
 
 
+@pytest.mark.slow
 def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplog):
     house.save(tmp_path / "house.json")
     w = open_folder(tmp_path, HandCatalogue(), tmp_path / "cache", size=16)
