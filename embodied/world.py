@@ -102,7 +102,12 @@ class World:
     @functools.cached_property
     def path(self) -> Path:
         """Where the panoramas of this world are, or will be, on disk."""
-        return self._path or self.cache / "panoramas" / f"{digest(self.fingerprint)[:32]}.pano"
+        return self._path or self.cached_path
+
+    @functools.cached_property
+    def cached_path(self) -> Path:
+        """Where the cache keeps panoramas of this very world, whoever had them drawn."""
+        return self.cache / "panoramas" / f"{digest(self.fingerprint)[:32]}.pano"
 
     @property
     def lit(self) -> LitPages | None:

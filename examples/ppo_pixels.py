@@ -1,11 +1,15 @@
-"""PPO of Stable-Baselines3 learns from colours alone to find objects in a lit flat.
+"""PPO of Stable-Baselines3 learns from the colours of lit flats to go where it should, or to find things.
 
     pip install stable-baselines3 && python examples/ppo_pixels.py --minutes 40 --out out/ppo
 
-The agent sees 64 x 64 pixels straight ahead and hears what to look for, one of --goals requests as a number; it goes
-ahead, turns by 30 degrees or stops, and is right when it stops within 2 m of such an object. Reward: 1 for that, minus
-0.01 a step, plus what a step brings it nearer (metres / 10). The flat is generated from --seed and lit once. At the
-end: how often it finds what it should, beside a random walk, and the curve of its training in OUT/curve.csv.
+The agent sees 64 x 64 pixels straight ahead (90 degrees) and its goal, and goes ahead, turns by 30 degrees or stops.
+Flats are generated from --seed and lit, once. --task point: the goal is how far a place is and in which direction,
+seen from where the agent stands (what a compass and a positioning system tell; it knows no map and no other place),
+and stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of
+such an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings
+the agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in one
+it never saw, beside a random walk that stops as often as suits it best. --blind shows black pictures instead: what the
+goal alone gives.
 """
 
 from __future__ import annotations
@@ -13,8 +17,10 @@ from __future__ import annotations
 import argparse
 import csv
 import dataclasses
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,32 +30,60 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from assets.cache import default_cache
+from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
+from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.envs.base import HelpEnv
+from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.playground import flat_playground
-from embodied.gym.spaces import SpaceLayout, text_of
-from embodied.interface import Task
+from embodied.gym.spaces import SpaceLayout
+from embodied.interface import TURNS, FollowRoute, Pose, Task
+from embodied.language.plain import PlainLanguage
 from embodied.render.pictures import PictureSettings
+from embodied.seeds import stream
+from embodied.tasks.find import FindConfig, find_pool, find_task
+from embodied.world import World, open_world
 
 LAYOUT = SpaceLayout(candidates=5, text=200)
 ACTIONS = (0, 1, 2, LAYOUT.candidates)
 """Ahead, left, right, stop, as the environment counts them."""
-HORIZON = 60
-"""Steps of an episode: three turns may stand before every move."""
+STOP = len(ACTIONS) - 1
+AREA = (50.0, 75.0)
+"""Size of the flats, square metres."""
+HORIZON = 40
+"""Steps of an episode."""
+WRONG_STOP = -0.3
+HOPS = (1, 3)
+"""Fewest and most edges between start and goal."""
+FAR = 10.0
+"""A goal so far away, or farther, looks the same, metres."""
+SIDE, ANGLE = 64, math.radians(90.0)
+STOPS = (0.25, 0.1, 0.05, 0.025)
+"""How often the random walk may stop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arena:
+    """Flats and what there is to do in them."""
+
+    worlds: dict[str, World]
+    tasks: list[Task]
+    goals: tuple[str, ...]
+    """The requests that are numbered; none for points."""
 
 
 class Seeker(gymnasium.Wrapper):
-    """What PPO sees and does: colours, the number of the request, four actions."""
+    """What PPO sees and does: colours, the goal as numbers, four actions."""
 
-    def __init__(self, env: gymnasium.Env, requests: list[str]) -> None:
+    def __init__(self, env: HelpGymEnv, goals: Sequence[str], blind: bool) -> None:
         super().__init__(env)
-        self._requests = requests
-        goal = gymnasium.spaces.Box(0.0, 1.0, (len(requests),), np.float32)
+        self._goals, self._blind = goals, blind
+        goal = gymnasium.spaces.Box(-1.0, 1.0, (len(goals) or 3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({"rgb": env.observation_space["rgb"], "goal": goal})
         self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
 
@@ -59,12 +93,39 @@ class Seeker(gymnasium.Wrapper):
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         observation, reward, terminated, truncated, info = self.env.step(ACTIONS[int(action)])
+        if terminated and not info["success"]:
+            reward += WRONG_STOP
         return self._seen(observation), float(reward), terminated, truncated, info
 
     def _seen(self, observation: dict[str, Any]) -> dict[str, np.ndarray]:
-        goal = np.zeros(len(self._requests), np.float32)
-        goal[self._requests.index(text_of(observation["instruction"]))] = 1.0
-        return {"rgb": observation["rgb"], "goal": goal}
+        rgb = np.zeros_like(observation["rgb"]) if self._blind else observation["rgb"]
+        return {"rgb": rgb, "goal": self._numbered() if self._goals else self._direction()}
+
+    def _numbered(self) -> np.ndarray:
+        goal = np.zeros(len(self._goals), np.float32)
+        goal[self._goals.index(self.env._env.task.request)] = 1.0
+        return goal
+
+    def _direction(self) -> np.ndarray:
+        """(3,) how far, and sine and cosine of where from straight ahead, left positive."""
+        play = self.env._env
+        x, y, _ = play.world.graph.positions[play.task.goal_nodes[0]] - play.world.graph.positions[play.pose.node]
+        aside = float(wrap(math.atan2(y, x) - play.pose.yaw))
+        return np.array([min(math.hypot(x, y) / FAR, 1.0), math.sin(aside), math.cos(aside)], np.float32)
+
+
+class Sight(BaseFeaturesExtractor):
+    """Three small convolutions, and the goal beside what they find."""
+
+    def __init__(self, space: gymnasium.spaces.Dict, size: int = 128) -> None:
+        super().__init__(space, size + space["goal"].shape[0])
+        relu, flat = torch.nn.ReLU, torch.nn.Flatten
+        layers = [torch.nn.Conv2d(3, 16, 8, 4), relu(), torch.nn.Conv2d(16, 32, 4, 2), relu()]
+        layers += [torch.nn.Conv2d(32, 32, 3, 1), relu(), flat(), torch.nn.Linear(32 * 4 * 4, size), relu()]
+        self.eyes = torch.nn.Sequential(*layers)
+
+    def forward(self, seen: dict[str, torch.Tensor]) -> torch.Tensor:
+        return torch.cat([self.eyes(seen["rgb"]), seen["goal"]], 1)
 
 
 class Curve(BaseCallback):
@@ -82,10 +143,10 @@ class Curve(BaseCallback):
     def _on_rollout_end(self) -> None:
         if not self._ended:
             return
-        found = float(np.mean([info.get("success", 0.0) for info in self._ended]))
+        success = float(np.mean([info.get("success", 0.0) for info in self._ended]))
         reward = float(np.mean([info["episode"]["r"] for info in self._ended]))
-        row = {"steps": self.num_timesteps, "episodes": len(self._ended), "success": found, "reward": reward}
-        self._rows.append({k: round(v, 4) for k, v in row.items()})
+        row = {"steps": self.num_timesteps, "episodes": len(self._ended), "success": success, "reward": reward}
+        self._rows.append({k: round(v, 4) for k, v in row.items()} | {"seconds": round(time.process_time())})
         self._ended = []
         print(", ".join(f"{k} {v:g}" for k, v in self._rows[-1].items()), flush=True)
         with self._path.open("w", newline="") as f:
@@ -94,28 +155,65 @@ class Curve(BaseCallback):
             table.writerows(self._rows)
 
 
-def makers(args: argparse.Namespace) -> Callable[[], Seeker]:
-    """A maker of environments that share the flat and its decoded panoramas."""
-    drawn = PictureSettings(128, args.quality)
-    play = flat_playground("find", args.seed, cache=default_cache(), pictures=drawn, sees=("rgb",))
-    tasks = chosen(play.tasks, args.goals)
-    requests = sorted({t.request for t in tasks})
-    print(f"{len(tasks)} tasks: {', '.join(requests)}")
-    eyes = PictureEyes(PanoramaStore(play.worlds), ("rgb",), ViewSettings("view", 64, 64))
+def arena(args: argparse.Namespace, numbers: Sequence[int], goals: Sequence[str] = ()) -> Arena:
+    """The flats of these numbers, drawn where they are not yet; `goals`: only such requests."""
+    catalogue, worlds, tasks = load_catalogue(default_cache()), {}, []
+    for n in numbers:
+        config = DatasetConfig("find", "tiny", args.seed, area=AREA)
+        house, graph = make_dataset_house(args.seed, f"flat_{n}", config, catalogue)
+        drawn = PictureSettings(128, args.quality)
+        world = worlds[house.name] = open_world(house, catalogue, default_cache(), drawn, graph=graph)
+        world.render_all()
+        tasks += point_tasks(world, args.seed) if args.task == "point" else find_tasks(world, args.seed)
+        print(f"{house.name}: {len(house.rooms)} rooms, {len(graph.positions)} viewpoints", flush=True)
+    if args.task == "point":
+        return Arena(worlds, tasks, ())
+    requests = [t.request for t in tasks]
+    most = sorted(set(requests), key=lambda r: (-requests.count(r), r))[: args.goals]
+    kept = tuple(goals) or tuple(sorted(most))
+    return Arena(worlds, [t for t in tasks if t.request in kept], kept)
+
+
+def point_tasks(world: World, seed: int) -> list[Task]:
+    """Every start with every goal that is HOPS away, with a drawn heading."""
+    rng, graph = stream(seed, "point tasks", world.name), world.graph
+    pairs = np.argwhere((graph.hops >= HOPS[0]) & (graph.hops <= HOPS[1]))
+    return [
+        Task(
+            id=f"{world.name}/point/{k}",
+            kind="find",
+            world=world.name,
+            start=Pose(int(start), int(rng.integers(TURNS))),
+            goal=FollowRoute("point", graph.path(int(start), int(goal))),
+            goal_nodes=(int(goal),),
+            request="go there",
+            radius=0.0,
+            horizon=HORIZON,
+        )
+        for k, (start, goal) in enumerate(pairs.tolist())
+    ]
+
+
+def find_tasks(world: World, seed: int) -> list[Task]:
+    """Every start near a thing that can be found."""
+    config = FindConfig(fewest_nodes=HOPS[0] + 1, most_nodes=HOPS[1] + 1, horizon=HORIZON)
+    pool, language = find_pool(world, seed=seed, config=config), PlainLanguage()
+    tasks = [find_task(pool, i, seed=seed, language=language, config=config) for i in range(len(pool))]
+    return [dataclasses.replace(t, request=t.goal.object_class) for t in tasks]
+
+
+def maker(place: Arena, blind: bool) -> Callable[[], Seeker]:
+    """A maker of environments that share the flats and their decoded panoramas."""
+    eyes = PictureEyes(PanoramaStore(place.worlds), ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
     moves = MonocularMoves()
 
     def make() -> Seeker:
-        env = HelpGymEnv(lambda: HelpEnv(play.worlds, moves=moves), tasks, eyes, layout=LAYOUT, shaping=True)
-        return Seeker(env, requests)
+        env = HelpGymEnv(
+            lambda: HelpEnv(place.worlds, moves=moves), place.tasks, eyes, layout=LAYOUT, shaping=True, patience=HORIZON
+        )
+        return Seeker(env, place.goals, blind)
 
     return make
-
-
-def chosen(tasks: tuple[Task, ...], goals: int) -> list[Task]:
-    """The tasks of the requests that most of them make."""
-    requests = [t.request for t in tasks]
-    most = sorted(set(requests), key=lambda r: (-requests.count(r), r))[:goals]
-    return [dataclasses.replace(t, horizon=HORIZON) for t in tasks if t.request in most]
 
 
 def judged(env: gymnasium.Env, act: Callable[[dict[str, np.ndarray]], int], episodes: int, seed: int) -> float:
@@ -130,30 +228,57 @@ def judged(env: gymnasium.Env, act: Callable[[dict[str, np.ndarray]], int], epis
     return found / episodes
 
 
+def interval(share: float, n: int) -> str:
+    """A share of n episodes and its 95 % interval, per cent. Source: Wilson 1927."""
+    z = 1.96
+    middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    low, high = (abs(100 * (middle + s * half) / (1 + z * z / n)) for s in (-1, 1))
+    return f"{100 * share:.0f} % ({low:.0f} to {high:.0f})"
+
+
+def walker(chance: float, rng: np.random.Generator) -> Callable[[dict[str, np.ndarray]], int]:
+    """Moves at random and stops with a chance, whatever it sees."""
+    return lambda o: STOP if rng.random() < chance else int(rng.integers(STOP))
+
+
+def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> None:
+    env, rng = make(), np.random.default_rng(args.seed)
+    learned = judged(env, lambda o: int(learner.predict(o, deterministic=False)[0]), args.judge, 1000)
+    random = max(judged(env, walker(chance, rng), args.judge, 1000) for chance in STOPS)
+    n = args.judge
+    print(f"{name}: succeeds in {interval(learned, n)} of {n} episodes, random walk {interval(random, n)}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--task", default="point", choices=("point", "find"))
     parser.add_argument("--minutes", type=float, default=40.0)
     parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many")
+    parser.add_argument("--flats", type=int, default=3, help="how many flats it learns in")
     parser.add_argument("--goals", type=int, default=4, help="how many different things it looks for")
+    parser.add_argument("--blind", action="store_true", help="black pictures, to compare with")
     parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--rollout", type=int, default=128, help="steps of each environment between updates")
-    parser.add_argument("--judge", type=int, default=100, help="episodes")
+    parser.add_argument("--judge", type=int, default=300, help="episodes")
     parser.add_argument("--quality", default="fast", choices=("unlit", "fast", "normal"))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/ppo"))
     args = parser.parse_args()
-    torch.set_num_threads(2)
+    torch.set_num_threads(args.threads)
     args.out.mkdir(parents=True, exist_ok=True)
 
-    make = makers(args)
-    envs = DummyVecEnv([lambda: Monitor(make())] * args.envs)
+    home = arena(args, range(args.flats))
+    print(f"{len(home.tasks)} tasks {', '.join(home.goals)}", flush=True)
+    make = maker(home, args.blind)
     learner = PPO(
         "MultiInputPolicy",
-        envs,
+        DummyVecEnv([lambda: Monitor(make())] * args.envs),
+        policy_kwargs={"features_extractor_class": Sight, "net_arch": [64]},
         n_steps=args.rollout,
         batch_size=256,
         n_epochs=4,
-        learning_rate=3e-4,
+        learning_rate=5e-4,
         ent_coef=0.01,
         gamma=0.97,
         seed=args.seed,
@@ -161,12 +286,10 @@ def main() -> None:
     )
     learner.learn(args.steps, callback=Curve(args.out / "curve.csv", args.minutes))
     learner.save(args.out / "agent.zip")
-
-    env, rng = make(), np.random.default_rng(args.seed)
-    learned = lambda o: int(learner.predict(o, deterministic=False)[0])
-    found = judged(env, learned, args.judge, 1000)
-    random = judged(env, lambda o: int(rng.integers(len(ACTIONS))), args.judge, 1000)
-    print(f"finds it in {100 * found:.0f} % of {args.judge} episodes, random walk {100 * random:.0f} %")
+    report("flats it learned in", make, learner, args)
+    away = arena(args, [args.flats], home.goals)
+    if away.tasks:
+        report("a flat it never saw", maker(away, args.blind), learner, args)
 
 
 if __name__ == "__main__":

@@ -88,8 +88,9 @@ embodied.bench <- embodied.gl assets.catalogue embodied.house embodied.navigatio
     embodied.tasks embodied.world embodied.assistants embodied.envs embodied.datasets embodied.gym
 embodied.evaluation <- embodied.navigation embodied.interface embodied.policies embodied.envs
     embodied.datasets
-embodied.gym <- assets.catalogue embodied.house embodied.generate embodied.interface embodied.language embodied.render
-    embodied.world embodied.assistants embodied.envs embodied.datasets embodied.evaluation
+embodied.gym <- assets.catalogue embodied.house embodied.navigation embodied.generate embodied.interface
+    embodied.language embodied.render embodied.tasks embodied.world embodied.assistants embodied.envs embodied.datasets
+    embodied.evaluation
 embodied.cli <- agents.shipped embodied.locks embodied.gl viz.sinks agents.imitation assets.importing assets.catalogue
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies

@@ -11,10 +11,15 @@ found no difference from a build with one process (digest 4b6783e58d002317).
 from __future__ import annotations
 
 import sys
+import threading
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from hand_data import build, content, small_house
 
+from embodied.datasets.build import DatasetConfig, build_dataset
 from embodied.datasets.cluster import RETRIES, run_on_ray
 from embodied.errors import UnableError
 
@@ -56,3 +61,41 @@ def test_without_ray_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(UnableError, match=r"embodied-houses\[ray\]"):
         list(run_on_ray(str, ["a"], (), "local"))
+
+
+def slow_house(*arguments):
+    """A small house that somebody takes some seconds to make."""
+    time.sleep(4.0)
+    return small_house(*arguments)
+
+
+@pytest.mark.slow
+def test_a_node_that_is_killed_in_the_middle_changes_nothing(tmp_path, monkeypatch):
+    pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+
+    here = Path(__file__).resolve().parent
+    monkeypatch.setenv("PYTHONPATH", f"{here.parent}:{here}:{':'.join(p for p in sys.path if p)}")
+    whole = build(tmp_path / "whole", tmp_path / "cache", "find", make_house=small_house)
+    config = DatasetConfig("find", "tiny", seed=4, language="plain")
+    houses = tmp_path / "ray" / "houses"
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    doomed, drafts = cluster.add_node(num_cpus=1), []
+
+    def kill() -> None:
+        """As soon as a house is whole and both nodes are at work on another."""
+        while not (list(houses.glob("*/unit.json")) and len(found := list(houses.glob(".*"))) == 2):
+            time.sleep(0.05)
+        drafts.extend(found)
+        cluster.remove_node(doomed, allow_graceful=False)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    try:
+        build_dataset(config, tmp_path / "ray", tmp_path / "cache", make_house=slow_house, ray_address=cluster.address)
+    finally:
+        cluster.shutdown()
+    assert len(drafts) == 2, "both nodes were at work when one was killed"
+    left = {k: v for k, v in content(tmp_path / "ray").items() if not k.startswith(".")}
+    assert left == {k: v for k, v in content(whole.folder).items() if not k.startswith(".")}
+    assert not list(houses.glob(".*")), "what the killed node left unfinished is swept away"

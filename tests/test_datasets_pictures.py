@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import os
+import shutil
 import sys
 
 import numpy as np
@@ -87,6 +88,7 @@ def test_drawing_goes_on_where_it_was_stopped(data, caplog):
     first, names = files(data), [u.name for u in building.units(data.scale)]
     assert sorted(first) == sorted(names) and data.pictures == SMALL
     pano(data, names[0]).unlink()  # killed before this one
+    shutil.rmtree(data.folder / "cache" / "panoramas")
     cut = pano(data, names[1])
     cut.write_bytes(cut.read_bytes()[:-9])  # or the disk was full
     draw(data)
@@ -95,6 +97,26 @@ def test_drawing_goes_on_where_it_was_stopped(data, caplog):
     assert all(data.drawn_pictures(n) == SMALL for n in names)
     draw(data, PictureSettings(size=8))
     assert all(data.drawn_pictures(n).size == 8 for n in names), "another size is drawn anew"
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_data_sets_over_the_same_houses_share_their_pictures(data, tmp_path):
+    other = build(tmp_path / "vnla", tmp_path / "cache", "vln", size="1x4", make_house=small_house)
+    names = [u.name for u in building.units(data.scale)]
+    for one in (data, other):
+        for name in names:
+            pano(one, name).unlink(missing_ok=True)
+        building.draw_panoramas(one.config, one.folder, tmp_path / "shared", pictures=SMALL)
+    for name in names:
+        assert data.place(name).house.digest == other.place(name).house.digest
+        assert pano(data, name).samefile(pano(other, name)), "drawn once, kept once"
+    kept = next((tmp_path / "shared" / "panoramas").iterdir())
+    pano(other, names[0]).write_bytes(b"damaged")  # wherever it lies, nobody believes it
+    building.draw_panoramas(other.config, other.folder, tmp_path / "shared", pictures=SMALL)
+    assert other.drawn_pictures(names[0]) == SMALL and kept.exists()
+    building.draw_panoramas(data.config, data.folder, tmp_path / "shared", pictures=PictureSettings(size=8))
+    assert not any(pano(data, name).samefile(pano(other, name)) for name in names), "another size is another file"
 
 
 @pytest.mark.gl

@@ -1,12 +1,13 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help, seen with pixels; light compares the ways of drawing with a path tracer, growth lights
-houses of 40 to 400 m² and fits how the cost grows (fast, or --quality normal), codecs compares ways of
-storing what was drawn (choose --quality fast). Close other programs first: the numbers are only as
-good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
-and features in OUT/freeze and writes their digests; with --against it says of every part whether it
-is the same as in a file of them (docs/freeze.json), or differs and why that is meant.
+with help, seen with pixels, drive a body on wheels with live pictures; light compares the ways of
+drawing with a path tracer, growth lights houses of 40 to 400 m² and fits how the cost grows (fast, or
+--quality normal), codecs compares ways of storing what was drawn (choose --quality fast). Close other
+programs first: the numbers are only as good as the quiet. freeze measures nothing: it makes houses, a
+lit flat, data sets, episodes, tables and features in OUT/freeze and writes their digests; with
+--against it says of every part whether it is the same as in a file of them (docs/freeze.json), or
+differs and why that is meant.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-PARTS = ("houses", "pictures", "steps", "plays", "seen", "memory", "light", "growth", "codecs", "freeze")
+PARTS = ("houses", "pictures", "steps", "plays", "seen", "drive", "memory", "light", "growth", "codecs", "freeze")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied import gl
-    from embodied.bench import episodes, seen, timing, world
+    from embodied.bench import drive, episodes, seen, timing, world
 
     catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -68,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
         "steps": lambda: world.steps(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
+        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
     measures = []

@@ -98,6 +98,11 @@ def run(args: argparse.Namespace) -> int:
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
+    if args.own:
+        raise ValueError(
+            "--own: data sets are made of the furniture that everybody has, since whoever reads one must find the "
+            "same; leave it out, or use it with `embodied house`, `light`, `render` and `rollout`"
+        )
     HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
     programs = [name for name, program in PROGRAMS.items() if program.kind == args.kind]
     if args.export and not programs:

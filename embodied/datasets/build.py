@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -189,9 +190,25 @@ def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings, 
     house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
     catalogue = load_catalogue(cache, packs)
     path, may = home / "panoramas.pano", ("renderer",)  # nodes of a cluster may have other drivers
+    new = not path.exists()
     with World(house, catalogue, graph, cache, pictures, file=path, may_differ=may) as world:
+        share(world.cached_path, path)
         world.render_all()
+        if new:
+            share(path, world.cached_path)
     return unit.name
+
+
+def share(source: Path, target: Path) -> None:
+    """Give the file `source`, where it is there, the name `target`, too, unless that is taken or on another disk.
+
+    So data sets of several kinds over the same houses are drawn once and take the space of one.
+    """
+    if target.exists():
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(OSError):  # absent, made meanwhile, or a file system without such names: drawn anew
+        os.link(source, target)
 
 
 def for_each_unit(

@@ -44,6 +44,8 @@ NEAR = 0.06
 """A node is reached within this many metres."""
 AHEAD = 0.4
 """The body steers for a point of its line this many metres ahead, so that it stays on the line."""
+APART = 0.5
+"""Seconds without touch after which touching the same thing is another bump (Driver.roll): bodies rebound."""
 PATIENCE = 4.0
 """Seconds allowed beyond four times what the way takes at full speed."""
 
@@ -110,6 +112,18 @@ class Drive:
     """What it touched besides floors, in order, once per contact."""
 
 
+@dataclass(frozen=True)
+class Roll:
+    """What came of a command."""
+
+    metres: float
+    """Way of the body's centre."""
+    bumps: tuple[str, ...]
+    """What it began to touch, besides floors, in order."""
+    touched: bool
+    """Whether it touched anything meanwhile."""
+
+
 class Driver:
     """Owns the physics of one house with the body in it.
 
@@ -127,6 +141,9 @@ class Driver:
         self.data = mujoco.MjData(self.model)
         joint = next(j for j in range(self.model.njnt) if self.model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE)
         self._free = slice(self.model.jnt_qposadr[joint], self.model.jnt_qposadr[joint] + 7)
+        self._moves = slice(self.model.jnt_dofadr[joint], self.model.jnt_dofadr[joint] + 6)
+        self._camera = self.model.camera("robot/eye").id
+        self._last_touch: dict[str, float] = {}
         self._motors = [self.model.actuator(f"robot/{side}").id for side in ("left", "right")]
         self._names = [self.model.geom(g).name for g in range(self.model.ngeom)]
         self._mine = np.array([name.startswith("robot/") for name in self._names])
@@ -149,6 +166,37 @@ class Driver:
         self.data.qpos[self._free] = [position[0], position[1], height, math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)]
         self._command(0.0, 0.0)
         mujoco.mj_step(self.model, self.data, 10 * self._substeps)
+        self._last_touch = {}
+
+    def roll(self, speed: float, turn: float, periods: int = 1) -> Roll:
+        """Hold a command for so many control periods.
+
+        Args:
+          speed, turn: metres and radians per second, as far as the motors can.
+        """
+        self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
+        metres, bumps, touched = 0.0, list[str](), False
+        for _ in range(periods):
+            before = self.position
+            mujoco.mj_step(self.model, self.data, self._substeps)
+            metres += float(np.linalg.norm(self.position - before))
+            now, time = self._touched(), self.data.time
+            bumps += sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
+            self._last_touch |= dict.fromkeys(now, time)
+            touched = touched or bool(now)
+        return Roll(metres, tuple(bumps), touched)
+
+    @property
+    def eye(self) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) where the camera is, metres, and (3, 3) its axes as columns (right, up, backward), world."""
+        mujoco.mj_camlight(self.model, self.data)
+        return self.data.cam_xpos[self._camera].copy(), self.data.cam_xmat[self._camera].reshape(3, 3).copy()
+
+    @property
+    def motion(self) -> tuple[float, float]:
+        """Metres per second ahead, and radians per second to the left."""
+        velocity = self.data.qvel[self._moves]
+        return float(velocity[0] * math.cos(self.yaw) + velocity[1] * math.sin(self.yaw)), float(velocity[5])
 
     def drive(self, target: np.ndarray) -> Drive:
         """Turn towards (x, y) and go there along the straight line; give up after a while."""

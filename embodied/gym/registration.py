@@ -31,6 +31,8 @@ def register(gymnasium: ModuleType) -> None:
                 vector_entry_point="embodied.gym.env:make_vec",
                 kwargs={"kind": kind},
             )
+    if "embodied/Drive-v0" not in gymnasium.registry:
+        gymnasium.register("embodied/Drive-v0", entry_point="embodied.gym.drive:make")
 
 
 class WhenImported(MetaPathFinder):

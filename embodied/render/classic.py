@@ -122,7 +122,10 @@ class Renderer:
           size: (height, width), pixels.
           cull: False draws everything, for comparison.
         """
-        camera = camera_at(position, yaw, pitch, vfov)
+        return self.through(camera_at(position, yaw, pitch, vfov), size, cull=cull)
+
+    def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
+        """The picture of (height, width) that `camera` takes; `cull` as in `view`."""
         drawn = self._choose(camera, size, cull)
         rgb = self._rgb(camera, size)
         depth, ids = self._depth_and_ids(size, drawn)

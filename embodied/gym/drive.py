@@ -1,0 +1,144 @@
+"""embodied/Drive-v0: a body on wheels, driven by velocities through lit houses, that sees every moment of its way.
+
+    env = gymnasium.make("embodied/Drive-v0", task="find", sees=("rgb", "depth"), data="DIR", split="train")
+
+An action says how fast ahead and how fast to the left, each from -1 to 1, and is held for a tenth of a second while
+physics goes on; to find something, a third number above 0.5 says that it is here. The same as a dm_env environment, in
+the way of dm_control's suite: embodied.gym.suite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from assets.cache import default_cache
+from assets.catalogue import load_catalogue
+from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.store import Dataset
+from embodied.gym.driving import TEXT, DriveSettings, Driving
+from embodied.gym.eyes import FAR
+from embodied.gym.playground import AREA, pictures_of
+from embodied.gym.spaces import LARGE
+from embodied.render.pictures import PictureSettings
+from embodied.world import World, open_world
+
+VIEW = (480, 640)
+"""Height and width of what `render` shows, pixels."""
+
+
+class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
+    """Driving as a Gymnasium environment.
+
+    Reward: 1 on success, minus 0.01 a command and 0.05 for everything that is bumped into, plus a tenth for every
+    metre nearer to the goal along the floor. An episode ends when the point is reached, when the object is said to be
+    here, and is cut short after `seconds`. info: success, spl, bumps, metres, seconds, left (metres to the goal).
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(self, driving: Driving, *, render_mode: str | None = None) -> None:
+        """
+        Raises:
+          ValueError: an unknown render mode.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
+        self.driving, self.render_mode = driving, render_mode
+        self.action_space: spaces.Box = spaces.Box(-1.0, 1.0, (driving.settings.numbers,), np.float32)
+        self.observation_space = seen_space(driving.settings)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A start and a goal drawn with this environment's generator; options["world"] chooses the house by name."""
+        super().reset(seed=seed)
+        self.driving.reset(self.np_random, (options or {}).get("world"))
+        return self.driving.look(), {"world": self.driving.world.name, "request": self.driving.request}
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        outcome = self.driving.step(action)
+        ended = outcome.ended
+        terminated = ended in ("reached", "said")
+        return self.driving.look(), outcome.reward, terminated, ended == "limit", dict(outcome.facts)
+
+    def render(self) -> np.ndarray | None:
+        """(h, w, 3) uint8: what its camera sees, larger."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
+            return None
+        return self.driving.picture(*VIEW)
+
+    def close(self) -> None:
+        self.driving.close()
+
+
+def seen_space(s: DriveSettings) -> spaces.Dict:
+    """The space of `Driving.look`."""
+    shape = (s.height, s.width)
+    pixels: dict[str, spaces.Space] = {
+        "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
+        "depth": spaces.Box(0.0, FAR, shape, np.float32),
+        "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
+    }
+    whole = {name: pixels[name] for name in s.sees}
+    whole["motion"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
+    whole["touched"] = spaces.Box(0.0, 1.0, (1,), np.float32)
+    if s.task == "reach":
+        low, high = np.array([0, -1, -1], np.float32), np.array([LARGE, 1, 1], np.float32)
+        whole["goal"] = spaces.Box(low, high, dtype=np.float32)
+    else:
+        whole["object"] = spaces.Box(0.0, LARGE, (1,), np.float32)
+        whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
+    return spaces.Dict(whole)
+
+
+def make(*, render_mode: str | None = None, **options: Any) -> DriveEnv:
+    """The environment; options as of `make_driving`."""
+    return DriveEnv(make_driving(**options), render_mode=render_mode)
+
+
+def make_driving(
+    *,
+    data: str | Path | None = None,
+    split: str = "train",
+    seed: int = 0,
+    cache: str | Path | None = None,
+    pictures: PictureSettings | None = None,
+    worlds: Mapping[str, World] | None = None,
+    **settings: Any,
+) -> Driving:
+    """Driving in the houses of a data set, in given worlds, or in one flat that is generated from `seed` and lit.
+
+    Args:
+      data, split: of any kind; the light of its houses is baked where the cache does not have it.
+      pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere.
+      settings: fields of DriveSettings.
+    """
+    if isinstance(sees := settings.get("sees"), str):
+        settings["sees"] = (sees,)
+    wanted, where = DriveSettings(**settings), Path(cache) if cache else default_cache()
+    if worlds is None:
+        worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
+    return Driving(worlds, wanted)
+
+
+def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
+    """The houses of a split."""
+    whole, catalogue = Dataset(data), load_catalogue(cache)
+    names = whole.names(split)
+    drawn = pictures or pictures_of(whole, names, wanted=False)
+    return {name: whole.open_world(name, catalogue, cache, drawn) for name in names}
+
+
+def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
+    """The flat that the other environments play in, too."""
+    name, catalogue = f"flat_{seed}", load_catalogue(cache)
+    house, graph = make_dataset_house(seed, name, DatasetConfig("find", "tiny", seed, area=AREA), catalogue)
+    drawn = pictures or PictureSettings(quality="fast")
+    return {name: open_world(house, catalogue, cache, graph=graph, pictures=drawn)}

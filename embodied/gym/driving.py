@@ -1,0 +1,294 @@
+"""Driving: a body on wheels in a lit house, driven by velocities, that sees what its camera sees at every command.
+
+The rules behind embodied/Drive-v0 (embodied.gym.drive) and its dm_env twin (embodied.gym.suite).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
+from embodied.geometry import wrap
+from embodied.gym.eyes import FAR, PIXELS
+from embodied.gym.floor_ways import FloorWays
+from embodied.gym.spaces import codes_of, word_number
+from embodied.language.plain import with_article
+from embodied.navigation.free_space import EYE
+from embodied.render.camera import Camera, camera_at
+from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+TASKS = ("reach", "find")
+"""To reach a point, or to find an object of a class and say so."""
+TEXT = 80
+"""Most characters of a request."""
+STEP_COST, BUMP_COST, PER_METRE = 0.01, 0.05, 0.1
+"""Of every command, of everything that is bumped into; and what a metre nearer to the goal is worth."""
+KEPT = 4
+"""Houses whose physics and pictures are held ready, the last used."""
+AHEAD = 3
+"""Cells of its way that a guide looks ahead: 30 cm."""
+POINTS = 50
+"""Goals that are tried before a house counts as too small (reach)."""
+SAID = 0.5
+"""Above this the third number of an action says 'here it is' (find)."""
+
+
+@dataclass(frozen=True)
+class DriveSettings:
+    """What is to be done, what is seen and how an episode ends."""
+
+    task: str = "reach"
+    """One of TASKS."""
+    sees: tuple[str, ...] = ("rgb", "depth")
+    """Some of embodied.gym.eyes.PIXELS; nothing for a blind body."""
+    height: int = 128
+    width: int = 128
+    """Pixels."""
+    vfov: float = math.radians(78.0)
+    """Vertical field of view, radians."""
+    control: float = 0.1
+    """Seconds that a command is held."""
+    seconds: float = 40.0
+    """After which an episode is cut short, in the simulated world."""
+    nearest: float = 1.5
+    farthest: float = 8.0
+    """Metres to drive from a start to its goal."""
+    reached: float = 0.3
+    """A point is reached within this many metres."""
+    found: float = 1.0
+    """An object is found within this many metres of its outline, in its room."""
+
+    def __post_init__(self) -> None:
+        if self.task not in TASKS:
+            raise ValueError(f"task is {self.task!r}; use one of {TASKS}")
+        if any(name not in PIXELS for name in self.sees) or len(set(self.sees)) < len(self.sees):
+            raise ValueError(f"sees should be some of {PIXELS}, each once, got {self.sees!r}")
+        if not (8 <= self.height <= 2048 and 8 <= self.width <= 2048 and 0 < self.vfov < math.pi):
+            raise ValueError(
+                f"a view of {self.height} x {self.width} pixels and {self.vfov} radians; sides need 8 to 2048 pixels, "
+                "the angle more than 0 and less than pi"
+            )
+        if not (self.control >= CONTROL and self.seconds >= self.control and 0 <= self.nearest < self.farthest):
+            raise ValueError(
+                f"control is {self.control} s of {self.seconds} s, goals are {self.nearest} to {self.farthest} m away; "
+                f"control needs at least {CONTROL} s, and the first of each pair to be the smaller"
+            )
+
+    @property
+    def numbers(self) -> int:
+        """Of an action: ahead, left, and, to find, whether it is here; each from -1 to 1."""
+        return 3 if self.task == "find" else 2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one command."""
+
+    reward: float
+    ended: str | None
+    """'reached', 'said' or 'limit'; None while it goes on."""
+    facts: Mapping[str, float]
+    """success, spl, bumps, metres, seconds and the distance that is left, all since the episode began."""
+
+
+class Driving:
+    """Owns the physics and the pictures of some houses, and plays one episode at a time."""
+
+    def __init__(self, worlds: Mapping[str, World], settings: DriveSettings) -> None:
+        """
+        Args:
+          worlds: by House.name, lit or not; what draws them is opened when an episode plays there.
+
+        Raises:
+          ValueError: no worlds.
+        """
+        if not worlds:
+            raise ValueError("there are no houses to drive in; choose another split")
+        self.worlds, self.settings = dict(worlds), settings
+        self._names = sorted(self.worlds)
+        self._stages: OrderedDict[str, tuple[Driver, FloorWays]] = OrderedDict()
+        self.request = ""
+
+    def reset(self, rng: np.random.Generator, world: str | None = None) -> None:
+        """Put the body somewhere with something to do.
+
+        Raises:
+          KeyError: no such world.
+          ValueError: the house has no goal as far away as the settings want.
+        """
+        name = self._names[int(rng.integers(len(self._names)))] if world is None else world
+        self.world, s = self.worlds[name], self.settings
+        if name not in self._stages:
+            self._stages[name] = Driver(self.world.house, self.world.catalogue), FloorWays(self.world.house)
+        self._stages.move_to_end(name)
+        if len(self._stages) > KEPT:
+            self.worlds[self._stages.popitem(last=False)[0]].close()
+        self.driver, self._ground = self._stages[name]
+        start = self._draw(rng)
+        x, y = self._ground.xy[start]
+        height = self.world.house.storeys[0].elevation + EYE
+        self.driver.place(np.array([x, y, height]), float(rng.uniform(-math.pi, math.pi)))
+        self.shortest = max(self._ways.length(start) - (s.reached if s.task == "reach" else 0.0), 0.0)
+        """Metres that the best driver needs."""
+        self._left = self.left
+        self.metres = self.seconds = 0.0
+        self.bumps: list[str] = []
+        self.touched, self.ended, self._wide = False, None, None
+
+    def step(self, action: Sequence[float] | np.ndarray) -> Outcome:
+        """Hold a command: `settings.numbers` numbers from -1 to 1.
+
+        Raises:
+          ValueError: another number of numbers, or something that is none.
+          RuntimeError: the episode is over.
+        """
+        s, command = self.settings, np.asarray(action, dtype=np.float64).reshape(-1)
+        if len(command) != s.numbers or not np.isfinite(command).all():
+            raise ValueError(f"an action should be {s.numbers} finite numbers from -1 to 1, got {action!r}")
+        if self.ended is not None:
+            raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
+        command = np.clip(command, -1.0, 1.0)
+        periods = max(1, round(s.control / CONTROL))
+        rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
+        self.metres += rolled.metres
+        self.seconds += periods * CONTROL
+        self.bumps += rolled.bumps
+        self.touched = rolled.touched
+        before, self._left = self._left, self.left
+        near = self.is_there
+        if s.task == "reach" and near:
+            self.ended = "reached"
+        elif s.task == "find" and command[2] > SAID:
+            self.ended = "said"
+        elif self.seconds >= s.seconds - 1e-9:
+            self.ended = "limit"
+        success = float(near and self.ended in ("reached", "said"))
+        reward = success - STEP_COST - BUMP_COST * len(rolled.bumps) + PER_METRE * (before - self._left)
+        return Outcome(reward, self.ended, self._facts(success))
+
+    @property
+    def left(self) -> float:
+        """Metres to drive to the nearest goal from here, over the grid."""
+        return float(self._ways.metres[self._ground.cell_at(self.driver.position)])
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it is where it should be, said or not."""
+        if self.settings.task == "reach":
+            return bool(np.linalg.norm(self._goal - self.driver.position) <= self.settings.reached)
+        return self._ways.metres[self._ground.cell_at(self.driver.position)] == 0.0
+
+    @property
+    def direction(self) -> np.ndarray:
+        """(3,) float32: metres to the goal as the crow flies, sine and cosine of where, left positive (reach)."""
+        offset = self._goal - self.driver.position
+        aside = float(wrap(math.atan2(offset[1], offset[0]) - self.driver.yaw))
+        return np.array([np.linalg.norm(offset), math.sin(aside), math.cos(aside)], np.float32)
+
+    def way(self) -> np.ndarray:
+        """(n, 2) cells of a way to the goal that keeps away from things; for teachers, never for a policy."""
+        if self._wide is None:
+            self._wide = self._ground.wide_ways(self._goals)
+        return self._ground.xy[self._wide.cells(self._ground.cell_at(self.driver.position))]
+
+    def look(self) -> dict[str, np.ndarray]:
+        """What the body knows: pixels, its motion, whether it touches something, and its goal."""
+        found = self._pixels()
+        found["motion"] = np.array(self.driver.motion, np.float32)
+        found["touched"] = np.array([self.touched], np.float32)
+        if self.settings.task == "reach":
+            found["goal"] = self.direction
+        else:
+            found["object"] = np.array([word_number(self._wanted)], np.float32)
+            found["instruction"] = codes_of(self.request, TEXT)
+        return found
+
+    def camera(self) -> Camera:
+        """The body's eye as it is now, upright."""
+        position, axes = self.driver.eye
+        x, y, z = (float(v) for v in -axes[:, 2])
+        return camera_at(position, math.atan2(y, x), math.asin(max(-1.0, min(1.0, z))), self.settings.vfov)
+
+    def picture(self, height: int, width: int) -> np.ndarray:
+        """(height, width, 3) uint8 for people."""
+        return self.world.renderer.rgb(self.camera(), (height, width))
+
+    def close(self) -> None:
+        """Free what draws; a later use opens it again."""
+        for world in self.worlds.values():
+            world.close()
+
+    def _pixels(self) -> dict[str, np.ndarray]:
+        sees, size = self.settings.sees, (self.settings.height, self.settings.width)
+        if not sees:
+            return {}
+        if sees == ("rgb",):
+            return {"rgb": np.ascontiguousarray(self.picture(*size))}
+        view = self.world.renderer.through(self.camera(), size)
+        whole = {"rgb": view.rgb, "depth": np.minimum(view.depth, np.float32(FAR)), "ids": view.ids}
+        return {name: np.ascontiguousarray(whole[name]) for name in sees}
+
+    def _facts(self, success: float) -> dict[str, float]:
+        """SPL as (4.17), of metres (docs/sources.md, S125)."""
+        longer = max(self.metres, self.shortest)
+        return {
+            "success": success,
+            "spl": success * (self.shortest / longer if longer > 0 else 1.0),
+            "bumps": float(len(self.bumps)),
+            "metres": self.metres,
+            "seconds": self.seconds,
+            "left": self._left,
+        }
+
+    def _draw(self, rng: np.random.Generator) -> int:
+        """Choose goal and start, and the ways between; returns the start's cell."""
+        s = self.settings
+        for goals in self._points(rng) if s.task == "reach" else self._objects(rng):
+            self._goals, self._ways = goals, self._ground.ways(goals)
+            far = self._ways.metres
+            if len(starts := np.flatnonzero((far >= s.nearest) & (far <= s.farthest))):
+                return int(rng.choice(starts))
+        raise ValueError(
+            f"house {self.world.name!r} has no goal for {s.task!r} that is {s.nearest} to {s.farthest} m to drive "
+            "away; choose other distances"
+        )
+
+    def _points(self, rng: np.random.Generator) -> Iterator[np.ndarray]:
+        """Cells, one by one."""
+        self.request = "go there"
+        for cell in rng.integers(len(self._ground.xy), size=POINTS):
+            self._goal = self._ground.xy[cell]
+            yield np.array([cell])
+
+    def _objects(self, rng: np.random.Generator) -> Iterator[np.ndarray]:
+        """Cells near all objects of a class, in their rooms; class by class in a drawn order."""
+        ground, things = self._ground, self.world.house.placements
+        classes = sorted({p.object_class for p in things} - NOT_OBJECTS)
+        for k in rng.permutation(len(classes)):
+            self._wanted, near = classes[k], np.zeros(len(ground.xy), bool)
+            self.request = f"find {with_article(self._wanted)}"[:TEXT]
+            for p in things:
+                if p.object_class == self._wanted:
+                    close = footprint_distance(p, ground.xy) <= self.settings.found
+                    near |= close & (ground.room_of_cell == p.room)
+            if near.any():
+                yield np.flatnonzero(near)
+
+
+def guided(driving: Driving) -> np.ndarray:
+    """The command of somebody who knows the house and the goal: along a wide way, and 'here' when it is."""
+    way, here = driving.way(), driving.driver.position
+    to = way[min(AHEAD, len(way) - 1)] - here
+    error = float(wrap(math.atan2(to[1], to[0]) - driving.driver.yaw))
+    ahead = 0.0 if abs(error) > 0.4 else min(1.0, 0.2 + float(np.linalg.norm(way[-1] - here))) * math.cos(error) ** 4
+    command = [ahead, float(np.clip(2.0 * error, -1.0, 1.0)), float(driving.is_there)]
+    return np.array(command[: driving.settings.numbers], np.float32)

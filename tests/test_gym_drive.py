@@ -1,0 +1,155 @@
+"""Driving: what is seen is where the body is, experts arrive, walls hold, and both interfaces say the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from gymnasium.utils.env_checker import check_env
+from handmade import HandCatalogue, furnished
+
+from embodied.gym import suite
+from embodied.gym.drive import DriveEnv, make
+from embodied.gym.driving import DriveSettings, Driving, guided
+from embodied.gym.floor_ways import FloorWays
+from embodied.world import open_world
+
+SMALL = {"height": 32, "width": 32, "farthest": 5.0}
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    with open_world(furnished(two_rooms()), HandCatalogue(), tmp_path_factory.mktemp("drive"), size=32) as w:
+        yield w
+
+
+def env_of(world, **settings) -> DriveEnv:
+    return DriveEnv(Driving({world.name: world}, DriveSettings(**{**SMALL, **settings})))
+
+
+def test_ways_over_free_floor_are_straight_lines_and_others_are_longer(world):
+    ground = FloorWays(world.house)
+    rng = np.random.default_rng(0)
+    for goal in rng.integers(len(ground.xy), size=8):
+        ways = ground.ways(np.array([goal]))
+        starts = rng.integers(len(ground.xy), size=20)
+        lengths = np.array([ways.length(int(s)) for s in starts])
+        straight = np.linalg.norm(ground.xy[starts] - ground.xy[goal], axis=1)
+        free = ground.is_free(ground.xy[goal], ground.xy[starts])
+        assert np.allclose(lengths[free], straight[free], rtol=0.03, atol=1e-6)
+        assert (lengths >= straight - 1e-9).all() and (lengths <= ways.metres[starts] + 1e-9).all()
+
+
+@pytest.mark.parametrize("task", ["reach", "find"])
+def test_gymnasium_accepts_the_environment(world, task):
+    check_env(env_of(world, task=task, sees=("rgb", "depth", "ids")), skip_render_check=True)
+
+
+def test_depth_straight_ahead_is_how_far_the_wall_is(world):
+    env = env_of(world, sees=("rgb", "depth"))
+    env.reset(seed=0)
+    driving = env.driving
+    for x in (3.0, 4.0):
+        driving.driver.place(np.array([x, 3.0, 1.5]), 0.0)
+        eye = driving.driver.eye[0]
+        seen = driving.look()
+        assert np.allclose(eye[:2], [x, 3.0], atol=0.02)
+        far = float(np.median(seen["depth"][15:17, 15:17]))
+        driving.driver.place(np.array([x - 0.5, 3.0, 1.5]), 0.0)
+        assert float(np.median(driving.look()["depth"][15:17, 15:17])) == pytest.approx(far + 0.5, abs=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["reach", "find"])
+def test_whoever_knows_the_way_arrives_without_a_bump(world, task):
+    env = env_of(world, task=task, sees=())
+    for seed in range(6):
+        env.reset(seed=seed)
+        ended = False
+        while not ended:
+            _, _, terminated, truncated, info = env.step(guided(env.driving))
+            ended = terminated or truncated
+        assert info["success"] == 1.0 and info["bumps"] == 0 and info["spl"] > 0.75, (seed, info)
+
+
+def test_a_wall_stops_the_body_and_is_counted_once(world):
+    env = env_of(world, sees=())
+    env.reset(seed=1)
+    env.driving.driver.place(np.array([4.0, 3.0, 1.5]), 0.0)
+    steps = [env.step(np.array([1.0, 0.0])) for _ in range(30)]
+    assert 1 <= steps[-1][-1]["bumps"] <= 3 and env.driving.driver.position[0] < 5.0
+    assert steps[0][0]["touched"][0] == 0.0 and any(o["touched"][0] for o, *_ in steps[-10:])
+
+
+def test_time_is_up_or_the_wrong_thing_is_said(world):
+    env = env_of(world, task="find", sees=(), seconds=1.0)
+    env.reset(seed=3)
+    ends = [env.step(np.zeros(3)) for _ in range(10)]
+    assert [e[3] for e in ends] == [False] * 9 + [True] and ends[-1][4]["success"] == 0.0
+    with pytest.raises(RuntimeError, match="over .limit.; reset"):
+        env.step(np.zeros(3))
+    env.reset(seed=3)
+    _, reward, terminated, _, info = env.step(np.array([0.0, 0.0, 1.0]))
+    assert terminated and info["success"] == info["spl"] == 0.0 and reward < 0.05
+
+
+def test_dm_env_and_gymnasium_play_the_same_episode(world):
+    env = env_of(world, sees=("rgb",))
+    other = suite.load(
+        "drive",
+        "reach",
+        task_kwargs={"random": 5, **SMALL, "sees": ("rgb",)},
+        environment_kwargs={"worlds": {world.name: world}},
+    )
+    o, _ = env.reset(seed=5)
+    step, rng = other.reset(), np.random.default_rng(0)
+    assert step.first() and set(step.observation) == set(other.observation_spec())
+    for _ in range(12):
+        for name, spec in other.observation_spec().items():
+            spec.validate(step.observation[name])
+            assert np.array_equal(step.observation[name], o[name])
+        action = rng.uniform(-1, 1, 2).astype(np.float32)
+        other.action_spec().validate(action)
+        o, reward, *_ = env.step(action)
+        step = other.step(action)
+        assert step.reward == reward and step.discount == 1.0
+
+
+def test_arriving_ends_a_dm_env_episode_and_the_next_step_begins_another(world):
+    there = {"worlds": {world.name: world}}
+    env = suite.load("drive", "reach", task_kwargs={"random": 2, **SMALL, "sees": ()}, environment_kwargs=there)
+    step = env.reset()
+    while not step.last():
+        step = env.step(guided(env.driving))
+    assert step.discount == 0.0 and step.reward > 0.9 and env.facts["success"] == 1.0
+    assert env.step(np.zeros(2)).first() and env.control_timestep() == 0.1
+
+
+def test_wishes_that_cannot_be_had_are_refused(world):
+    wrong = [
+        {"task": "fly"},
+        {"sees": ("smell",)},
+        {"height": 0},
+        {"vfov": math.pi},
+        {"control": 0.0},
+        {"nearest": 9.0},
+    ]
+    for settings in wrong:
+        with pytest.raises(ValueError, match=r"use one of|should be|need"):
+            make(worlds={world.name: world}, **settings)
+    with pytest.raises(ValueError, match="no houses"):
+        make(worlds={})
+    with pytest.raises(ValueError, match="there is no environment 'drive' 'fly'"):
+        suite.load("drive", "fly")
+    env = env_of(world, nearest=40.0, farthest=50.0)
+    with pytest.raises(ValueError, match="no goal for 'reach'"):
+        env.reset(seed=0)
+    env = env_of(world, sees=())
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="2 finite numbers"):
+        env.step(np.array([1.0, 0.0, 1.0]))
+    with pytest.raises(ValueError, match="2 finite numbers"):
+        env.step(np.array([np.nan, 0.0]))
