@@ -51,7 +51,7 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
             raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
         self.driving, self.render_mode = driving, render_mode
         self.action_space: spaces.Box = spaces.Box(-1.0, 1.0, (driving.settings.numbers,), np.float32)
-        self.observation_space = seen_space(driving.settings)
+        self.observation_space = spaces.Dict({**seen_space(driving.settings)})
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -78,10 +78,10 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
         self.driving.close()
 
 
-def seen_space(s: DriveSettings) -> spaces.Dict:
-    """The space of `Driving.look`."""
+def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
+    """The spaces of what `Driving.look` returns."""
     shape = (s.height, s.width)
-    pixels: dict[str, spaces.Space] = {
+    pixels: dict[str, spaces.Box] = {
         "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
         "depth": spaces.Box(0.0, FAR, shape, np.float32),
         "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
@@ -95,7 +95,7 @@ def seen_space(s: DriveSettings) -> spaces.Dict:
     else:
         whole["object"] = spaces.Box(0.0, LARGE, (1,), np.float32)
         whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
-    return spaces.Dict(whole)
+    return whole
 
 
 def make(*, render_mode: str | None = None, **options: Any) -> DriveEnv:

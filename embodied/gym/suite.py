@@ -74,7 +74,7 @@ class DriveEnvironment(dm_env.Environment):
         return specs.BoundedArray((self.driving.settings.numbers,), np.float32, -1.0, 1.0, "velocities")
 
     def observation_spec(self) -> dict[str, specs.BoundedArray]:
-        spaces = seen_space(self.driving.settings).spaces
+        spaces = seen_space(self.driving.settings)
         return {n: specs.BoundedArray(s.shape, s.dtype, s.low, s.high, n) for n, s in spaces.items()}
 
     def control_timestep(self) -> float:
