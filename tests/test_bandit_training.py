@@ -14,17 +14,18 @@ import torch
 
 from agents.bandit import corpus, libreoffice
 from agents.bandit.config import RUN_FORMAT, BanditConfig
-from agents.bandit.corpus import CorpusError, Pair, Sizes
-from agents.bandit.network import Critic, Translator, begin
+from agents.bandit.corpus import CorpusError, Pair, Sizes, pairs_of
+from agents.bandit.network import Critic, EncoderDecoder, Translator, begin
 from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
-from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct, run_study
+from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct, folder_of, history, run_study
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
 from agents.imitation.checkpoint import CheckpointError, read_checkpoint
 from agents.imitation.decoding import drawn_with
 from agents.imitation.runs import Run
+from agents.imitation.studies import history_of
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
@@ -226,13 +227,40 @@ def test_padding_changes_nothing():
     assert not translator(padded(SOURCE), padded(said))[1, 2:].any()
 
 
+def word_by_word(network: EncoderDecoder, source: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    """What `read` computes, by `step` and automatic differentiation."""
+    encoded, now = network.encode(source)
+    before, outputs = torch.cat([torch.full_like(target[:, :1], END_NUMBER), target[:, :-1]], 1), []
+    for words in before.unbind(1):
+        now = network.step(encoded, now, network.word_before(words))
+        outputs.append(now.output)
+    return torch.stack(outputs, 1)
+
+
+def test_the_gradient_by_hand_is_the_automatic_one():
+    network = networks()[0].body.double()
+    with torch.no_grad():
+        for p in network.parameters():
+            p.mul_(5)
+    source, target = padded(SOURCE), padded([[7, 2], [3, 3, 3, 4, 2], [5, 6, 2]])
+    weights = torch.from_numpy(stream(0, "w").normal(size=(3, 5, 16)))
+    found = []
+    by_hand, places = network.read(source, target)
+    assert sorted(places.tolist()) == (target.flatten() != PAD_NUMBER).nonzero()[:, 0].tolist()
+    for outputs in (by_hand, word_by_word(network, source, target).flatten(0, 1)[places]):
+        network.zero_grad()
+        (outputs * weights.flatten(0, 1)[places]).sum().backward()
+        found.append((outputs.detach(), {n: p.grad.clone() for n, p in network.named_parameters()}))
+    assert torch.allclose(found[0][0], found[1][0], atol=1e-12)
+    assert all(torch.allclose(found[0][1][n], g, atol=1e-12) and g.abs().max() > 1e-6 for n, g in found[1][1].items())
+
+
 def test_log_probabilities_sum_to_one_over_the_next_word():
     translator, _ = networks()
     total = sum(translator(padded([SOURCE[0]]), torch.tensor([[5, w]]))[0, 1].exp() for w in range(1, 9))
     # word 0 is padding and never said, but the softmax gives it its share
-    nothing = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]])))[0, 1].softmax(-1)[
-        PAD_NUMBER
-    ]
+    outputs, _ = translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]]))
+    nothing = translator.out(outputs)[1].softmax(-1)[PAD_NUMBER]
     assert float((total + nothing).detach()) == pytest.approx(1.0, abs=1e-5)
 
 
@@ -249,7 +277,7 @@ def test_samples_follow_the_distribution():
     translator, _ = networks()
     n = 4000
     first = [s[0] for s in decode(translator, padded([SOURCE[0]] * n), drawn_with(stream(1, "u").random((n, 1))), 1)]
-    logits = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[3]])))[0, 0]
+    logits = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[3]]))[0])[0]
     logits[PAD_NUMBER] = -torch.inf
     wanted = logits.softmax(-1).detach().numpy()
     assert np.abs(np.bincount(first, minlength=9) / n - wanted).max() < 4 * np.sqrt(0.25 / n)
@@ -350,6 +378,28 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")} == first
     with pytest.raises(ValueError, match="unknown studies"):
         run_study(setting, ["9.9"], note=silent)
+    text = run_study(setting, ["held-out"], note=silent)["held-out"].read_text()
+    assert "| entropy | 2 |" in text
+    for seed in (0, 1):
+        job = Job("full", "supervised")
+        folder = folder_of(setting, seed, job)
+        found = json.loads((folder / "behaviour.json").read_text())
+        assert found["BLEU"] == pytest.approx(history(setting, seed, job)[0]["held-out BLEU"])
+        assert 0 < found["entropy"] < np.log(TOY.target_words) and found["perplexity"] > 1
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"history": 3}', '{"history": [3]}'])
+def test_a_damaged_result_is_named(tmp_path, text):
+    (tmp_path / "result.json").write_text(text)
+    with pytest.raises(ValueError, match="result.json"):
+        history_of(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"splits": {"dev": 3}}', '{"splits": {"dev": {"documents": 3}}}'])
+def test_a_damaged_corpus_file_is_named(tmp_path, text):
+    (tmp_path / "corpus.json").write_text(text)
+    with pytest.raises(CorpusError, match="corpus.json.*make the corpus again"):
+        pairs_of(tmp_path)
 
 
 def test_runs_that_two_studies_share_are_made_once():

@@ -7,7 +7,6 @@ and corpus.json, which says where it came from. Own files work as well if they h
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from pathlib import Path
 
 from agents.bandit.sizes import Sizes
 from assets.cache import digest, write_bytes, write_json
+from embodied.records import RecordError, from_plain, read_json
 from embodied.seeds import stream
 
 SOURCE, TARGET = "de", "en"
@@ -117,6 +117,24 @@ def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) ->
     write_json(folder / "corpus.json", {"format": FORMAT, **facts, "splits": counts}, indent=1)
 
 
+def pairs_of(folder: Path) -> dict[str, int]:
+    """How many pairs each split has, as corpus.json says; nothing where there is none (files of one's own).
+
+    Raises:
+      CorpusError: corpus.json is damaged.
+    """
+    path = Path(folder) / "corpus.json"
+    if not path.exists():
+        return {}
+    try:
+        splits = from_plain(dict[str, dict[str, float]], read_json(path).get("splits"), f"{path}: splits")
+        return {name: int(counts["pairs"]) for name, counts in splits.items()}
+    except RecordError as e:
+        raise CorpusError(f"{e}; make the corpus again with `embodied corpus`") from e
+    except KeyError as e:
+        raise CorpusError(f"{path}: a split says no {e}; make the corpus again with `embodied corpus`") from e
+
+
 def load(folder: Path, names: Sequence[str], *, longest: int = 50) -> Corpus:
     """The splits in `names`; sentences of more than `longest` words on either side are left out (3.1.5).
 
@@ -194,5 +212,5 @@ def make_corpus(
     kept = filtered(pairs)
     note(f"{len(pairs)} pairs, {len(kept)} after the filter, in {len({p.document for p in kept})} documents")
     save(split(kept, sizes, seed=seed), folder, seed=seed, sizes=vars(sizes), pairs=len(kept), **facts)
-    for name, counts in json.loads((Path(folder) / "corpus.json").read_text())["splits"].items():
+    for name, counts in read_json(Path(folder) / "corpus.json")["splits"].items():
         note(f"{name}: " + ", ".join(f"{v} {k}" for k, v in counts.items()))

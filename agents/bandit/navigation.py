@@ -8,9 +8,8 @@ what a critic expected. Decisions are words there; here they are moves, stopping
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -223,11 +222,3 @@ def _learn_once(
 def fingerprint(agent: HannaAgent) -> str:
     """Of an agent's weights."""
     return digest(*(v.detach().cpu().numpy().tobytes() for _, v in sorted(agent.network.state_dict().items())))
-
-
-def read_history(folder: Path) -> list[dict[str, float]]:
-    """What `learn_from_stars` wrote of each update."""
-    return json.loads((Path(folder) / "result.json").read_text())["history"]
-
-
-Judge = Callable[[HannaAgent], Sequence[Episode]]

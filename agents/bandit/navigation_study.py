@@ -54,6 +54,8 @@ class NavigationSetting:
     tasks: int | None = None
     """Judge on at most so many tasks."""
     threads: int = 1
+    judgings: int = 3
+    """How often each task is judged, each time with another seed: agents draw what they do."""
 
 
 def raters() -> dict[str, Rater]:
@@ -101,15 +103,29 @@ def _learn(setting: NavigationSetting, split: Split, name: str, seed: int, note:
 def _judge(setting: NavigationSetting, split: Split, name: str | None, seed: int | None, note: Note) -> None:
     """Play the tasks to be judged on, as `embodied judge` does, and keep the episodes."""
     folder = _folder(setting, name, seed)
-    path = folder / "episodes.jsonl"
-    if path.exists():
+    missing = [k for k in range(setting.judgings) if not _episodes_file(folder, k).exists()]
+    if not missing:
         return
     agent: HannaAgent = load_agent(setting.agent if name is None else folder / "agent.safetensors")
-    with torch.inference_mode():
-        episodes = play(split.make_env, agent.policy(split.bank), spread(split.tasks, setting.tasks), seed=0, batch=32)
-    save_lines(path, episodes)
-    success = np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes])
-    note(f"{folder}: success {100 * success:.1f} % on {len(episodes)} tasks of {setting.split}")
+    policy, tasks = agent.policy(split.bank), spread(split.tasks, setting.tasks)
+    for k in missing:
+        with torch.inference_mode():
+            episodes = play(split.make_env, policy, tasks, seed=k, batch=32)
+        save_lines(_episodes_file(folder, k), episodes)
+        success = np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes])
+        note(
+            f"{folder}: success {100 * success:.1f} % on {len(episodes)} tasks of {setting.split}, judged with seed {k}"
+        )
+
+
+def _episodes_file(folder: Path, judging: int) -> Path:
+    return folder / f"episodes_{judging}.jsonl"
+
+
+def _judged(setting: NavigationSetting, folder: Path) -> list[Episode]:
+    """The episodes of all judgings, one after the other; none if one is missing."""
+    paths = [_episodes_file(folder, k) for k in range(setting.judgings)]
+    return [e for path in paths for e in load_lines(path, Episode)] if all(p.exists() for p in paths) else []
 
 
 def values(episodes: Sequence[Episode], split: Split) -> dict[str, np.ndarray]:
@@ -129,14 +145,14 @@ def gain(after: Sequence[np.ndarray], before: np.ndarray, houses: Sequence[str])
 
 
 def _write(setting: NavigationSetting, split: Split) -> Path:
-    first = list(load_lines(_folder(setting, None, None) / "episodes.jsonl", Episode))
+    first = _judged(setting, _folder(setting, None, None))
     houses, before = [e.task.world for e in first], values(first, split)
     found: dict[str, dict[str, Estimate]] = {}
     each: dict[str, list[float]] = {}
     for name in raters():
-        paths = [_folder(setting, name, seed) / "episodes.jsonl" for seed in setting.seeds]
-        if all(p.exists() for p in paths):
-            after = [values(list(load_lines(p, Episode)), split) for p in paths]
+        judged = [_judged(setting, _folder(setting, name, seed)) for seed in setting.seeds]
+        if all(judged):
+            after = [values(episodes, split) for episodes in judged]
             found[name] = {c: gain([a[c] for a in after], before[c], houses) for c in COLUMNS}
             each[name] = [float((a["success"] - before["success"]).mean()) for a in after]
     base = {c: estimate(before[c].tolist(), houses) for c in COLUMNS}
@@ -187,7 +203,8 @@ def _markdown(
     c = setting.config
     how = (
         f"Before: success {shown(base['success'])} %, nDTW {shown(base['nDTW'])}, {shown(base['requests'])} requests, "
-        f"on {base['success'].n} tasks in {houses} houses ({setting.split}). {c.updates} updates of {c.batch} "
+        f"on {base['success'].n // setting.judgings} tasks in {houses} houses ({setting.split}), each judged "
+        f"{setting.judgings} times. {c.updates} updates of {c.batch} "
         f"episodes, each rated once by its {c.score}; learning rate {c.learning_rate:g}; seeds "
         f"{', '.join(map(str, setting.seeds))}. Differences are task by task, averaged over seeds; intervals 95 %, "
         "clustered by house."

@@ -12,6 +12,7 @@ from typing import TypeVar
 import torch
 from torch import Tensor, nn
 
+from agents.bandit.decoder import Outputs, packing
 from agents.bandit.words import END_NUMBER, PAD_NUMBER
 
 Network = TypeVar("Network", bound=nn.Module)
@@ -85,15 +86,19 @@ class EncoderDecoder(nn.Module):
         """What known words (...) int64 add to the gates, (..., 4h); END stands before the first one."""
         return self.word_gates(self.target(words))
 
-    def read(self, source: Tensor, target: Tensor) -> Tensor:
-        """h^dec before each word of `target` (B, T), whose words are given (teacher forcing): (B, T, h)."""
+    def read(self, source: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        """h^dec before each word of `target` (B, T), whose words are given (teacher forcing).
+
+        Returns:
+          (N, h) of the N words, and (N,) their places in the flat (B, T).
+        """
+        packed = packing(target != PAD_NUMBER)
         encoded, now = self.encode(source)
         begin = torch.full_like(target[:, :1], END_NUMBER)
-        outputs = []
-        for gates in self.word_before(torch.cat([begin, target[:, :-1]], 1)).unbind(1):
-            now = self.step(encoded, now, gates)
-            outputs.append(now.output)
-        return torch.stack(outputs, 1)
+        gates = self.word_before(torch.cat([begin, target[:, :-1]], 1).flatten()[packed.places])
+        weights = self.gates.weight, self.combine.weight
+        given = gates, encoded.states, encoded.keys, now.hidden, now.cell
+        return Outputs.apply(packed, encoded.mask, *given, *weights), packed.places
 
 
 class Translator(nn.Module):
@@ -106,10 +111,9 @@ class Translator(nn.Module):
 
     def forward(self, source: Tensor, target: Tensor) -> Tensor:
         """log P(y_t | y_<t, x), (B, T), zero on padding."""
-        said = target != PAD_NUMBER
-        logits = self.out(self.body.read(source, target)[said])  # (words, V)
-        loss = nn.functional.cross_entropy(logits, target[said], reduction="none")  # A.2
-        return torch.zeros(target.shape).masked_scatter(said, -loss)
+        outputs, places = self.body.read(source, target)
+        loss = nn.functional.cross_entropy(self.out(outputs), target.flatten()[places], reduction="none")  # A.2
+        return spread(-loss, places, target)
 
 
 class Critic(nn.Module):
@@ -121,8 +125,14 @@ class Critic(nn.Module):
         self.out = nn.Linear(size, 1, bias=False)
 
     def forward(self, source: Tensor, target: Tensor) -> Tensor:
-        """The rating to be expected before each word, (B, T)."""
-        return self.out(self.body.read(source, target))[..., 0]
+        """The rating to be expected before each word, (B, T), zero on padding."""
+        outputs, places = self.body.read(source, target)
+        return spread(self.out(outputs)[:, 0], places, target)
+
+
+def spread(numbers: Tensor, places: Tensor, target: Tensor) -> Tensor:
+    """(N,) numbers at their places in a (B, T) of zeros."""
+    return numbers.new_zeros(target.numel()).index_copy(0, places, numbers).view(target.shape)
 
 
 def begin(network: Network, generator: torch.Generator) -> Network:

@@ -1,4 +1,4 @@
-"""Table 3.2 and Figures 3.4 and 3.5 on a small corpus: run what is missing, put it beside the dissertation's numbers.
+"""Table 3.2, Figures 3.4 and 3.5, and how learners behave on held-out sentences: run what is missing, make the page.
 
 A study is a folder: `seed_N/pretrain`, `seed_N/full` and `seed_N/weak` with a critic and one folder
 per learner and rater. Runs that tables share are made once, and everything goes on where it stopped.
@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 
+from agents.bandit.behaviour import COLUMNS, behaviour, translator_of_run
 from agents.bandit.config import BanditConfig
+from agents.bandit.corpus import pairs_of
 from agents.bandit.figures import curves_figure, gains_figure
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
@@ -32,6 +33,7 @@ from agents.imitation.studies import (
 )
 from assets.cache import write_json
 from embodied.evaluation.tables import Estimate, across_seeds
+from embodied.records import read_json
 
 Note = Callable[[str], None]
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
@@ -89,6 +91,10 @@ def table_jobs() -> list[Job]:
     return [Job(reference, learner) for reference in REFERENCES for learner in LEARNERS]
 
 
+def held_out_jobs() -> list[Job]:
+    return [Job("full", learner) for learner in LEARNERS]
+
+
 def curve_jobs() -> list[Job]:
     return [Job("full", "reference"), Job("full", "a2c", passes=PASSES)]
 
@@ -98,7 +104,12 @@ def sweep_jobs(sweeps: Mapping[str, Sequence[float]] = SWEEPS) -> list[Job]:
     return [Job("full", "reference"), Job("full", "a2c"), *(Job("full", "a2c", rater) for rater in raters)]
 
 
-STUDIES: Mapping[str, Callable[[], list[Job]]] = {"3.2": table_jobs, "3.4": curve_jobs, "3.5": sweep_jobs}
+STUDIES: Mapping[str, Callable[[], list[Job]]] = {
+    "3.2": table_jobs,
+    "3.4": curve_jobs,
+    "3.5": sweep_jobs,
+    "held-out": held_out_jobs,
+}
 
 
 def run_study(
@@ -132,7 +143,7 @@ def distinct(jobs: Sequence[Job]) -> list[Job]:
 
 def report(setting: BanditStudySetting, names: Sequence[str]) -> dict[str, Path]:
     """Write the tables and figures of runs that are there; sweeps show the settings that all seeds have."""
-    writers = {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps}
+    writers = {"3.2": _write_table, "3.4": _write_curves, "3.5": _write_sweeps, "held-out": _write_held_out}
     return write_all(names, {name: functools.partial(write, setting) for name, write in writers.items()})
 
 
@@ -158,9 +169,13 @@ def folder_of(setting: BanditStudySetting, seed: int, job: Job) -> Path:
     return setting.out / f"seed_{seed}" / job.reference / job.name
 
 
+_material = functools.lru_cache(maxsize=8)(material)
+"""Corpora in numbers of the seeds at hand: reading one takes as long as many updates."""
+
+
 def _prepare(setting: BanditStudySetting, seed: int, references: Sequence[str], note: Note) -> str:
     torch.set_num_threads(setting.threads)
-    m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
+    m, home = _material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
     pretrain(m, home / "pretrain", note=note)
     for reference in references:
         teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference / "critic", note=note)
@@ -170,7 +185,7 @@ def _prepare(setting: BanditStudySetting, seed: int, references: Sequence[str], 
 def _run(setting: BanditStudySetting, seed: int, job: Job, note: Note) -> str:
     if not history(setting, seed, job):
         torch.set_num_threads(setting.threads)
-        m, home = material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
+        m, home = _material(setting.data, dataclasses.replace(setting.config, seed=seed)), setting.out / f"seed_{seed}"
         bandit(
             m,
             home / "pretrain" / f"{job.reference}.safetensors",
@@ -252,6 +267,40 @@ def _write_sweeps(setting: BanditStudySetting) -> Path:
     return _markdown(setting, "figure_3.5.md", title, table(heads, rows), missing)
 
 
+def _write_held_out(setting: BanditStudySetting) -> Path:
+    """Of each learner after its first pass, on the test set."""
+    jobs = held_out_jobs()
+    found = {seed: [_behaviour(setting, seed, job) for job in jobs] for seed in done(setting, *jobs)}
+    seeds = [seed for seed, row in found.items() if all(row)]
+    if not seeds:
+        raise ValueError(f"{setting.out}: no seed has the three learners after one pass; run it without --report")
+    each = {job.learner: [found[seed][i] for seed in seeds] for i, job in enumerate(jobs)}
+    base = each["reference"]
+    rows = []
+    for column in COLUMNS:
+        cells = [shown(across_seeds([b[column] for b in base]), 3)]
+        for learner in LEARNERS[1:]:
+            differences = [a[column] - b[column] for a, b in zip(each[learner], base, strict=True)]
+            cells.append(shown(across_seeds(differences), 3))
+        rows.append([column, str(len(seeds)), *cells])
+    write_json(setting.out / "held_out.json", each, indent=1)
+    title = "Held-out sentences: how learners translate them after one round of ratings"
+    heads = ["", "seeds", "reference", "Δ supervised", "Δ NED-A2C"]
+    return _markdown(setting, "held_out.md", title, table(heads, rows))
+
+
+def _behaviour(setting: BanditStudySetting, seed: int, job: Job) -> Mapping[str, float]:
+    """How the translator of a run behaves after one pass; nothing if that was not asked for before it went on."""
+    folder = folder_of(setting, seed, job)
+    path = folder / "behaviour.json"
+    if not path.exists():
+        if len(history_of(folder)) > 1:
+            return {}
+        m = _material(setting.data, dataclasses.replace(setting.config, seed=seed))
+        write_json(path, behaviour(translator_of_run(m, folder), m, "test"), indent=1)
+    return read_json(path)
+
+
 def _clean_gains(setting: BanditStudySetting, job: Job) -> list[float]:
     """What the clean rater gave the seeds that have `job`."""
     base, clean = Job(job.reference, "reference"), Job(job.reference, "a2c")
@@ -263,12 +312,8 @@ def _markdown(
     setting: BanditStudySetting, name: str, title: str, lines: Sequence[str], missing: Sequence[str] = ()
 ) -> Path:
     c = setting.config
-    splits = (
-        json.loads((setting.data / "corpus.json").read_text())["splits"]
-        if (setting.data / "corpus.json").exists()
-        else {}
-    )
-    sizes = ", ".join(f"{s} {splits[s]['pairs']:,}" for s in ("supervised", c.bandit_set, "dev", "test") if s in splits)
+    counts = pairs_of(setting.data)
+    sizes = ", ".join(f"{s} {counts[s]:,}" for s in ("supervised", c.bandit_set, "dev", "test") if s in counts)
     how = (
         f"Pairs: {sizes}. Hidden size {c.hidden_size}, {c.source_words:,} and {c.target_words:,} {c.units}, "
         f"{c.pretraining_passes} passes of pre-training at {c.pretraining_rate:g}, {c.critic_passes} of the critic, "

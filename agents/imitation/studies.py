@@ -6,7 +6,6 @@ what its jobs are, how one is run, and which rows its tables have; the rest is h
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ import joblib
 from agents.imitation.loop import Note
 from assets.cache import write_bytes
 from embodied.evaluation.tables import Estimate
+from embodied.records import RecordError, read_json
 
 J = TypeVar("J", bound=Hashable)
 
@@ -43,9 +43,20 @@ def run_all(
 
 
 def history_of(folder: Path) -> list[dict[str, Any]]:
-    """What a run of agents.imitation.runs found so far; nothing if it has not begun."""
+    """What a run of agents.imitation.runs found so far; nothing if it has not begun.
+
+    Raises:
+      RecordError: result.json is damaged.
+    """
     path = Path(folder) / "result.json"
-    return json.loads(path.read_text(encoding="utf-8"))["history"] if path.exists() else []
+    if not path.exists():
+        return []
+    found = read_json(path).get("history")
+    if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+        raise RecordError(
+            f"{path} should hold the history of a run, a list of objects; delete its folder to run it again"
+        )
+    return found
 
 
 def seeds_with(seeds: Sequence[int], has: Callable[[int], bool]) -> list[int]:

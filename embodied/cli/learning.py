@@ -249,7 +249,13 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", choices=("3.2", "3.4", "3.5"), metavar="TABLE", help="3.2, 3.4 or 3.5")
+    parser.add_argument(
+        "tables",
+        nargs="+",
+        choices=("3.2", "3.4", "3.5", "held-out"),
+        metavar="TABLE",
+        help="3.2, 3.4, 3.5 or held-out",
+    )
     parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help="corpus of `embodied corpus`")
     parser.add_argument(
         "--out",
@@ -339,6 +345,13 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
     parser.add_argument(
         "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks, from all houses alike"
+    )
+    parser.add_argument(
+        "--judgings",
+        type=whole(),
+        default=3,
+        metavar="N",
+        help="judge every task so often, each time with another seed (default: %(default)s)",
     )
     parser.set_defaults(threads=1)
     add_fields(parser, RatingConfig)

@@ -138,6 +138,7 @@ def run_stars(args: argparse.Namespace) -> list[Path]:
         args.split,
         args.tasks,
         args.threads,
+        args.judgings,
     )
     return [run_navigation_study(setting, args.only, note=note)]
 
