@@ -22,7 +22,7 @@ from torch.autograd.function import once_differentiable
 
 
 @dataclass(frozen=True, eq=False)
-class Packing:
+class WordPacking:
     """How the words of B sentences of up to T words are packed."""
 
     order: Tensor
@@ -40,12 +40,12 @@ class Packing:
             before, at = at, at + count
 
 
-def packing(known: Tensor) -> Packing:
+def packing(known: Tensor) -> WordPacking:
     """Of the words that are True in `known` (B, T) bool; every sentence begins with one and has no gap."""
     lengths = known.sum(1)
     order = lengths.argsort(descending=True, stable=True)
     step, rank = known[order].t().nonzero(as_tuple=True)
-    return Packing(order, tuple(known.sum(0).tolist()), order[rank] * known.shape[1] + step)
+    return WordPacking(order, tuple(known.sum(0).tolist()), order[rank] * known.shape[1] + step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Outputs(torch.autograd.Function):
     """h^dec of each packed word."""
 
     @staticmethod
-    def forward(ctx: Any, packed: Packing, mask: Tensor, *tensors: Tensor) -> Tensor:
+    def forward(ctx: Any, packed: WordPacking, mask: Tensor, *tensors: Tensor) -> Tensor:
         """
         Args:
           mask: (B, S) bool, False on padding of the source.
@@ -109,7 +109,7 @@ class Outputs(torch.autograd.Function):
 
 def _walk(
     walk: _Walk,
-    packed: Packing,
+    packed: WordPacking,
     word_gates: Tensor,
     states: Tensor,
     keys: Tensor,
@@ -139,7 +139,7 @@ def _walk(
 
 def _back(
     walk: _Walk,
-    packed: Packing,
+    packed: WordPacking,
     given: Tensor,
     states: Tensor,
     keys: Tensor,
@@ -176,7 +176,7 @@ def _back(
     return of_gates, of_states, of_keys, of_entered[:, size:].contiguous(), of_cell, *of_weights
 
 
-def _slopes(walk: _Walk, packed: Packing, begin: Tensor) -> Tensor:
+def _slopes(walk: _Walk, packed: WordPacking, begin: Tensor) -> Tensor:
     """(N, 4h): what a change of each gate's input changes, of the cell but for `leave`, which changes tilde h^dec."""
     size = begin.shape[1]
     enter, forget, leave, content = walk.gates.chunk(4, -1)
