@@ -69,6 +69,8 @@ class Story:
             self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
+        elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
+            self.dialogue.append(f"**Teacher:** {step.reply.text}")
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step

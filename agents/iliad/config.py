@@ -73,6 +73,14 @@ def mixing_at(config: LearnerConfig, update: int) -> float:
     return max(config.least_mixing, config.mixing * config.anneal_rate ** (update // config.anneal_every))
 
 
+def folder_name(learner: LearnerConfig) -> str:
+    """The folder of a learner: its name and what is not as usual."""
+    if learner.learner != "adel":
+        return learner.learner
+    annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
+    return f"adel_{learner.mixing:g}{annealed}"
+
+
 def as_dict(config: object) -> Mapping[str, object]:
     """Field to value, as it is written into checkpoints and weights."""
     return dataclasses.asdict(config)  # type: ignore[call-overload]

@@ -7,6 +7,7 @@ agents.hanna.run, agents.judging and agents.study.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Mapping
 
 from agents.bandit.config import SCALES as BANDIT_SCALES
@@ -15,6 +16,7 @@ from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
+from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import NETWORKS, VisionConfig
@@ -278,19 +280,34 @@ def add_study_bandit(parser: argparse.ArgumentParser) -> None:
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
 
 
+ONLY_REGEX = tuple(f.name for f in dataclasses.fields(RegexConfig) if f.name not in NavConfig.__dataclass_fields__)
+"""Settings that NAV has not."""
+SHARED_SETTINGS = tuple(n for n in NavConfig.__dataclass_fields__ if n in RegexConfig.__dataclass_fields__)
+
+
 def add_train_iliad(parser: argparse.ArgumentParser) -> None:
     """One world after the other."""
     worlds = parser.add_subparsers(dest="world", metavar="WORLD", required=True)
     regex = worlds.add_parser("regex", help="change words as a request says, by regular expressions")
     _add_iliad(regex)
+    _add_regex_files(regex)
     regex.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
     add_fields(regex, LearnerConfig, scales=LEARNER_SCALES)
     add_fields(regex, RegexConfig, scales=REGEX_SCALES)
+    nav = worlds.add_parser("nav", help="follow routes through houses, on a data set `vln` with features")
+    _add_iliad(nav)
+    add_nav_data(nav, required=True)
+    nav.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    add_fields(nav, LearnerConfig, scales=NAV_LEARNER_SCALES)
+    add_fields(nav, NavConfig, scales=NAV_SCALES)
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="3.4, 3.5, C.1, 'figure 3.7' or describer")
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
+    parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
     _add_iliad(parser)
+    _add_regex_files(parser)
+    add_nav_data(parser, required=False)
     parser.add_argument(
         "--seeds", type=whole(), default=3, metavar="N", help="students per row, from --seed on (default: %(default)s)"
     )
@@ -299,7 +316,17 @@ def add_study_iliad(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
     add_fields(parser, LearnerConfig, scales=LEARNER_SCALES, skip=("learner", "mixing", "anneal_every"))
-    add_fields(parser, RegexConfig, scales=REGEX_SCALES, skip=("wrong",))
+    add_fields(parser, RegexConfig, scales=REGEX_SCALES, skip=("wrong", "unheard"))
+    add_fields(parser, NavConfig, scales=NAV_SCALES, skip=SHARED_SETTINGS)
+
+
+def add_nav_data(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Where NAV's houses and what is seen of them come from."""
+    parser.add_argument(
+        "--data", type=any_path, required=required, metavar="DIR", help="NAV: folder that `embodied dataset vln` built"
+    )
+    add_cache(parser)
+    add_encoder(parser)
 
 
 def _add_iliad(parser: argparse.ArgumentParser) -> None:
@@ -313,15 +340,18 @@ def _add_iliad(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scale", choices=sorted(REGEX_SCALES), default="mini", help="settings to start from (default: %(default)s)"
     )
+    parser.add_argument(
+        "--threads", type=whole(), default=1, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+    )
+
+
+def _add_regex_files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--words", type=any_path, metavar="FILE", help="words, one a line (default: made-up ones)")
     parser.add_argument(
         "--templates",
         type=any_path,
         metavar="FILE",
         help="requests of your own, JSON: rule -> texts with BEFORE and AFTER (default: the grammar's)",
-    )
-    parser.add_argument(
-        "--threads", type=whole(), default=1, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
     )
 
 

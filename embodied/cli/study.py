@@ -6,14 +6,15 @@
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
     embodied study iliad 3.4 3.5 C.1 --out STUDY
+    embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
 number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's: `askers`,
 `interventions`, `rooms` (wants --without-rooms) and `rules`. `bandit` is a translator
 that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
 agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it did: Tables 3.4,
-3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions. Rows that tables share are
-trained once. Interrupt it whenever you like: the same command goes on.
+3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions, `speakers`: one that was never heard.
+Rows that tables share are trained once. Interrupt it whenever you like: the same command goes on.
 """
 
 from __future__ import annotations
@@ -144,19 +145,37 @@ def run_stars(args: argparse.Namespace) -> list[Path]:
 
 
 def run_iliad(args: argparse.Namespace) -> list[Path]:
+    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES
+    from agents.iliad.nav.run import NavSource
     from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES
     from agents.iliad.study import IliadStudySetting, report, run_study
+    from agents.iliad.subjects import NavSubject, RegexSubject, Subject
+    from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
-    setting = IliadStudySetting(
-        args.out,
-        chosen(args, REGEX_SCALES[args.scale]),
-        chosen(args, LEARNER_SCALES[args.scale]),
-        args.seeds,
-        args.words,
-        args.templates,
-        args.threads,
-    )
+    subject: Subject
+    if args.world == "nav":
+        refuse_regex_settings(args)
+        source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
+        subject = NavSubject(chosen(args, NAV_SCALES[args.scale]), source)
+    else:
+        subject = RegexSubject(chosen(args, REGEX_SCALES[args.scale]), args.words, args.templates)
+    learners = NAV_LEARNER_SCALES if args.world == "nav" else LEARNER_SCALES
+    setting = IliadStudySetting(args.out, subject, chosen(args, learners[args.scale]), args.seeds, args.threads)
     if args.report:
         return list(report(setting, args.tables).values())
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def refuse_regex_settings(args: argparse.Namespace) -> None:
+    """
+    Raises:
+      ValueError: settings of REGEX, or no data set, for NAV.
+    """
+    from embodied.cli.learning import ONLY_REGEX
+
+    given = [n for n in (*ONLY_REGEX, "words", "templates") if getattr(args, n, None) is not None]
+    if given:
+        raise ValueError(f"--{given[0].replace('_', '-')} belongs to --world regex; leave it out with --world nav")
+    if args.data is None:
+        raise ValueError("--world nav wants --data, a folder that `embodied dataset vln` built, with features")

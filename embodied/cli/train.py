@@ -111,17 +111,37 @@ def run_hari(args: argparse.Namespace) -> int:
 
 
 def run_iliad(args: argparse.Namespace) -> int:
-    """Teach a student to change words as a request says, by descriptions (ADEL), demonstrations or rewards."""
-    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, students_of
-    from agents.iliad.regex.run import learn, prepare
+    """Teach a student to change words or to follow routes as a request says, by descriptions (ADEL), demonstrations or
+    rewards."""
     from agents.imitation.parallel import use_threads
-    from embodied.cli.options import chosen
 
     use_threads(args.threads)
+    return {"regex": run_regex, "nav": run_nav}[args.world](args)
+
+
+def run_regex(args: argparse.Namespace) -> int:
+    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, students_of
+    from agents.iliad.regex.run import learn, prepare
+    from embodied.cli.options import chosen
+
     regex = chosen(args, REGEX_SCALES[args.scale])
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
     learner = chosen(args, LEARNER_SCALES[args.scale])
     learn(grounds, learner, args.out / "students" / students_of(regex), minutes=args.minutes, note=note)
+    return 0
+
+
+def run_nav(args: argparse.Namespace) -> int:
+    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, nav_students_of
+    from agents.iliad.nav.run import NavSource, learn, prepare
+    from agents.vision.run import encoder_of
+    from embodied.cli.options import chosen
+
+    nav = chosen(args, NAV_SCALES[args.scale])
+    source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
+    grounds = prepare(nav, source, args.out / "shared", note=note)
+    learner = chosen(args, NAV_LEARNER_SCALES[args.scale])
+    learn(grounds, learner, args.out / "students" / nav_students_of(nav), minutes=args.minutes, note=note)
     return 0
 
 

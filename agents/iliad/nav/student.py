@@ -26,8 +26,20 @@ LONGEST_REQUEST = 80
 
 
 @dataclass(frozen=True, eq=False)
+class Ways:
+    """What can be done in a pose: stopping is action 0."""
+
+    poses: tuple[Pose, ...]
+    """That the actions after stop lead to."""
+    embedded: Tensor
+    """(1 + n, E): zero for stopping, what is seen that way and its direction for going to a neighbour."""
+    number_of: Mapping[int, int]
+    """Node to the action that leads there; the pose's own node to stopping."""
+
+
+@dataclass(frozen=True, eq=False)
 class NavEyes:
-    """Everything that is seen in some houses."""
+    """Everything that is seen in some houses; what a pose offers is computed once."""
 
     places: Mapping[str, Place]
     bank: FeatureBank
@@ -35,6 +47,8 @@ class NavEyes:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_moves", PanoramicMoves())
+        object.__setattr__(self, "_ways", {})
+        object.__setattr__(self, "_words", {})
 
     @property
     def action_size(self) -> int:
@@ -43,31 +57,40 @@ class NavEyes:
 
     def words(self, requests: Sequence[str]) -> Tensor:
         """(B, longest) int64, padded."""
-        rows = torch.from_numpy(np.stack([self.vocabulary.encode(r, LONGEST_REQUEST) for r in requests]))
-        return rows[:, : max(1, int((rows != 0).sum(1).max()))]
+        known: dict[str, Tensor] = self._words  # type: ignore[attr-defined]
+        if len(known) > 100_000:
+            known.clear()
+        for request in requests:
+            if request not in known:
+                row = torch.from_numpy(self.vocabulary.encode(request, LONGEST_REQUEST))
+                known[request] = row[: max(1, int((row != 0).sum()))]
+        return nn.utils.rnn.pad_sequence([known[r] for r in requests], batch_first=True)
 
-    def ahead(self, world: str, pose: Pose) -> tuple[Pose, ...]:
-        """The poses that the actions after stop lead to."""
-        return self._reach(world, pose)[1]
+    def ways(self, world: str, pose: Pose) -> Ways:
+        """What can be done there."""
+        known: dict[tuple[str, int, int], Ways] = self._ways  # type: ignore[attr-defined]
+        key = world, pose.node, pose.turn
+        if key not in known:
+            known[key] = self._look(world, pose)
+        return known[key]
 
-    def see(self, trips: Sequence[Trip], poses: Sequence[Pose], previous: Tensor) -> StepSeen:
-        """What agents see at these poses; `previous` (B, E) embeds how each came there."""
-        views = self.bank.gather([Sight(t.world, p.node) for t, p in zip(trips, poses, strict=True)])
-        embedded = [self._actions(t.world, p, v) for t, p, v in zip(trips, poses, views, strict=True)]
+    def see(self, tracks: Sequence[Track]) -> StepSeen:
+        """What agents see where they are."""
+        views = self.bank.gather([Sight(k.world, k.pose.node) for k in tracks])
+        embedded = [k.ways.embedded for k in tracks]
         actions = nn.utils.rnn.pad_sequence(embedded, batch_first=True)
         counts = torch.tensor([len(a) for a in embedded])
-        return StepSeen(views, actions, torch.arange(actions.shape[1]) < counts[:, None], previous)
+        mask = torch.arange(actions.shape[1]) < counts[:, None]
+        return StepSeen(views, actions, mask, torch.stack([k.previous for k in tracks]))
 
-    def _reach(self, world: str, pose: Pose) -> tuple:
+    def _look(self, world: str, pose: Pose) -> Ways:
         moves: PanoramicMoves = self._moves  # type: ignore[attr-defined]
-        return moves.at(self.places[world], pose)
-
-    def _actions(self, world: str, pose: Pose, views: Tensor) -> Tensor:
-        """(1 + n, E) embeddings of stopping, which is zero, and of going to each neighbour."""
-        candidates, _ = self._reach(world, pose)
+        candidates, poses = moves.at(self.places[world], pose)
+        (views,) = self.bank.gather([Sight(world, pose.node)])
         angles = orientation(torch.from_numpy(candidates.bearing), torch.from_numpy(candidates.slope), COPIES)
         rows = torch.cat([views[torch.from_numpy(candidates.view)], angles], -1)
-        return torch.cat([rows.new_zeros(1, rows.shape[1]), rows])
+        numbers = {pose.node: 0} | {p.node: k for k, p in enumerate(poses, 1)}
+        return Ways(poses, torch.cat([rows.new_zeros(1, rows.shape[1]), rows]), numbers)
 
 
 class NavStudent:
@@ -98,7 +121,7 @@ class NavStudent:
         now = self.follower.begin(self.eyes.words(requests))
         logs, entropies, mask = [], [], []
         for t in range(max(map(len, wanted))):
-            seen = self.eyes.see(tasks, [k.pose for k in tracks], torch.stack([k.previous for k in tracks]))
+            seen = self.eyes.see(tracks)
             logits, now = self.follower.step(now, seen)
             log = logits.log_softmax(-1).masked_fill(~seen.mask, 0.0)
             there = [t < len(w) for w in wanted]
@@ -106,9 +129,9 @@ class NavStudent:
             logs.append(log.gather(1, torch.tensor(chosen)[:, None])[:, 0])
             entropies.append(-(log.exp() * log * seen.mask).sum(-1))
             mask.append(torch.tensor(there))
-            for row, (track, walk) in enumerate(zip(tracks, executions)):
+            for track, walk in zip(tracks, executions):
                 if t + 1 < len(walk.nodes):
-                    track.go(track.number(walk.nodes[t + 1]), seen.actions[row])
+                    track.go(track.number(walk.nodes[t + 1]))
         flags = torch.stack(mask, 1)
         return ExecutionScores(torch.stack(logs, 1) * flags, torch.stack(entropies, 1) * flags, flags)
 
@@ -118,11 +141,11 @@ class NavStudent:
         now = self.follower.begin(self.eyes.words(requests))
         rows = torch.arange(len(tasks))
         for t in range(MOVES):
-            seen = self.eyes.see(tasks, [k.pose for k in tracks], torch.stack([k.previous for k in tracks]))
+            seen = self.eyes.see(tracks)
             logits, now = self.follower.step(now, seen)
-            for row, (track, number) in enumerate(zip(tracks, choose(logits, rows, t).tolist())):
+            for track, number in zip(tracks, choose(logits, rows, t).tolist()):
                 if not track.stopped:
-                    track.go(number, seen.actions[row])
+                    track.go(number)
             if all(track.stopped for track in tracks):
                 break
         return [walk_along(track.nodes) for track in tracks]
@@ -139,25 +162,28 @@ class Track:
     """Owns where one agent is on its way."""
 
     def __init__(self, eyes: NavEyes, trip: Trip) -> None:
-        self._eyes, self._world = eyes, trip.world
+        self._eyes, self.world = eyes, trip.world
         self.pose, self.nodes, self.stopped = trip.start, [trip.start.node], False
         self.previous = torch.zeros(eyes.action_size)
+
+    @property
+    def ways(self) -> Ways:
+        return self._eyes.ways(self.world, self.pose)
 
     def number(self, node: int) -> int:
         """The action that leads to `node`, 0 for staying.
 
         Raises:
-          ValueError: `node` is no neighbour.
+          KeyError: `node` is no neighbour.
         """
-        if node == self.pose.node:
-            return 0
-        return 1 + [p.node for p in self._eyes.ahead(self._world, self.pose)].index(node)
+        return self.ways.number_of[node]
 
-    def go(self, number: int, actions: Tensor) -> None:
-        """Take an action of `actions` (A, E)."""
+    def go(self, number: int) -> None:
+        """Take an action."""
+        ways = self.ways
+        self.previous = ways.embedded[number]
         if number == 0:
             self.stopped = True
         else:
-            self.pose = self._eyes.ahead(self._world, self.pose)[number - 1]
+            self.pose = ways.poses[number - 1]
             self.nodes.append(self.pose.node)
-        self.previous = actions[number]

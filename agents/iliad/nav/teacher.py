@@ -30,18 +30,23 @@ def performance(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Seque
     return sdtw(tuple(found), tuple(wanted), world.graph(trip), RADIUS)
 
 
+def arrival(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Sequence[int]) -> float:
+    """1 where a walk ends within RADIUS of where another one does, else 0 (docs/sources.md, S141)."""
+    return float(world.graph(trip).distance[found[-1], wanted[-1]] <= RADIUS + 1e-9)
+
+
 def walked(eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk]) -> tuple[Tensor, Tensor, Tensor]:
     """What a describer reads: (B, T, 36, D) panoramas, (B, T, E) actions taken there, (B, T) which there are."""
     tracks, views, actions = [Track(eyes, t) for t in trips], [], []
     longest = max(len(w.steps) for w in walks)
     mask = torch.tensor([[t < len(w.steps) for t in range(longest)] for w in walks])
     for t in range(longest):
-        seen = eyes.see(trips, [k.pose for k in tracks], torch.stack([k.previous for k in tracks]))
+        seen = eyes.see(tracks)
         numbers = [k.number(w.steps[t]) if t < len(w.steps) else 0 for k, w in zip(tracks, walks)]
         views.append(seen.views)
         actions.append(seen.actions[torch.arange(len(walks)), torch.tensor(numbers)])
-        for row, (track, number) in enumerate(zip(tracks, numbers)):
-            track.go(number, seen.actions[row])
+        for track, number in zip(tracks, numbers):
+            track.go(number)
     return torch.stack(views, 1), torch.stack(actions, 1), mask
 
 
@@ -94,7 +99,8 @@ class LearnedNavTeacher:
         several = [[d, *drawn[i * k : (i + 1) * k]] for i, d in enumerate(likely)]
         cases = [(trip, walk, d) for trip, walk, many in zip(trips, walks, several) for d in many]
         done = self.executor.greedy([c[0] for c in cases], [c[2] or NOTHING for c in cases])
-        scores = iter([performance(self.world, c[0], e.nodes, c[1].nodes) for c, e in zip(cases, done)])
+        perf = performance if self.pragmatics == "text" else arrival
+        scores = iter([perf(self.world, c[0], e.nodes, c[1].nodes) for c, e in zip(cases, done)])
         return [kept(many, [next(scores) for _ in many], THRESHOLD) for many in several]
 
 

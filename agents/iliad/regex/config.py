@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from agents.iliad.config import LearnerConfig
+from agents.iliad.regex.language import MANNERS
 
 TEACHERS = ("learned", "grammar")
 PRAGMATICS = ("program", "text")
+MARGINALS = ("asked", "narrow", "wide")
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,14 @@ class RegexConfig:
     """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the best one ('program', docs/sources.md, S93)."""
     candidates: int = 10
     """Sampled descriptions besides the likeliest one."""
+    marginal: str = "asked"
+    """Which rules the student knows without requests: drawn as requests are ('asked'), of half of their shapes only
+    ('narrow'), or of more shapes with any letters, most of which nobody asks for ('wide'; docs/sources.md, S140)."""
+    unheard: str = ""
+    """'': everybody asks in all manners. Else four speakers with a manner each make and describe requests, and this
+    one is heard in tests only; 'none': all four are heard (conditional, imperative, passive, terse)."""
+    unlabeled: int = 20_000
+    """Rules of the marginal's list."""
     executor_iterations: int = 30_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 40_000
@@ -52,6 +62,12 @@ class RegexConfig:
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:
             raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        if self.marginal not in MARGINALS or self.unlabeled < 1:
+            raise ValueError(
+                f"marginal must be one of {MARGINALS} and unlabeled at least 1, got {self.marginal!r}, {self.unlabeled}"
+            )
+        if self.unheard and self.unheard not in ("none", *MANNERS):
+            raise ValueError(f"unheard must be '', 'none' or one of {MANNERS}, got {self.unheard!r}")
         if self.pragmatics not in PRAGMATICS:
             raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
         if not (0 <= self.wrong <= 1 and self.teacher_rate > 0):
@@ -105,10 +121,13 @@ LEARNER_SCALES: dict[str, LearnerConfig] = {
 
 def students_of(config: RegexConfig) -> str:
     """Folder of a teacher's students."""
-    return f"grammar_{config.wrong:g}" if config.teacher == "grammar" else config.teacher
+    teacher = f"grammar_{config.wrong:g}" if config.teacher == "grammar" else config.teacher
+    few = "" if config.unlabeled == RegexConfig().unlabeled else f"_{config.unlabeled}"
+    marginal = "" if config.marginal == "asked" else f"_{config.marginal}"
+    return teacher + few + marginal + (f"_without_{config.unheard}" if config.unheard else "")
 
 
 def data_of(config: RegexConfig) -> dict[str, object]:
     """The settings that decide the data."""
     names = ("items", "held_out_items", "vocabulary", "examples", "data_seed")
-    return {name: getattr(config, name) for name in names}
+    return {name: getattr(config, name) for name in names} | ({"unheard": config.unheard} if config.unheard else {})

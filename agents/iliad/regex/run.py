@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.iliad.config import LearnerConfig, as_dict
+from agents.iliad.config import LearnerConfig, as_dict, folder_name
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.regex.coding import Requests, request_words
 from agents.iliad.regex.config import RegexConfig, data_of
@@ -30,8 +30,6 @@ from agents.imitation.loop import Note
 from assets.cache import digest, write_json
 from embodied.seeds import stream
 
-UNLABELED = 20_000
-"""Rules of the marginal's list."""
 VALIDATION = 500
 """Data points of each validation; the last one of a run and tests have all."""
 
@@ -56,17 +54,18 @@ def prepare(
     Raises:
       ValueError: files that cannot be used; data of other settings in the folder.
     """
-    data = _data(config, Path(folder) / "data.json", words, templates)
+    folder = Path(folder) / f"without_{config.unheard}" if config.unheard else Path(folder)
+    data = _data(config, folder / "data.json", words, templates)
     requests = request_words(r for q in data.splits["train"] for r in q.requests)
     count = sum(len(v) for v in data.templates.values())
     note(f"{len(data.words)} words, {count} templates, {len(requests.vocabulary)} words of requests")
     if config.teacher == "grammar":
         if templates:
             raise ValueError("the grammar knows no templates but its own; use --teacher learned with --templates")
-        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(data, config.data_seed, config.wrong)
+        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(data, config)
     else:
-        executor = teach_executor(data, config, requests, Path(folder), note=note)
-        describer = teach_describer(data, config, requests, Path(folder), note=note)
+        executor = teach_executor(data, config, requests, folder, note=note)
+        describer = teach_describer(data, config, requests, folder, note=note)
         teacher = LearnedTeacher(describer, executor, requests, config.candidates, config.pragmatics)
     return Grounds(config, data, requests, teacher, _digest(data))
 
@@ -81,7 +80,8 @@ def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print)
         made = pretrain_student(grounds.data, c, grounds.requests, folder, seed, note=note)
         return RegexStudent(made.train(), grounds.requests)
 
-    rules = tuple(rules_without_requests(grounds.data, UNLABELED, rng=stream(c.data_seed, "regex", "unlabeled")))
+    rng = stream(c.data_seed, "regex", "unlabeled")
+    rules = tuple(rules_without_requests(grounds.data, c, c.unlabeled, rng=rng))
     splits = grounds.data.splits
     identity = {"world": "regex", "data": grounds.digest, **as_dict(c)}
     return IliadProblem(
@@ -99,15 +99,7 @@ def learn(
     student = problem.student
     assert isinstance(student, RegexStudent)
     keep = lambda path: save_network(path, student.speller, grounds.config, grounds.requests, as_dict(learner))
-    return train(problem, learner, home / name_of(learner), keep, minutes=minutes, note=note)
-
-
-def name_of(learner: LearnerConfig) -> str:
-    """The folder of a learner: its name and what is not as usual."""
-    if learner.learner != "adel":
-        return learner.learner
-    annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
-    return f"adel_{learner.mixing:g}{annealed}"
+    return train(problem, learner, home / folder_name(learner), keep, minutes=minutes, note=note)
 
 
 def load_student(path: Path) -> tuple[RegexStudent, RegexConfig]:

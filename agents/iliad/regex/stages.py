@@ -1,6 +1,6 @@
 """What is trained before a student learns: the teacher's executor and describer, and a student on rules alone.
 
-All three are maximum likelihood on batches drawn by (seed, update), resumable and exact after a kill.
+All three are maximum likelihood on batches drawn by (seed, update).
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -21,24 +20,15 @@ from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import outputs
+from agents.iliad.stages import Network, Stage
 from agents.iliad.writing import log_likelihood
-from agents.imitation.actor_critic import descend
 from agents.imitation.decoding import likeliest
-from agents.imitation.loop import Note, falling_rate
-from agents.imitation.runs import Run
+from agents.imitation.loop import Note
 from agents.tensor_file import load_tensors, put, save_tensors
-from embodied.locks import locked
 from embodied.seeds import stream
 
-FORMAT = "embodied-iliad-stage-1"
 WEIGHTS = ("embodied-regex-1",)
 REMEDY = "delete it and train it again with `embodied train iliad regex`"
-COOLDOWN = 0.4
-"""Share of the updates, the last ones, over which the rate of these stages falls (docs/sources.md, S92)."""
-CLIP = 5.0
-REPORT = 250
-"""Updates between notes."""
-Network = TypeVar("Network", bound=nn.Module)
 
 
 def new_network(kind: Callable[..., Network], config: RegexConfig, requests: Requests, seed: int, name: str) -> Network:
@@ -60,8 +50,9 @@ def teach_executor(data: RegexData, config: RegexConfig, requests: Requests, fol
         wanted = characters([q.outputs[j] for q, j in zip(chosen, places)])
         return _likelihood(network(words, requests(_asked(chosen, rng)), wanted), wanted)
 
-    stage = _Stage("executor", folder, config.executor_iterations, config, config.data_seed)
-    return stage.train(network, requests, loss_of, lambda: executor_success(network, requests, _sample(data)), note)
+    stage = _stage("executor", folder, config.executor_iterations, config, requests, config.data_seed)
+    judge = lambda: executor_success(network, requests, _sample(data))
+    return stage.train(network, loss_of, judge, _keep(network, config, requests, stage), note)
 
 
 def teach_describer(
@@ -77,8 +68,8 @@ def teach_describer(
         wanted = requests(_asked(chosen, rng))
         return _likelihood(network(changed, wanted), wanted)
 
-    stage = _Stage("describer", folder, config.describer_iterations, config, config.data_seed)
-    return stage.train(network, requests, loss_of, dict, note)
+    stage = _stage("describer", folder, config.describer_iterations, config, requests, config.data_seed)
+    return stage.train(network, loss_of, dict, _keep(network, config, requests, stage), note)
 
 
 def pretrain_student(
@@ -88,20 +79,22 @@ def pretrain_student(
     network = new_network(Speller, config, requests, seed, "student")
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        words, rules = changing_rules(data, config.teacher_batch, rng=rng)
+        words, rules = changing_rules(data, config, config.teacher_batch, rng=rng)
         wanted = characters(rules)
         return _likelihood(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
 
-    stage = _Stage("student", folder, config.pretraining_iterations, config, seed)
-    return stage.train(network, requests, loss_of, dict, note)
+    stage = _stage("student", folder, config.pretraining_iterations, config, requests, seed)
+    return stage.train(network, loss_of, dict, _keep(network, config, requests, stage), note)
 
 
-def changing_rules(data: RegexData, count: int, *, rng: np.random.Generator) -> tuple[list[str], list[str]]:
+def changing_rules(
+    data: RegexData, config: RegexConfig, count: int, *, rng: np.random.Generator
+) -> tuple[list[str], list[str]]:
     """Random rules, each with a random word that it changes; a rule is drawn again until it changes its word."""
     words: list[str] = []
     rules: list[str] = []
     while len(rules) < count:
-        for rule in rules_without_requests(data, count - len(rules), rng=rng):
+        for rule in rules_without_requests(data, config, count - len(rules), rng=rng):
             word = data.words[int(rng.integers(len(data.words)))]
             if outputs(rule, [word]) not in (None, (word,)):
                 words.append(word)
@@ -144,43 +137,16 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     return network.eval(), requests, config
 
 
-class _Stage:
-    """One of the three: where it is kept, how long it lasts."""
+def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> Stage:
+    identity = {"words": len(requests.vocabulary), **{k: v for k, v in vars(config).items() if k in _DECIDE}}
+    if name == "student" and config.marginal != "asked":
+        identity["marginal"] = config.marginal
+    return Stage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity)
 
-    def __init__(self, name: str, folder: Path, updates: int, config: RegexConfig, seed: int) -> None:
-        self.name, self.folder, self.updates, self.config, self.seed = name, Path(folder), updates, config, seed
 
-    def train(
-        self,
-        network: Network,
-        requests: Requests,
-        loss_of: Callable[[np.random.Generator], Tensor],
-        judge: Callable[[], Mapping[str, float]],
-        note: Note,
-    ) -> Network:
-        """Train `network` or go on, unless that is done; keeps it as NAME.safetensors in the folder."""
-        c, path = self.config, self.folder / f"{self.name}.safetensors"
-        optimizer = torch.optim.Adam(network.parameters(), c.teacher_rate, fused=True)
-        identity = {"stage": self.name, "updates": self.updates, "seed": self.seed, "words": len(requests.vocabulary)}
-        identity |= {k: v for k, v in vars(c).items() if k in _DECIDE}
-        run = Run(self.folder / self.name, identity, {"network": network}, {"adam": optimizer}, FORMAT)
-        if run.progress.update >= self.updates:
-            return network.eval()
-        network.train()
-        with locked(run.folder), run.session(self.updates, 2.0, note) as session:
-            for update in session:
-                for group in optimizer.param_groups:
-                    group["lr"] = falling_rate(c.teacher_rate, update, self.updates, COOLDOWN)
-                loss = loss_of(stream(self.seed, "regex", self.name, update))
-                descend(loss, optimizer, CLIP, f"{self.name}, update {update}")
-                run.add({"loss": float(loss.detach()), "updates": 1.0})
-                if (update + 1) % REPORT == 0 or update + 1 == self.updates:
-                    found = {"update": update + 1.0, "loss": run.sums["loss"] / run.sums["updates"], **judge()}
-                    run.history.append(found)
-                    run.sums = {}
-                    note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
-        save_network(path, network, c, requests, {"stage": self.name, **identity})
-        return network.eval()
+def _keep(network: nn.Module, config: RegexConfig, requests: Requests, stage: Stage) -> Callable[[Path], None]:
+    about = {"stage": stage.name, "updates": stage.updates, "seed": stage.seed, **stage.identity}
+    return lambda path: save_network(path, network, config, requests, about)
 
 
 _DECIDE = (

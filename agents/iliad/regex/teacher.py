@@ -10,7 +10,8 @@ import numpy as np
 from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
-from agents.iliad.regex.data import Grammar, RegexData, WordTask, random_asked
+from agents.iliad.regex.config import RegexConfig
+from agents.iliad.regex.data import RegexData, WordTask, grammar_of, random_asked
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
 from agents.iliad.regex.world import Written
@@ -129,8 +130,8 @@ class GrammarTeacher:
     wrong descriptions.
     """
 
-    def __init__(self, data: RegexData, seed: int, wrong: float) -> None:
-        self.grammar, self.words, self.wrong = Grammar(seed), data.words, wrong
+    def __init__(self, data: RegexData, config: RegexConfig) -> None:
+        self.grammar, self.words, self.wrong = grammar_of(config), data.words, config.wrong
 
     def describe(
         self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator

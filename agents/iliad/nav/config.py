@@ -1,0 +1,77 @@
+"""Settings of NAV: networks and the simulated teacher (3.2.4.2, C.1.1, Table C.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.iliad.config import LearnerConfig
+
+TEACHERS = ("learned", "grammar")
+PRAGMATICS = ("program", "text")
+
+
+@dataclass(frozen=True)
+class NavConfig:
+    """The defaults are the dissertation's."""
+
+    hidden_size: int = 256
+    """Width of all networks."""
+    heads: int = 8
+    """Of attention."""
+    teacher: str = "learned"
+    """'learned': a describer and an executor of the data (3.2.4.1); 'grammar': who words routes here."""
+    pragmatics: str = "program"
+    """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the first that leads to the walk's end ('program',
+    docs/sources.md, S93, S141)."""
+    candidates: int = 5
+    """Sampled descriptions besides the likeliest one."""
+    executor_iterations: int = 20_000
+    """Updates of the teacher's executor."""
+    describer_iterations: int = 20_000
+    """Updates of the teacher's describer."""
+    teacher_batch: int = 32
+    """Trips per update of the two."""
+    teacher_rate: float = 1e-4
+    """Adam's learning rate for the two."""
+    held_out: float = 0.2
+    """Share of the paths of houses to learn from that nobody learns, for validation."""
+    data_seed: int = 0
+    """Of which paths are held out, and of the teacher, which all students share."""
+
+    def __post_init__(self) -> None:
+        if self.teacher not in TEACHERS:
+            raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        if self.pragmatics not in PRAGMATICS:
+            raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
+        for name in ("hidden_size", "heads", "executor_iterations", "describer_iterations", "teacher_batch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.hidden_size % self.heads:
+            raise ValueError(f"hidden_size {self.hidden_size} must be a multiple of heads {self.heads}")
+        if self.candidates < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
+            raise ValueError(
+                f"candidates {self.candidates} must not be negative, teacher_rate {self.teacher_rate} above 0, "
+                f"held_out {self.held_out} between 0 and 1"
+            )
+
+
+NAV_SCALES: dict[str, NavConfig] = {
+    "mini": NavConfig(
+        hidden_size=128, heads=4, executor_iterations=4_000, describer_iterations=6_000, teacher_rate=5e-4
+    ),
+    "tiny": NavConfig(
+        hidden_size=64, heads=4, executor_iterations=2_000, describer_iterations=4_000, teacher_rate=1e-3
+    ),
+    "paper": NavConfig(),
+}
+NAV_LEARNER_SCALES: dict[str, LearnerConfig] = {
+    "mini": LearnerConfig(iterations=8_000, learning_rate=5e-4, cooldown=0.3, threshold=0.3, validate_every=250),
+    "tiny": LearnerConfig(iterations=2_500, learning_rate=1e-3, cooldown=0.3, threshold=0.3, validate_every=100),
+    "paper": LearnerConfig(iterations=25_000, learning_rate=1e-4, threshold=0.3),
+}
+"""'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""
+
+
+def nav_students_of(config: NavConfig) -> str:
+    """Folder of a teacher's students."""
+    return config.teacher

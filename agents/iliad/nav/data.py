@@ -1,0 +1,80 @@
+"""The data of NAV: paths of a data set `vln` with their wordings, split by path and by house (3.2.4.2, C.1.1; docs/sources.md, S142)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from agents.hanna.vocabulary import build_vocabulary
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.student import NavEyes
+from agents.iliad.nav.world import Trip, trips_of
+from agents.vision.config import drawing
+from agents.vision.features import feature_path, load_bank
+from agents.vision.run import pictures_of
+from assets.cache import digest
+from embodied.datasets.store import Dataset
+from embodied.seeds import stream
+from embodied.tasks.vln import vln_task
+
+UNSEEN = "test_unseen"
+"""The split of a data set whose houses are for testing."""
+
+
+@dataclass(frozen=True, eq=False)
+class NavData:
+    """All that worlds and teachers are made of."""
+
+    source: Dataset
+    eyes: NavEyes
+    splits: Mapping[str, Sequence[Trip]]
+    """'train': paths with all of their wordings. 'validation': other paths of the same houses, 'test': paths of other
+    houses; in these two, each wording is a trip of its own."""
+    pictures: str
+    """How what is seen was drawn: 'fast_256', 'unlit_192', or several of them."""
+
+    @property
+    def digest(self) -> str:
+        """Names the content: the data set, who is held out, and who looks at which pictures."""
+        trips = {part: [(t.world, t.path, t.requests) for t in many] for part, many in self.splits.items()}
+        return digest([self.source.digest, trips, self.eyes.bank.digest, self.pictures])
+
+
+def nav_data(source: Dataset, config: NavConfig, encoder: str, quality: str | None = None) -> NavData:
+    """A data set `vln` with features as the data of NAV.
+
+    Args:
+      encoder: digest of the encoder that made the features.
+      quality: of the pictures, as in agents.vision.run.pictures_of.
+
+    Raises:
+      FileNotFoundError, ValueError: no features of this encoder, or others.
+    """
+    training, unseen = source.names("train"), source.names(UNSEEN)
+    splits: dict[str, list[Trip]] = {"train": [], "validation": [], "test": []}
+    for name in training:
+        trips = house_trips(source, name)
+        order = [int(i) for i in stream(config.data_seed, "nav", "held", name).permutation(len(trips))]
+        held = set(order[: round(config.held_out * len(trips))])
+        splits["train"] += [t for i, t in enumerate(trips) if i not in held]
+        splits["validation"] += [one for i in sorted(held) for one in each_wording(trips[i])]
+    splits["test"] = [one for name in unseen for trip in house_trips(source, name) for one in each_wording(trip)]
+    names = (*training, *unseen)
+    places = {name: source.place(name) for name in names}
+    pictures = {name: pictures_of(source, name, quality) for name in names}
+    paths: dict[str, Path] = {n: feature_path(source.folder / "features", encoder, n, pictures[n]) for n in names}
+    vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
+    eyes = NavEyes(places, load_bank(paths, encoder, places, pictures), vocabulary)
+    drawn = ", ".join(sorted({drawing(p) for p in pictures.values()}))
+    return NavData(source, eyes, splits, drawn)
+
+
+def house_trips(source: Dataset, name: str) -> list[Trip]:
+    """The paths of a house with all of their wordings."""
+    return trips_of([vln_task(name, route) for route in source.routes(name)])
+
+
+def each_wording(trip: Trip) -> list[Trip]:
+    """Each wording of a trip as a trip of its own, as validation and test have them."""
+    return [Trip(trip.world, trip.start, trip.path, (request,)) for request in trip.requests]

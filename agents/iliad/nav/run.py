@@ -1,0 +1,110 @@
+"""What the commands of NAV do: a data set becomes eyes, teacher and student, and these a problem of ILIAD."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from agents.iliad.config import LearnerConfig, as_dict, folder_name
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.data import UNSEEN, NavData, nav_data
+from agents.iliad.nav.network import Follower
+from agents.iliad.nav.stages import new_walker, save_walker, teach_describer, teach_executor
+from agents.iliad.nav.student import LoopFree, NavStudent
+from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
+from agents.iliad.nav.world import NavMarginal, NavWalk, NavWorld, Trip
+from agents.iliad.protocol import DescribingTeacher
+from agents.iliad.training import IliadProblem, train
+from agents.imitation.loop import Note
+from assets.catalogue import load_catalogue
+from embodied.datasets.store import Dataset, dataset_of
+from embodied.interface import SeenPlace
+from embodied.language.voice import RouteDescriber
+
+VALIDATION = 300
+"""Trips of each validation, from all houses alike; judging takes all."""
+
+
+@dataclass(frozen=True)
+class NavSource:
+    """Where the houses and what is seen of them come from."""
+
+    folder: Path
+    """A data set of `embodied dataset vln` with features."""
+    encoder: str
+    """Digest of the encoder that made them."""
+    quality: str | None
+    """Of the pictures, as in agents.vision.run.pictures_of."""
+    cache: Path
+
+    def data(self, config: NavConfig) -> NavData:
+        """
+        Raises:
+          FileNotFoundError, ValueError: a data set of another kind, or without such features.
+        """
+        return nav_data(dataset_of(self.folder, "vln"), config, self.encoder, self.quality)
+
+
+@dataclass(frozen=True, eq=False)
+class NavGrounds:
+    """What all students of a study share."""
+
+    config: NavConfig
+    data: NavData
+    teacher: DescribingTeacher[Trip, NavWalk]
+
+
+def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = print) -> NavGrounds:
+    """Data and teacher, trained into `folder` unless it is there.
+
+    Raises:
+      FileNotFoundError, ValueError: as NavSource.data.
+    """
+    data = source.data(config)
+    counts = ", ".join(f"{len(v)} {part}" for part, v in data.splits.items())
+    words = len(data.eyes.vocabulary)
+    note(f"trips: {counts}; {len(data.eyes.places)} houses, {words} words, pictures {data.pictures}")
+    return NavGrounds(config, data, _teacher(config, data, source.cache, Path(folder), note))
+
+
+def _teacher(
+    config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note
+) -> DescribingTeacher[Trip, NavWalk]:
+    world = NavWorld(data.eyes.places)
+    if config.teacher == "grammar":
+        return PeopleNavTeacher(world, seen_places(data.source, cache), RouteDescriber())
+    executor = teach_executor(data, config, folder, note=note)
+    describer = teach_describer(data, config, executor, folder, note=note)
+    return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)
+
+
+def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
+    """The houses to learn from and to test in, with what can be seen from every node of them."""
+    catalogue = load_catalogue(cache)
+    names = (*source.names("train"), *source.names(UNSEEN))
+    return {name: source.open_world(name, catalogue, cache) for name in names}
+
+
+def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
+    """A student of this seed with everything around it."""
+    c, data = grounds.config, grounds.data
+    eyes, splits = data.eyes, data.splits
+    student = NavStudent(new_walker(Follower, c, eyes, seed, "student"), eyes)
+    explorer = LoopFree(new_walker(Follower, c, eyes, seed, "student"), eyes)
+    validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
+    return IliadProblem(
+        NavWorld(eyes.places), grounds.teacher, NavMarginal(eyes.places), student, explorer,
+        splits["train"], validation, {"world": "nav", "data": data.digest, **as_dict(c)},
+    )  # fmt: skip
+
+
+def learn(
+    grounds: NavGrounds, learner: LearnerConfig, folder: Path, *, minutes: float | None = None, note: Note = print
+) -> list[dict[str, float]]:
+    """Train, or go on training, the student of a run folder; keeps the best one as best.safetensors."""
+    problem = problem_of(grounds, learner.seed)
+    student = problem.student
+    assert isinstance(student, NavStudent)
+    keep = lambda path: save_walker(path, student.follower, grounds.config, student.eyes, as_dict(learner))
+    home = Path(folder) / f"seed_{learner.seed}" / folder_name(learner)
+    return train(problem, learner, home, keep, minutes=minutes, note=note)

@@ -1,0 +1,148 @@
+"""What is trained before a NAV student learns: the teacher's executor and describer; and followers on disk."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from agents.hanna.vocabulary import Vocabulary
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.data import NavData
+from agents.iliad.nav.network import Follower, WalkDescriber
+from agents.iliad.nav.student import NavEyes, NavStudent
+from agents.iliad.nav.teacher import LONGEST, arrival, said, walked
+from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
+from agents.iliad.stages import Network, Stage
+from agents.iliad.training import success_rate
+from agents.iliad.writing import log_likelihood
+from agents.imitation.decoding import likeliest
+from agents.imitation.loop import Note
+from agents.tensor_file import load_tensors, put, save_tensors
+from embodied.seeds import stream
+
+WEIGHTS = ("embodied-nav-1",)
+REMEDY = "train it again with `embodied train iliad nav`"
+JUDGED = 128
+"""Trips that a stage is judged on between its updates."""
+
+
+def new_walker(kind: Callable[..., Network], config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Network:
+    """An untrained follower or describer; its weights follow from seed and name."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(stream(seed, "nav", "begin", name).integers(2**31)))
+        words, features = len(eyes.vocabulary), eyes.bank.size
+        return kind(words, config.hidden_size, config.heads, features, eyes.action_size, HORIZON)
+
+
+def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note) -> NavStudent:
+    """pi_T (3.2.4.1): imitation, walking where it would itself and shown the shortest path from there."""
+    eyes, world = data.eyes, NavWorld(data.eyes.places)
+    executor = NavStudent(new_walker(Follower, config, eyes, config.data_seed, "executor"), eyes)
+    trips = data.splits["train"]
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        chosen, requests = _batch(trips, config.teacher_batch, rng)
+        done = executor.sample(chosen, requests, rng=rng)
+        shown = [world.demonstrate(q, e) for q, e in zip(chosen, done, strict=True)]
+        return -executor.scores(chosen, requests, done, shown).log_probabilities.sum() / len(chosen)
+
+    judge = lambda: {"success": success_rate(world, executor, _sample(data))}
+    stage = _stage("executor", folder, config.executor_iterations, config, data)
+    stage.train(executor.follower, loss_of, judge, _keep(executor.follower, config, eyes, stage), note)
+    return executor
+
+
+def teach_describer(
+    data: NavData, config: NavConfig, executor: NavStudent, folder: Path, *, note: Note
+) -> WalkDescriber:
+    """P~_T(d | e) (3.2.4.1): the walk along a path to one of its requests; judged by who follows what it says."""
+    eyes, world = data.eyes, NavWorld(data.eyes.places)
+    describer = new_walker(WalkDescriber, config, eyes, config.data_seed, "describer")
+    trips = data.splits["train"]
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        chosen, requests = _batch(trips, config.teacher_batch, rng)
+        wanted = eyes.words(requests)[:, :LONGEST]
+        logits = describer(*walked(eyes, chosen, [walk_along(t.path) for t in chosen]), wanted)
+        return -log_likelihood(logits, wanted).sum() / len(wanted)
+
+    judge = lambda: {"followed": followed(world, describer, executor, _sample(data))}
+    stage = _stage("describer", folder, config.describer_iterations, config, data)
+    return stage.train(describer, loss_of, judge, _keep(describer, config, eyes, stage), note)
+
+
+def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
+    """Share of paths whose likeliest description leads the executor to their end."""
+    walks = [walk_along(t.path) for t in trips]
+    numbers = describer.write(*walked(executor.eyes, trips, walks), likeliest, LONGEST)
+    done = executor.greedy(trips, said(executor.eyes.vocabulary, numbers))
+    return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
+
+
+def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes, about: Mapping[str, object]) -> None:
+    """Write weights, settings, words and whose features they want, atomically."""
+    facts = {
+        "format": WEIGHTS[0],
+        "config": json.dumps(vars(config), sort_keys=True),
+        "words": json.dumps(list(eyes.vocabulary.words)),
+        "encoder": eyes.bank.digest,
+        "about": json.dumps(dict(about), sort_keys=True),
+    }
+    save_tensors(path, network.state_dict(), facts)
+
+
+def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
+    """A follower that `save_walker` wrote, with the words that it knows.
+
+    Args:
+      eyes: what is seen; its words are replaced.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged, of another format, or taught with features of another encoder.
+    """
+    tensors, about = load_tensors(path, WEIGHTS, REMEDY)
+    theirs, ours = about["encoder"], eyes.bank.digest
+    if theirs != ours:
+        raise ValueError(
+            f"{path} was taught with features of encoder {theirs[:12]}, these are of {ours[:12]}; name it by --encoder"
+        )
+    config = config_of(path)
+    own = NavEyes(eyes.places, eyes.bank, Vocabulary(tuple(json.loads(about["words"]))))
+    follower = new_walker(Follower, config, own, 0, "loaded")
+    put(follower, tensors, path)
+    return NavStudent(follower.eval(), own), config
+
+
+def config_of(path: Path) -> NavConfig:
+    """The settings of a follower on disk.
+
+    Raises:
+      FileNotFoundError, ValueError: as load_follower.
+    """
+    return NavConfig(**json.loads(load_tensors(path, WEIGHTS, REMEDY)[1]["config"]))
+
+
+def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> Stage:
+    names = ("hidden_size", "heads", "teacher_batch", "teacher_rate")
+    identity = {"data": data.digest, **{k: getattr(config, k) for k in names}}
+    return Stage("nav", name, Path(folder), updates, config.teacher_rate, config.data_seed, identity)
+
+
+def _keep(network: nn.Module, config: NavConfig, eyes: NavEyes, stage: Stage) -> Callable[[Path], None]:
+    about = {"stage": stage.name, "updates": stage.updates, **stage.identity}
+    return lambda path: save_walker(path, network, config, eyes, about)
+
+
+def _batch(trips: Sequence[Trip], count: int, rng: np.random.Generator) -> tuple[list[Trip], list[str]]:
+    """Random trips, each with one of its requests."""
+    chosen = [trips[int(i)] for i in rng.integers(len(trips), size=count)]
+    return chosen, [t.requests[int(rng.integers(len(t.requests)))] for t in chosen]
+
+
+def _sample(data: NavData) -> Sequence[Trip]:
+    return data.splits["validation"][:: max(1, len(data.splits["validation"]) // JUDGED)]

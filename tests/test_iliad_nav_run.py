@@ -1,0 +1,143 @@
+"""NAV as its commands run it, on a data set made by hand: data, teacher, students, a study, one episode shown."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import torch
+from hand_data import build, small_house
+
+from agents.iliad.config import LearnerConfig
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.network import Follower
+from agents.iliad.nav.run import NavSource, learn, prepare
+from agents.iliad.nav.showing import episode_of, lines_of, tell
+from agents.iliad.nav.stages import load_follower, new_walker
+from agents.iliad.nav.student import NavStudent
+from agents.iliad.nav.world import NavWorld, walk_along
+from agents.iliad.study import IliadStudySetting, report, run_study
+from agents.iliad.subjects import NavSubject
+from agents.imitation.checkpoint import CheckpointError
+from agents.vision.encoder import random_encoder
+from agents.vision.features import feature_path, save_features
+from embodied.cli import main
+from embodied.interface import Stop
+from embodied.seeds import stream
+
+SMALL = NavConfig(hidden_size=16, heads=2, candidates=2, executor_iterations=2, describer_iterations=2, teacher_batch=4)
+QUICK = LearnerConfig(iterations=4, batch=4, validate_every=2, checkpoint_minutes=1e-9, threshold=0.3)
+silent = lambda line: None
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory) -> NavSource:
+    """Grids of 16 nodes whose features are noise."""
+    folder = tmp_path_factory.mktemp("vln")
+    cache = tmp_path_factory.mktemp("cache")
+    data, encoder = build(folder, cache, "vln", make_house=small_house), random_encoder(seed=0)
+    for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):
+        place = data.place(name)
+        noise = stream(0, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
+        path = feature_path(folder / "features", encoder.digest, name)
+        save_features(path, noise, encoder, place.house.digest)
+    return NavSource(folder, encoder.digest, None, cache)
+
+
+@pytest.fixture(scope="module")
+def grounds(source, tmp_path_factory):
+    """With a learned teacher, hardly trained."""
+    return prepare(SMALL, source, tmp_path_factory.mktemp("shared"), note=silent)
+
+
+def test_held_out_paths_and_houses_are_nobodys_to_learn_from(grounds, source):
+    splits, data = grounds.data.splits, grounds.data.source
+    learned = {(t.world, t.path) for t in splits["train"]}
+    assert splits["train"] and splits["validation"] and splits["test"]
+    assert not learned & {(t.world, t.path) for t in splits["validation"]}
+    assert {t.world for t in splits["validation"]} <= set(data.names("train"))
+    assert {t.world for t in splits["test"]} == set(data.names("test_unseen"))
+    assert all(len(t.requests) == 1 for part in ("validation", "test") for t in splits[part])
+    asked = {r.instruction for name in data.names("train") for r in data.routes(name)}
+    assert {r for part in ("train", "validation") for t in splits[part] for r in t.requests} == asked
+    other = source.data(dataclasses.replace(SMALL, data_seed=1))
+    assert other.splits["train"] != splits["train"] and other.digest != grounds.data.digest
+
+
+@pytest.mark.parametrize("learner", ["adel", "dagger", "binary"])
+def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
+    """A run that was stopped after every update ends with what it finds in one go, to the last bit."""
+    config = dataclasses.replace(QUICK, learner=learner)
+    expected = learn(grounds, config, tmp_path / "whole", note=silent)
+    for _ in range(QUICK.iterations):
+        cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+    assert cut == expected and len(expected) == 2
+    (one,), (other,) = ((tmp_path / k).rglob("checkpoint.pt") for k in ("whole", "cut"))
+    a, b = (torch.load(p, weights_only=False)["modules"]["student"] for p in (one, other))
+    assert all(torch.equal(a[k], b[k]) for k in a)
+    (best,) = (tmp_path / "whole").rglob("best.safetensors")
+    student, loaded = load_follower(best, grounds.data.eyes)
+    assert loaded == SMALL and student.eyes.vocabulary == grounds.data.eyes.vocabulary
+    with pytest.raises(CheckpointError, match="batch"):
+        learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
+
+
+def test_a_teacher_is_trained_once(source, tmp_path):
+    prepare(SMALL, source, tmp_path, note=silent)
+    times = {p: p.stat().st_mtime_ns for p in sorted(tmp_path.rglob("*.safetensors"))}
+    prepare(SMALL, source, tmp_path, note=silent)
+    assert {p.name for p in times} == {"executor.safetensors", "describer.safetensors"}
+    assert all(p.stat().st_mtime_ns == t for p, t in times.items())
+
+
+def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
+    eyes, trip = grounds.data.eyes, grounds.data.splits["test"][0]
+    follower = new_walker(Follower, SMALL, eyes, 0, "told")
+    before = {k: v.clone() for k, v in follower.state_dict().items()}
+
+    class Right(NavStudent):
+        def sample(self, tasks, requests, *, rng):
+            return [walk_along(t.path) for t in tasks]
+
+    student = Right(follower, eyes)
+    told, walk = tell(student, grounds.teacher, trip, seed=0)
+    assert told.success and told.description == trip.requests[0] and told.walk == trip.path
+    assert told.after > told.before, "one update makes it likelier"
+    assert all(torch.equal(before[k], v) for k, v in follower.state_dict().items()), "the student stays as it is"
+    assert trip.requests[0] in "\n".join(lines_of(told))
+    episode = episode_of(student, trip, walk, told.description)
+    assert episode.nodes == (*trip.path, trip.path[-1]) and isinstance(episode.steps[-1].action, Stop)
+    assert episode.steps[-1].reply.text == trip.requests[0]
+    assert NavWorld(eyes.places).success(trip, walk)
+
+
+@pytest.mark.slow
+def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
+    setting = IliadStudySetting(tmp_path, NavSubject(SMALL, source), QUICK, seeds=2)
+    text = run_study(setting, ["3.5"], note=silent)["3.5"].read_text()
+    assert "NAV" in text and "| λ = 0.5 | 2 |" in text and "(29.4)" in text and "Not run" not in text
+    assert "Not run yet: DAgger" in report(setting, ["3.4"])["3.4"].read_text()
+    with pytest.raises(ValueError, match="REGEX only"):
+        run_study(setting, ["describer"], note=silent)
+
+
+@pytest.mark.slow
+def test_commands_train_and_show(source, tmp_path, capsys):
+    sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics")]
+    where = ["--data", str(source.folder), "--cache", str(source.cache), "--network", "random"]
+    out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
+    assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0
+    (best,) = tmp_path.rglob("best.safetensors")
+    capsys.readouterr()
+    show = ["iliad", str(best), "--world", "nav", *where, "--shared", str(tmp_path / "shared"), "--episodes", "1"]
+    assert main([*show, "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["episodes"]
+    assert told["request"] and len(told["walk"]) >= 1
+    assert main(["iliad", str(best), "--world", "nav"]) == 2
+    assert "--data" in capsys.readouterr().err
+    assert main(["iliad", "--rrd", str(tmp_path / "x.rrd"), "--request", "drop every vowel"]) == 2
+    assert "--world nav" in capsys.readouterr().err
+    assert main(["study", "iliad", "3.4", "--world", "nav", *where, "--out", str(tmp_path), "--items", "3"]) == 2
+    assert "--items" in capsys.readouterr().err
