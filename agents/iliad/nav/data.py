@@ -1,4 +1,4 @@
-"""The data of NAV: paths of a data set `vln` with their wordings, split by path and by house (3.2.4.2, C.1.1; docs/sources.md, S142)."""
+"""The data of NAV: paths of a data set `vln` with their wordings (3.2.4.2, C.1.1; docs/sources.md, S142)."""
 
 from __future__ import annotations
 

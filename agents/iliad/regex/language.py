@@ -89,7 +89,8 @@ def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
 
 
 def templates_by_manner(*, seed: int) -> dict[str, dict[str, list[RequestTemplate]]]:
-    """Part and manner to its templates, all specific; a text belongs to one shape, the first that it suits (docs/sources.md, S143)."""
+    """Part and manner to its templates, all specific; a text belongs to one shape, the first that it suits
+    (docs/sources.md, S143)."""
     found: dict[str, dict[str, list[RequestTemplate]]] = {p: {m: [] for m in MANNERS} for p in PARTS}
     taken: set[str] = set()
     for shape in SHAPES:
