@@ -107,12 +107,13 @@ def wheel(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {
         "agents/weights/encoder.safetensors",
         "agents/weights/hanna_mini.safetensors",
+        "agents/weights/hari_mini.safetensors",
+        "agents/weights/iliad_regex_tiny.safetensors",
     }
     assert not wanted - names
     assert any(n.startswith("assets/data/") and n.endswith(".json") for n in names)

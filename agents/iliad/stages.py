@@ -30,7 +30,7 @@ Network = TypeVar("Network", bound=nn.Module)
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class TeachingStage:
     """How long a network is trained, and where it is kept."""
 
     world: str

@@ -17,7 +17,7 @@ from agents.iliad.nav.network import Follower, WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent
 from agents.iliad.nav.teacher import LONGEST, arrival, said, walked
 from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
-from agents.iliad.stages import Network, Stage
+from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.training import success_rate
 from agents.iliad.writing import log_likelihood
 from agents.imitation.decoding import likeliest
@@ -127,13 +127,13 @@ def config_of(path: Path) -> NavConfig:
     return NavConfig(**json.loads(load_tensors(path, WEIGHTS, REMEDY)[1]["config"]))
 
 
-def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> Stage:
+def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
     names = ("hidden_size", "heads", "teacher_batch", "teacher_rate")
     identity = {"data": data.digest, **{k: getattr(config, k) for k in names}}
-    return Stage("nav", name, Path(folder), updates, config.teacher_rate, config.data_seed, identity)
+    return TeachingStage("nav", name, Path(folder), updates, config.teacher_rate, config.data_seed, identity)
 
 
-def _keep(network: nn.Module, config: NavConfig, eyes: NavEyes, stage: Stage) -> Callable[[Path], None]:
+def _keep(network: nn.Module, config: NavConfig, eyes: NavEyes, stage: TeachingStage) -> Callable[[Path], None]:
     about = {"stage": stage.name, "updates": stage.updates, **stage.identity}
     return lambda path: save_walker(path, network, config, eyes, about)
 

@@ -20,7 +20,7 @@ from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import outputs
-from agents.iliad.stages import Network, Stage
+from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.writing import log_likelihood
 from agents.imitation.decoding import likeliest
 from agents.imitation.loop import Note
@@ -137,14 +137,14 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     return network.eval(), requests, config
 
 
-def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> Stage:
+def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> TeachingStage:
     identity = {"words": len(requests.vocabulary), **{k: v for k, v in vars(config).items() if k in _DECIDE}}
     if name == "student" and config.marginal != "asked":
         identity["marginal"] = config.marginal
-    return Stage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity)
+    return TeachingStage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity)
 
 
-def _keep(network: nn.Module, config: RegexConfig, requests: Requests, stage: Stage) -> Callable[[Path], None]:
+def _keep(network: nn.Module, config: RegexConfig, requests: Requests, stage: TeachingStage) -> Callable[[Path], None]:
     about = {"stage": stage.name, "updates": stage.updates, "seed": stage.seed, **stage.identity}
     return lambda path: save_network(path, network, config, requests, about)
 
