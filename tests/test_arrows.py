@@ -110,8 +110,8 @@ agents.vision <- agents.shipped agents.device assets.catalogue embodied.house em
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.records
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
-    embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
-    embodied.locks
+    embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file agents.vision
+    embodied.render embodied.locks
 agents.iliad <- agents.imitation embodied.action_spaces embodied.interface embodied.navigation embodied.teachers
     embodied.evaluation agents.vision agents.hanna agents.tensor_file embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import nn
 
 from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
+from agents.hari.sight import Seeing
 from agents.hari.words import FeatureWords
 from agents.tensor_file import load_tensors, save_tensors
+from embodied.interface import FeatureSource, Sight
 from embodied.records import from_plain, parse
 
 FORMAT, OLD_FORMAT = "embodied-hari-2", "embodied-hari-1"
@@ -26,6 +31,8 @@ class Configs:
     execution: ExecutionConfig
     intention: IntentionConfig | None = None
     """None for an execution policy alone."""
+    sight: Seeing | None = None
+    """None for an execution policy that reads words alone."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,22 @@ class Executor:
     network: ExecutionNetwork
     words: FeatureWords
     config: ExecutionConfig
+    seeing: Seeing | None = None
+    """Whose features it learned from; None: it reads words alone."""
+    eyes: FeatureSource | None = None
+    """Where the features come from; not part of its file."""
+
+    def look(self, sights: Sequence[Sight]) -> list[np.ndarray] | list[None]:
+        """(36, D) float32 of each sight; None of each where it does not see.
+
+        Raises:
+          ValueError: it sees, and nobody gave it eyes.
+        """
+        if self.seeing is None:
+            return [None] * len(sights)
+        if self.eyes is None:
+            raise ValueError("this execution policy sees; give it its houses' features (agents.hari.run.with_eyes)")
+        return [self.eyes.features(s) for s in sights]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +87,14 @@ class HariAgent:
     config: IntentionConfig
 
 
-def new_executor(config: ExecutionConfig, words: FeatureWords) -> Executor:
-    """Random weights that follow from the seed."""
+def new_executor(
+    config: ExecutionConfig, words: FeatureWords, seeing: Seeing | None = None, eyes: FeatureSource | None = None
+) -> Executor:
+    """Random weights that follow from the seed; of a policy that sees where `seeing` says whose features."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        return Executor(ExecutionNetwork(config, len(words)), words, config)
+        network = ExecutionNetwork(config, len(words), seeing.size if seeing else 0)
+        return Executor(network, words, config, seeing, eyes)
 
 
 def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, RecurrentHead]:
@@ -81,12 +107,12 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
 
 def save_executor(executor: Executor, path: Path) -> None:
     """Write an execution policy, atomically."""
-    _save({"execution": executor.network}, {"execution": as_dict(executor.config)}, executor.words, path)
+    _save({"execution": executor.network}, _settings_of(executor), executor.words, path)
 
 
 def save_agent(agent: HariAgent, path: Path) -> None:
     """Write an agent with its execution policy, atomically."""
-    settings = {"execution": as_dict(agent.executor.config), "intention": as_dict(agent.config)}
+    settings = _settings_of(agent.executor) | {"intention": as_dict(agent.config)}
     _save({"execution": agent.executor.network, "actor": agent.actor}, settings, agent.executor.words, path)
 
 
@@ -97,7 +123,7 @@ def load_executor(path: Path) -> Executor:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
     tensors, told = _load(Path(path))
-    executor = new_executor(told.settings.execution, FeatureWords(told.names))
+    executor = new_executor(told.settings.execution, FeatureWords(told.names), told.settings.sight)
     _fill(executor.network, tensors, "execution", path)
     executor.network.eval()
     return executor
@@ -121,6 +147,11 @@ def load_agent(path: Path) -> HariAgent:
     _fill(actor, tensors, "actor", path)
     actor.eval()
     return HariAgent(executor, actor, config)
+
+
+def _settings_of(executor: Executor) -> dict[str, dict[str, object]]:
+    seeing = executor.seeing
+    return {"execution": as_dict(executor.config)} | ({"sight": dataclasses.asdict(seeing)} if seeing else {})
 
 
 def _save(

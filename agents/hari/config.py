@@ -13,7 +13,13 @@ from agents.imitation.settings import (
     SHARE,
     ValidatedRunSettings,
     require,
+    require_word,
 )
+
+SEES = ("words", "features")
+"""What an execution policy knows its own place by."""
+STATES = ("none", "sparse", "dense")
+"""As in embodied.envs.hari."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,13 +45,21 @@ class ExecutionConfig(ValidatedRunSettings):
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
     """Share of the updates, the last ones, over which the learning rate falls linearly (docs/sources.md, S79)."""
+    sees: str = "words"
+    """'words': d^s alone, as in the dissertation; 'features': CNN features of the panorama always, d^s where there is
+    one (docs/sources.md, S130)."""
+    described: float = 0.5
+    """With features: share of the training episodes with words for d^s, at a share of their steps that is drawn."""
+    environment_dropout: float = 0.0
+    """With features: share of their channels that are hidden for a whole training episode (docs/sources.md, S131)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
         require(self, POSITIVE, "clip")
-        require(self, NOT_ALL, "dropout")
-        require(self, SHARE, "cooldown", "guided")
+        require(self, NOT_ALL, "dropout", "environment_dropout")
+        require(self, SHARE, "cooldown", "guided", "described")
+        require_word(self, "sees", SEES)
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
 
@@ -81,6 +95,8 @@ class IntentionConfig(ValidatedRunSettings):
     """H, the most steps of an episode."""
     cooperative: bool = True
     """False: the assistant answers another question than was asked (Table 4.7)."""
+    states: str = "sparse"
+    """How the agent's own place is described without asking: 'none', 'sparse' (as in the dissertation) or 'dense'."""
     perfect: bool = False
     """True: sub-goals are reached perfectly, whatever the execution policy would do (the skyline of Table 4.7)."""
     validate_every: int = 250
@@ -93,6 +109,7 @@ class IntentionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
+        require_word(self, "states", STATES)
         if self.move_temperature is not None and not 0 < self.move_temperature < float("inf"):
             raise ValueError(
                 f"move_temperature should be above 0, got {self.move_temperature}; leave it out for likeliest"
@@ -106,7 +123,14 @@ class IntentionConfig(ValidatedRunSettings):
 
 EXECUTION_SCALES: dict[str, ExecutionConfig] = {
     "mini": ExecutionConfig(
-        hidden_size=128, heads=4, learning_rate=1e-3, iterations=3_000, guided=0.5, cooldown=0.4, validate_every=250
+        hidden_size=128,
+        heads=4,
+        learning_rate=1e-3,
+        iterations=3_000,
+        guided=0.5,
+        cooldown=0.4,
+        environment_dropout=0.4,
+        validate_every=250,
     ),
     "paper": ExecutionConfig(),
 }

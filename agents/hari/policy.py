@@ -102,8 +102,8 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     goals = [reader("goal", o.goal_descriptions[-1]) for o in seen]
     inputs = collate(
         [
-            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn)
-            for s, g, o in zip(states, goals, seen, strict=True)
+            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn, view)
+            for s, g, o, view in zip(states, goals, seen, reader.executor.look([o.sight for o in seen]), strict=True)
         ]
     )
     state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))

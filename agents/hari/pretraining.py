@@ -5,7 +5,8 @@
         ask the shortest path what would have been right at each step
         cross-entropy, Adam step                                           (appendix E)
 
-A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5).
+A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5). A policy
+that sees is shown the panorama at every step and told d^s at some, as if it had asked (docs/sources.md, S130).
 """
 
 from __future__ import annotations
@@ -23,13 +24,14 @@ from torch import Tensor
 
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig, as_dict
-from agents.hari.words import collate, padded, percept
+from agents.hari.sight import hidden_channels
+from agents.hari.words import Inputs, collate, padded, percept
 from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
 from agents.imitation.loop import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
 from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
-from embodied.interface import Description, FindObject, Move, Place, Pose, Task
+from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Sight, Task
 from embodied.locks import locked
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
@@ -62,6 +64,10 @@ class Walk:
     goal: Description
     rng: np.random.Generator
     ended: bool = False
+    described: float = 1.0
+    """Share of its steps at which it is told d^s."""
+    channels: np.ndarray | None = None
+    """(D,) float32 that hides channels of what it sees, in training."""
 
 
 def pretrain(
@@ -119,6 +125,10 @@ def learn_once(
     config = executor.config
     tasks = tasks_of_update(lessons.training, update, config.batch, config.seed)
     walks = [_begin(lessons, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
+    if executor.seeing is not None:
+        for walk in walks:
+            walk.described = max(0.0, 1 - walk.rng.random() / config.described) if config.described else 0.0
+            walk.channels = hidden_channels(executor.seeing.size, config.environment_dropout, walk.rng)
     executor.network.train()
     with dropout_of(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
@@ -155,13 +165,8 @@ def _play(
         if not alive:
             break
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        seen = [_thinned(lessons.describer, walks[i]) for i in alive]
-        batch = collate(
-            [
-                percept(executor.words, d, walks[i].goal, candidates, walks[i].pose.turn)
-                for i, d, (candidates, _) in zip(alive, seen, reach, strict=True)
-            ]
-        )
+        told = [_thinned(lessons.describer, walks[i]) for i in alive]
+        batch = perceived(executor, [walks[i] for i in alive], told, [candidates for candidates, _ in reach])
         new, log_moves = executor.network(beliefs[alive], batch, goal=goals[alive])  # (b, h), (b, C + 1)
         stop = log_moves.shape[1] - 1
         wanted = torch.tensor([_right(walks[i], poses, stop) for i, (_, poses) in zip(alive, reach, strict=True)])
@@ -184,7 +189,22 @@ def _begin(lessons: Curriculum, task: Task, rng: np.random.Generator) -> Walk:
     return Walk(task, place, task.start, described, rng)
 
 
+def perceived(
+    executor: Executor, walks: Sequence[Walk], told: Sequence[Description], candidates: Sequence[Candidates]
+) -> Inputs:
+    """What some walks are told of where they are and, of a policy that sees, what is seen there."""
+    views = executor.look([Sight(w.task.world, w.pose.node) for w in walks])
+    return collate(
+        [
+            percept(executor.words, d, w.goal, c, w.pose.turn, v if v is None or w.channels is None else v * w.channels)
+            for w, d, c, v in zip(walks, told, candidates, views, strict=True)
+        ]
+    )
+
+
 def _thinned(describer: Describer, walk: Walk) -> Description:
+    if walk.described < 1 and walk.rng.random() >= walk.described:
+        return ()
     return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
 
 
@@ -202,7 +222,8 @@ def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
 
 
 def pretraining_success(executor: Executor, lessons: Curriculum, tasks: Sequence[Task]) -> float:
-    """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state."""
+    """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state; by sight
+    alone where the policy sees."""
     config = executor.config
     executor.network.eval()
     walks = [_begin(lessons, t, stream(config.seed, "validation", t.id)) for t in tasks]
@@ -219,17 +240,10 @@ def _play_greedily(executor: Executor, lessons: Curriculum, walks: Sequence[Walk
         if not alive:
             return
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        rows = [
-            percept(
-                executor.words,
-                lessons.describer.dense(walks[i].place, walks[i].pose.node),
-                walks[i].goal,
-                candidates,
-                walks[i].pose.turn,
-            )
-            for i, (candidates, _) in zip(alive, reach, strict=True)
-        ]
-        beliefs[alive], log_moves = executor.network(beliefs[alive], collate(rows))
+        dense = lambda walk: () if executor.seeing else lessons.describer.dense(walk.place, walk.pose.node)
+        some = [walks[i] for i in alive]
+        batch = perceived(executor, some, [dense(w) for w in some], [candidates for candidates, _ in reach])
+        beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
         for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
             _go(walks[i], column, poses, log_moves.shape[1] - 1)
 
@@ -249,9 +263,14 @@ def _validate(
     return progress
 
 
+def _settings_of(executor: Executor) -> dict[str, object]:
+    seeing = dataclasses.asdict(executor.seeing) if executor.seeing else None
+    return as_dict(executor.config) | {"names": list(executor.words.names), "sight": seeing}
+
+
 def _save(path: Path, executor: Executor, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
     body = {
-        "settings": as_dict(executor.config) | {"names": list(executor.words.names)},
+        "settings": _settings_of(executor),
         "network": executor.network.state_dict(),
         "optimizer": optimizer.state_dict(),
         "progress": vars(progress),
@@ -263,7 +282,7 @@ def _restore(path: Path, executor: Executor, optimizer: torch.optim.Optimizer) -
     if not path.exists():
         return Progress()
     body = read_checkpoint(path, FORMAT, ("settings", "network", "optimizer", "progress"))
-    refuse_changes(path, body["settings"], as_dict(executor.config) | {"names": list(executor.words.names)}, MAY_CHANGE)
+    refuse_changes(path, body["settings"], _settings_of(executor), MAY_CHANGE)
     executor.network.load_state_dict(body["network"])
     optimizer.load_state_dict(body["optimizer"])
     return Progress(**body["progress"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from agents.hari.agent import Executor, HariAgent, load_executor, new_executor, 
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
+from agents.hari.sight import eyes_of
 from agents.hari.words import feature_words
 from agents.imitation.loop import Note, Progress
 from embodied.datasets.store import Dataset, dataset_of
@@ -39,7 +41,8 @@ def lessons_of(data: Dataset) -> Curriculum:
 
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
-    return HariRules(Costs.alike(config.cost), config.stack, config.longest, config.cooperative, horizon=config.horizon)
+    costs = Costs.alike(config.cost)
+    return HariRules(costs, config.stack, config.longest, config.cooperative, config.states, config.horizon)
 
 
 def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
@@ -62,16 +65,43 @@ def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[
     return made
 
 
+def with_eyes(executor: Executor, data: Dataset, quality: str | None = None) -> Executor:
+    """An execution policy with the features of a data set's houses, if it is one that sees.
+
+    Args:
+      quality: of the pictures that they were made from, as in agents.vision.run.pictures_of.
+    """
+    if executor.seeing is None:
+        return executor
+    return dataclasses.replace(executor, eyes=eyes_of(data, executor.seeing.encoder, quality=quality)[0])
+
+
 def train_execution(
-    data: Dataset, config: ExecutionConfig, folder: Path, *, minutes: float | None = None, note: Note = print
+    data: Dataset,
+    config: ExecutionConfig,
+    folder: Path,
+    *,
+    encoder: str = "",
+    quality: str | None = None,
+    minutes: float | None = None,
+    note: Note = print,
 ) -> Progress:
-    """Train, or go on training, the execution policy of a run folder."""
+    """Train, or go on training, the execution policy of a run folder.
+
+    Args:
+      encoder: digest of the one whose features a policy sees that does.
+      quality: of the pictures that these were made from, as in agents.vision.run.pictures_of.
+    """
     lessons = lessons_of(data)
     describe = lessons.describer.dense
     houses = {t.world for t in lessons.training}
     places = [lessons.places[name] for name in sorted(houses)]
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
-    executor = new_executor(config, words)
+    eyes, seeing = None, None
+    if config.sees == "features":
+        eyes, seeing = eyes_of(data, encoder, splits=("pretrain", "pretrain_val"), quality=quality)
+        note(f"sees features of {seeing.size} numbers per view, pictures: {seeing.pictures}")
+    executor = new_executor(config, words, seeing, eyes)
     size = sum(p.numel() for p in executor.network.parameters())
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(words)} names, {size:,} parameters")
     return pretrain(executor, lessons, folder, minutes=minutes, note=note)
@@ -83,11 +113,16 @@ def train_intention(
     config: IntentionConfig,
     folder: Path,
     *,
+    quality: str | None = None,
     minutes: float | None = None,
     note: Note = print,
 ) -> Progress:
-    """Train, or go on training, the intention policy of a run folder over a trained execution policy."""
-    executor = load_executor(executor) if isinstance(executor, Path) else executor
+    """Train, or go on training, the intention policy of a run folder over a trained execution policy.
+
+    Args:
+      quality: of the pictures that an execution policy in a file sees, as in agents.vision.run.pictures_of.
+    """
+    executor = with_eyes(load_executor(executor), data, quality) if isinstance(executor, Path) else executor
     actor, critic = new_heads(config, executor.config.hidden_size)
     training = ground_of(data, ["train"], config)
     validation = ground_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)

@@ -8,25 +8,27 @@ where it stopped.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import joblib
 import numpy as np
 import torch
 
 from agents.hari.agent import load_agent, load_executor
-from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.figures import costs_figure, requests_figure, times_figure
 from agents.hari.judging import TEST, judge
 from agents.hari.networks import INTENTIONS
-from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention
+from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention, with_eyes
+from agents.hari.sight_study import KINDS, train_and_judge, write_sight
+from agents.hari.study_setting import HariStudySetting, estimates
 from agents.imitation.loop import Note
+from agents.imitation.studies import refuse_unknown, run_all, table, write_all, write_markdown
 from assets.cache import digest, write_bytes, write_json
-from embodied.evaluation.tables import Estimate, across_seeds, as_json, save, shown
+from embodied.evaluation.tables import as_json, save, shown
 from embodied.interface import Ask, Episode, Move
-from embodied.records import load_lines, parse_file, read_json, save_lines
+from embodied.records import load_lines, read_json, save_lines
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 COSTS = (0.01, 0.05, 0.1, 0.2, 0.5)
@@ -61,36 +63,11 @@ PRINTED: Mapping[str, str] = {
 """Success on unseen starts, objects and environments, and CUR, GOAL, SUB, DO, of Tables 4.7 and 4.8."""
 
 
-@dataclass(frozen=True)
-class HariStudySetting:
-    """What all runs of a study share."""
-
-    data: Path
-    out: Path
-    execution: ExecutionConfig
-    intention: IntentionConfig
-    """Its seed is the first one."""
-    executor: Path | None = None
-    """A trained execution policy; None trains one into the study's folder."""
-    seeds: int = 3
-    """Intention policies of each variant."""
-    tasks: int | None = None
-    """Judge on at most so many tasks of a split."""
-    threads: int = 1
-    """Of PyTorch, per run."""
-
-    @property
-    def repeats(self) -> list[int]:
-        return [self.intention.seed + k for k in range(self.seeds)]
-
-    def folder(self, variant: str, seed: int) -> Path:
-        return self.out / variant.replace(" ", "_").replace(",", "") / f"seed_{seed}"
-
-
 TABLES: Mapping[str, Sequence[str]] = {
     "4.7": ("learned", "uncooperative", "skyline"),
     "4.8": ("stack 1", "learned", "stack 3"),
     "moves": ("learned", "moves drawn"),
+    "sight": tuple(KINDS),
     "figure 4.5": ("learned",),
     "figure 4.6": tuple(v for v in VARIANTS if v.startswith("cost ")) + ("learned",),
 }
@@ -107,34 +84,38 @@ def run_study(
     Raises:
       ValueError: an unknown table.
     """
-    if unknown := [n for n in names if n not in TABLES]:
-        raise ValueError(f"unknown tables {unknown}; HARI's are {list(TABLES)}")
+    refuse_unknown(names, TABLES)
     executor = setting.executor or setting.out / "execution" / "best.safetensors"
-    if setting.executor is None:
+    variants = [v for n in names for v in TABLES[n]]
+    if setting.executor is None and set(variants) - set(KINDS):
         torch.set_num_threads(setting.threads)
-        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note)
-    jobs = [(v, s) for v in dict.fromkeys(v for n in names for v in TABLES[n]) for s in setting.repeats]
-    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
-    for line in parallel(joblib.delayed(_run)(setting, executor, v, s, note) for v, s in jobs):
-        note(line)
-    writers: Mapping[str, Callable[[HariStudySetting], Path]] = {
-        "4.7": lambda x: _write_table(x, "4.7", [*BY_RULES, *map(_learned, TABLES["4.7"])], "test"),
-        "4.8": lambda x: _write_table(x, "4.8", [_stacked(v) for v in TABLES["4.8"]], "val"),
-        "moves": lambda x: _write_table(x, "moves", MOVES, "test"),
-        "figure 4.5": _write_behaviour,
-        "figure 4.6": _write_costs,
+        how = {"encoder": setting.encoder, "quality": setting.quality}
+        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note, **how)
+    work = functools.partial(_run, setting, executor, note=note)
+    run_all(variants, setting.repeats, work, workers=workers, note=note)
+    writers: Mapping[str, Callable[[], Path]] = {
+        "4.7": lambda: _write_table(setting, "4.7", [*BY_RULES, *map(_learned, TABLES["4.7"])], "test"),
+        "4.8": lambda: _write_table(setting, "4.8", [_stacked(v) for v in TABLES["4.8"]], "val"),
+        "moves": lambda: _write_table(setting, "moves", MOVES, "test"),
+        "sight": lambda: write_sight(setting),
+        "figure 4.5": lambda: _write_behaviour(setting),
+        "figure 4.6": lambda: _write_costs(setting),
     }
-    return {name: writers[name](setting) for name in names}
+    return write_all(names, writers)
 
 
-def _run(setting: HariStudySetting, executor: Path, variant: str, seed: int, note: Note) -> str:
-    """Train one intention policy and judge it on validation and test splits, unless that is done."""
+def _run(setting: HariStudySetting, executor: Path, seed: int, variant: str, *, note: Note) -> str:
+    """Train one policy and judge it on validation and test splits, unless that is done."""
+    if variant in KINDS:
+        return train_and_judge(setting, seed, KINDS[variant], note)
     torch.set_num_threads(setting.threads)
     data, folder = hari_data(setting.data), setting.folder(variant, seed)
     config = dataclasses.replace(setting.intention, seed=seed, **VARIANTS[variant])  # type: ignore[arg-type]
+    walking = with_eyes(load_executor(executor), data, setting.quality)
     quiet: Note = lambda line: None
-    train_intention(data, load_executor(executor), config, folder, note=note if seed == setting.repeats[0] else quiet)
-    agent, rows = load_agent(folder / "best.safetensors"), []
+    train_intention(data, walking, config, folder, note=note if seed == setting.repeats[0] else quiet)
+    agent = load_agent(folder / "best.safetensors")
+    agent = dataclasses.replace(agent, executor=dataclasses.replace(agent.executor, eyes=walking.eyes))
     mark, of_what = folder / "judged.json", digest(folder / "best.safetensors", setting.tasks)
     if mark.exists() and read_json(mark) == {"of": of_what}:
         return f"{variant}, seed {seed}: judged before"
@@ -180,38 +161,17 @@ MOVES = [
 """What drawing DO's moves instead of taking the likeliest is worth; not in the dissertation."""
 
 
-def rows_of(setting: HariStudySetting, variant: str, row: str, split: str) -> list[dict[str, float]]:
-    """The means of one row of what was judged of a variant on one split, per seed."""
-    found = []
-    for seed in setting.repeats:
-        path = setting.folder(variant, seed) / "rows.json"
-        try:
-            (mine,) = [r for r in parse_file(path) if r["agent"] == row and r["split"] == split]  # type: ignore[attr-defined]
-            found.append({k: v["mean"] for k, v in mine["values"].items()})
-        except (KeyError, TypeError, AttributeError, ValueError) as e:
-            raise ValueError(f"{path} is no table of this study ({e!r}); delete it, the same command makes it") from e
-    return found
-
-
-def estimates(setting: HariStudySetting, variant: str, split: str, column: str, row: str = "learned") -> Estimate:
-    """A number of a row over seeds, with Student's interval."""
-    return across_seeds([r[column] for r in rows_of(setting, variant, row, split)])
-
-
-def _write_table(setting: HariStudySetting, table: str, rows: Sequence[TableLine], when: str) -> Path:
+def _write_table(setting: HariStudySetting, name: str, rows: Sequence[TableLine], when: str) -> Path:
     """Success per condition, and actions over all of them, beside what the dissertation prints."""
     splits = [f"{when}_{c}" for c in CONDITIONS]
     heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    lines = []
     for line in rows:
         number = lambda split, column, line=line: estimates(setting, line.variant, split, column, line.row)
         successes = [shown("success", number(s, "success")) for s in splits]
         actions = [f"{np.mean([number(s, a).mean for s in splits]):.1f}" for a in heads[4:8]]
-        lines.append("| " + " | ".join([line.shown, *successes, *actions, line.printed]) + " |")
-    about = f"{setting.seeds} training seeds per row; ± is Student's 95 % interval over them.\n"
-    path = setting.out / f"table_{table}.md"
-    write_bytes(path, ("\n".join([*lines, "", about])).encode())
-    return path
+        lines.append([line.shown, *successes, *actions, line.printed])
+    return write_markdown(setting.out / f"table_{name}.md", f"Table {name}", table(heads, lines), _seeds(setting))
 
 
 def _write_behaviour(setting: HariStudySetting) -> Path:
@@ -226,9 +186,8 @@ def _write_behaviour(setting: HariStudySetting) -> Path:
     ]
     requests_figure(per_condition, setting.out / "figure_4_5a.png")
     times_figure(intentions_by_time(episodes, setting.intention.horizon), setting.out / "figure_4_5b.png")
-    path = setting.out / "figure_4_5.md"
-    write_bytes(path, b"![Requests per condition](figure_4_5a.png)\n![Intentions by time](figure_4_5b.png)\n")
-    return path
+    pictures = ["![Requests per condition](figure_4_5a.png)", "![Intentions by time](figure_4_5b.png)"]
+    return write_markdown(setting.out / "figure_4_5.md", "Figure 4.5", pictures, _seeds(setting))
 
 
 def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> np.ndarray:
@@ -255,6 +214,9 @@ def _write_costs(setting: HariStudySetting) -> Path:
         for a in ("CUR", "GOAL", "SUB", "DO")
     }
     costs_figure(COSTS, success, actions, setting.out / "figure_4_6.png")
-    path = setting.out / "figure_4_6.md"
-    write_bytes(path, b"![Success and actions against cost](figure_4_6.png)\n")
-    return path
+    pictures = ["![Success and actions against cost](figure_4_6.png)"]
+    return write_markdown(setting.out / "figure_4_6.md", "Figure 4.6", pictures, _seeds(setting))
+
+
+def _seeds(setting: HariStudySetting) -> str:
+    return f"{setting.seeds} training seeds; intervals are Student's, 95 %, over them."

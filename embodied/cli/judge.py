@@ -73,6 +73,7 @@ def run_hari(args: argparse.Namespace) -> int:
     """Rows of Table 4.7 for one agent."""
     from agents.hari.agent import load_agent
     from agents.hari.judging import COLUMNS, TEST, judge
+    from agents.hari.run import with_eyes
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
     from assets.cache import digest, write_json
@@ -82,6 +83,7 @@ def run_hari(args: argparse.Namespace) -> int:
 
     file = SHIPPED_HARI if args.agent == SHIPPED_AGENT else args.agent
     data, agent, splits = Dataset(args.data), load_agent(file), args.split or TEST
+    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, data, args.quality))
     use_threads(args.threads)
 
     with locked(args.out) if args.out else contextlib.nullcontext():

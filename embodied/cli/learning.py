@@ -14,7 +14,7 @@ from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import SCALES, TrainingConfig
-from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
@@ -51,6 +51,10 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
         choices=(*NETWORKS[1:], "random"),
         help="torchvision network of --encoder; 'random' for an untrained compact one",
     )
+    add_quality(parser)
+
+
+def add_quality(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quality",
         choices=QUALITIES[1:],
@@ -166,7 +170,8 @@ def add_train_hari(parser: argparse.ArgumentParser) -> None:
     phases = parser.add_subparsers(dest="phase", metavar="PHASE", required=True)
     execution = phases.add_parser("execution", help="first: to understand descriptions and walk by them (DAgger)")
     _add_hari(execution, EXECUTION_SCALES)
-    add_fields(execution, ExecutionConfig, scales=EXECUTION_SCALES)
+    add_encoder(execution)
+    add_fields(execution, ExecutionConfig, scales=EXECUTION_SCALES, words={"sees": SEES})
     intention = phases.add_parser("intention", help="then: which question to ask when (actor-critic)")
     _add_hari(intention, INTENTION_SCALES)
     intention.add_argument(
@@ -176,7 +181,8 @@ def add_train_hari(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a trained execution policy (best.safetensors)",
     )
-    add_fields(intention, IntentionConfig, scales=INTENTION_SCALES)
+    add_quality(intention)
+    add_fields(intention, IntentionConfig, scales=INTENTION_SCALES, words={"states": STATES})
 
 
 def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
@@ -186,7 +192,9 @@ def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> 
 
 
 def add_study_hari(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.7, 4.8, 'figure 4.5' or 'figure 4.6'")
+    parser.add_argument(
+        "tables", nargs="+", metavar="TABLE", help="4.7, 4.8, moves, sight, 'figure 4.5' or 'figure 4.6'"
+    )
     _add_hari(parser, INTENTION_SCALES)
     parser.add_argument(
         "--execution",
@@ -199,7 +207,9 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
     )
     add_judged_tasks(parser)
     add_agents_side_by_side(parser)
-    add_fields(parser, IntentionConfig, scales=INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))
+    add_encoder(parser)
+    skip = ("stack", "cooperative", "perfect")
+    add_fields(parser, IntentionConfig, scales=INTENTION_SCALES, skip=skip, words={"states": STATES})
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:

@@ -148,6 +148,10 @@ def add_rules(parser: argparse.ArgumentParser) -> None:
     )
 
 
+STATES = ("none", "sparse", "dense")
+"""As in embodied.envs.hari, which --help should not import."""
+
+
 def add_hari_rules(parser: argparse.ArgumentParser) -> None:
     """HARI's variants; `hari_rules_of` reads them."""
     group = parser.add_argument_group("HARI's variants (defaults: Table E.2 of the dissertation)")
@@ -158,7 +162,12 @@ def add_hari_rules(parser: argparse.ArgumentParser) -> None:
         "--horizon", type=whole(), metavar="H", help="most steps of an episode (default: its task's, 30)"
     )
     group.add_argument("--uncooperative", action="store_true", help="the assistant answers another question than asked")
-    group.add_argument("--dense-states", action="store_true", help="the agent's own place is described densely, always")
+    group.add_argument(
+        "--states",
+        choices=STATES,
+        default=STATES[1],
+        help="how the agent's own place is described without asking (default: %(default)s)",
+    )
 
 
 def hari_rules_of(args: argparse.Namespace) -> HariRules:
@@ -166,7 +175,7 @@ def hari_rules_of(args: argparse.Namespace) -> HariRules:
     from embodied.envs.hari import Costs, HariRules
 
     costs, cooperative = Costs.alike(args.cost), not args.uncooperative
-    return HariRules(costs, args.stack, args.longest, cooperative, args.dense_states, args.horizon)
+    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon)
 
 
 # Options made from settings ---------------------------------------------------------------------

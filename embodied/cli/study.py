@@ -9,9 +9,9 @@
     embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
-number of training houses. HARI's are 4.7, 4.8, 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's: `askers`,
-`interventions`, `rooms` (wants --without-rooms) and `rules`. `bandit` is a translator
-that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
+number of training houses. HARI's are 4.7, 4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and
+'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (wants --without-rooms) and
+`rules`. `bandit` is a translator that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5; `stars` lets a HANNA
 agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it did: Tables 3.4,
 3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions, `speakers`: one that was never heard.
 Rows that tables share are trained once. Interrupt it whenever you like: the same command goes on.
@@ -71,7 +71,9 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
 
 def run_hari(args: argparse.Namespace) -> list[Path]:
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
-    from agents.hari.study import HariStudySetting, run_study
+    from agents.hari.study import run_study
+    from agents.hari.study_setting import HariStudySetting
+    from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
     setting = HariStudySetting(
@@ -83,6 +85,8 @@ def run_hari(args: argparse.Namespace) -> list[Path]:
         seeds=args.seeds,
         tasks=args.tasks,
         threads=args.threads,
+        encoder=encoder_of(args).digest if "sight" in args.tables else "",
+        quality=args.quality,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
 

@@ -97,16 +97,19 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention
     from agents.imitation.parallel import use_threads
+    from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
     use_threads(args.threads)
     data = hari_data(args.data)
     if args.phase == "execution":
         walking = chosen(args, EXECUTION_SCALES[args.scale])
-        train_execution(data, walking, args.out, minutes=args.minutes, note=note)
+        encoder = encoder_of(args).digest if walking.sees == "features" else ""
+        how = {"encoder": encoder, "quality": args.quality, "minutes": args.minutes}
+        train_execution(data, walking, args.out, note=note, **how)
     else:
         asking = chosen(args, INTENTION_SCALES[args.scale])
-        train_intention(data, args.execution, asking, args.out, minutes=args.minutes, note=note)
+        train_intention(data, args.execution, asking, args.out, quality=args.quality, minutes=args.minutes, note=note)
     return 0
 
 

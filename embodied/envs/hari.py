@@ -6,7 +6,7 @@ execution policy's choice) and DONE is `Stop`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,16 @@ class Costs:
         return getattr(self, action.intention.value) if isinstance(action, Ask) else 0.0
 
 
+STATES = ("none", "sparse", "dense")
+"""What an agent is told of where it is without asking."""
+
+
+def check_states(states: str) -> None:
+    """Raises ValueError for a word that is none of STATES."""
+    if states not in STATES:
+        raise ValueError(f"states must be one of {STATES}, got {states!r}")
+
+
 @dataclass(frozen=True)
 class HariRules:
     """What may be varied of HARI's environment; the defaults are Table E.2."""
@@ -55,8 +65,9 @@ class HariRules:
     """l_max, the most nodes to a sub-goal."""
     cooperative: bool = True
     """False: the assistant answers a question drawn from those that could be asked (Table 4.7)."""
-    dense_states: bool = False
-    """True: d^s is as rich as the assistant's, always, as for an agent that sees everything."""
+    states: str = "sparse"
+    """What d^s holds before anybody asks: one of STATES. 'none' is for agents that see for themselves, 'dense' is as
+    rich as the assistant's."""
     horizon: int | None = None
     """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
 
@@ -65,6 +76,7 @@ class HariRules:
             raise ValueError(
                 f"stack {self.stack}, longest {self.longest} and horizon {self.horizon} should be at least 1"
             )
+        check_states(self.states)
 
 
 AS_PRINTED = HariRules()
@@ -94,15 +106,20 @@ class HariEnv(HelpEnv):
         *,
         costs: Costs = Costs(),
         moves: Moves | None = None,
-        dense_states: bool = False,
+        states: str = "sparse",
     ) -> None:
         """
         Args:
-          dense_states: describe where the agent is as richly as the assistant would.
+          states: how where the agent is is described unasked, one of STATES.
         """
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs
-        self._see = describer.dense if dense_states else describer.sparse
+        check_states(states)
+        self._see: Callable[[Place, int], Description] = {
+            "none": lambda world, node: (),
+            "sparse": describer.sparse,
+            "dense": describer.dense,
+        }[states]
 
     def task_error(self, node: int, goal: int) -> float:
         """c(s, a_done): edges on the shortest path from node to goal (4.3.6; docs/sources.md, S61)."""

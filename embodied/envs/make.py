@@ -61,7 +61,7 @@ def environment_maker(
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
         assistant = willing if hari.cooperative else Uncooperative(willing)
         moves = PanoramicMoves()
-        return lambda: HariEnv(worlds, assistant, say, costs=hari.costs, moves=moves, dense_states=hari.dense_states)
+        return lambda: HariEnv(worlds, assistant, say, costs=hari.costs, moves=moves, states=hari.states)
     raise ValueError(f"unknown kind of task {kind!r}")
 
 

@@ -282,7 +282,7 @@ class StageSettings:
     rooms: bool = True
     """Whether VNLA's requests in a generated flat name the room; those of a data set are as it was built."""
     hari: HariRules = AS_PRINTED
-    """Variants of HARI: costs, stack, sub-goals' length, horizon, whether the assistant cooperates, dense states."""
+    """Variants of HARI: costs, stack, sub-goals' length, horizon, a willing assistant, what is told unasked."""
     wheels: bool = False
     """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
 
