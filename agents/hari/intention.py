@@ -58,6 +58,7 @@ def train(
     *,
     minutes: float | None = None,
     note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
     """Train `agent.actor` and `critic` in place, from `folder`'s checkpoint if there is one.
 
@@ -65,6 +66,7 @@ def train(
 
     Args:
       minutes: stop after this long in this session, as if interrupted.
+      on_validation: is given the update and the episodes of each validation (to record some).
 
     Raises:
       DivergedError: a loss or gradient is not finite; the last checkpoint is intact.
@@ -97,7 +99,10 @@ def train(
                 note(_line(done, session.progress.seconds, config.updates, seen))
                 seen = []
             if done % config.validate_every == 0 or last:
-                session.progress = _validate(agent, validation, session.progress, done, folder, note)
+                episodes = _validation_of(agent, validation)
+                session.progress = _kept(agent, episodes, validation, session.progress, done, folder, note)
+                if on_validation:
+                    on_validation(done, episodes)
     return session.progress
 
 
@@ -216,19 +221,29 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
     return {"success": success, **counts_of(episodes)}
 
 
-def _validate(agent: HariAgent, ground: Ground, progress: Progress, update: int, folder: Path, note: Note) -> Progress:
-    """Judge by what is optimised: the mean cost, task errors included; keep the cheapest agent."""
-    config = agent.config
-    tasks = ground.tasks[: config.validation_tasks]
+def _validation_of(agent: HariAgent, ground: Ground) -> Sequence[Episode]:
+    config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
     with torch.inference_mode():
-        episodes = play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)
+        return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)
+
+
+def _kept(
+    agent: HariAgent,
+    episodes: Sequence[Episode],
+    ground: Ground,
+    progress: Progress,
+    update: int,
+    folder: Path,
+    note: Note,
+) -> Progress:
+    """Judge by what is optimised: the mean cost, task errors included; keep the cheapest agent."""
     cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
     numbers = {"cost": cost, **numbers_of(episodes, ground.places)}
     with open(folder / "validation.jsonl", "a") as f:
         f.write(json.dumps({"update": update, "episodes": len(episodes), **numbers}) + "\n")
     kept = -cost >= progress.best
     said = ", ".join(f"{k} {v:.2f}" for k, v in numbers.items())
-    note(f"validation on {len(tasks)} tasks after {update} updates: {said}{'; kept' * kept}")
+    note(f"validation on {len(episodes)} tasks after {update} updates: {said}{'; kept' * kept}")
     if kept:
         save_agent(agent, folder / "best.safetensors")
         return dataclasses.replace(progress, best=-cost, best_update=update)

@@ -12,11 +12,10 @@ from agents.hari.policy import policy_of
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
 from agents.hari.run import CONDITIONS, ground_of, rules_of
 from embodied.datasets.store import Dataset
-from embodied.envs.base import HelpEnv
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
-from embodied.interface import Agent, Episode, Task
+from embodied.interface import Agent, Episode
 
 TEST = tuple(f"test_{c}" for c in CONDITIONS)
 COLUMNS = ("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error")
@@ -76,15 +75,10 @@ def judge(
         tasks = spread(whole.tasks, limit)
         graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):
-            episodes = _play(whole.make_env, judged[name], tasks, agent, seed)
+            with torch.inference_mode():
+                batch = agent.config.batch
+                episodes = play(whole.make_env, judged[name], tasks, seed=seed, batch=batch, agent=name)
             rows.append(row(name, split, episodes, graphs, seed=seed))
             if keep:
                 keep(split, name, episodes)
     return rows
-
-
-def _play(
-    make_env: Callable[[], HelpEnv], policy: Agent, tasks: Sequence[Task], agent: HariAgent, seed: int
-) -> list[Episode]:
-    with torch.inference_mode():
-        return play(make_env, policy, tasks, seed=seed, batch=agent.config.batch)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from agents.hari.agent import Executor, HariAgent, load_executor, new_executor, new_heads
+from agents.hari.agent import Executor, HariAgent, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
@@ -17,7 +17,7 @@ from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
-from embodied.interface import Place
+from embodied.interface import Episode, Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
@@ -109,23 +109,20 @@ def train_execution(
 
 def train_intention(
     data: Dataset,
-    executor: Executor | Path,
+    executor: Executor,
     config: IntentionConfig,
     folder: Path,
     *,
-    quality: str | None = None,
     minutes: float | None = None,
     note: Note = print,
+    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train, or go on training, the intention policy of a run folder over a trained execution policy.
-
-    Args:
-      quality: of the pictures that an execution policy in a file sees, as in agents.vision.run.pictures_of.
-    """
-    executor = with_eyes(load_executor(executor), data, quality) if isinstance(executor, Path) else executor
+    """Train, or go on training, the intention policy of a run folder over a trained execution policy that has its eyes;
+    `on_validation` is given the episodes of each validation."""
     actor, critic = new_heads(config, executor.config.hidden_size)
     training = ground_of(data, ["train"], config)
     validation = ground_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
     note(f"{len(training.tasks)} tasks in {len(training.places)} houses, {size:,} parameters of each head")
-    return train(HariAgent(executor, actor, config), critic, training, validation, folder, minutes=minutes, note=note)
+    agent, watch = HariAgent(executor, actor, config), on_validation
+    return train(agent, critic, training, validation, folder, minutes=minutes, note=note, on_validation=watch)

@@ -115,7 +115,9 @@ def judged(setting: HariStudySetting, executor: Executor, line: SightLine, drawn
     for split in TEST:
         whole = data.split(split, hari=rules_of(config))
         with torch.inference_mode():
-            episodes = play(whole.make_env, agent, spread(whole.tasks, setting.tasks), seed=seed, batch=config.batch)
+            episodes = play(
+                whole.make_env, agent, spread(whole.tasks, setting.tasks), seed=seed, batch=config.batch, agent=name
+            )
         rows.append(row(name, split, episodes, {n: p.graph for n, p in whole.worlds.items()}, seed=seed))
         save_lines(setting.folder(variant_of(line.sees), seed) / "episodes" / episodes_file(split, name), episodes)
     return rows

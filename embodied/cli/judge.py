@@ -1,6 +1,6 @@
 """Judge a learned HANNA agent (Tables 4.3 to 4.5, and why its episodes fail), VNLA agent or HARI agent (Table 4.7).
 
-Which one it is follows from the data set.
+Which one it is follows from the data set. --rrd records what the learned agent did, as `embodied view --episode` does.
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ import argparse
 import contextlib
 import dataclasses
 import json
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import bar, note, show
+from embodied.cli.options import whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,17 +27,47 @@ def add(parser: argparse.ArgumentParser) -> None:
     from embodied.cli import learning
 
     learning.add_eval(parser)
+    parser.add_argument(
+        "--rrd",
+        type=whole(),
+        metavar="N",
+        help="record the learned agent's first N episodes of each split into OUT/recordings; wants --out",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     from embodied.datasets.store import Dataset
 
-    kind = Dataset(args.data).kind
-    if kind in ("hari", "vnla"):
-        return run_hari(args) if kind == "hari" else run_vnla(args)
+    if args.rrd and not args.out:
+        raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
+    {"hari": run_hari, "vnla": run_vnla}.get(Dataset(args.data).kind, run_hanna)(args)
+    if args.rrd:
+        record_learned(args)
+    return 0
+
+
+def run_hanna(args: argparse.Namespace) -> int:
+    """Tables 4.3 to 4.5, and failures."""
     from agents import judging
 
     return judging.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))
+
+
+def record_learned(args: argparse.Namespace) -> None:
+    """The first episodes of the learned agent of each split, recorded in their houses as the data set holds them."""
+    from assets.catalogue import load_catalogue
+    from embodied.cli.view import record_again
+    from embodied.datasets.store import Dataset
+    from viz.report import load_run
+    from viz.sinks import Sinks
+
+    data, catalogue, counts = Dataset(args.data), load_catalogue(args.cache), Counter[str]()
+    args.quality = args.quality or "unlit"
+    for number, listed in enumerate(load_run(args.out)):
+        if listed.agent.endswith(" learned") and counts[listed.agent] < args.rrd:
+            counts[listed.agent] += 1
+            sinks = Sinks(args.out / "recordings" / f"{number}.rrd", ())
+            record_again(args.out, data, listed.episode, sinks, catalogue, args)
 
 
 def run_vnla(args: argparse.Namespace) -> int:
@@ -76,6 +108,7 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.run import with_eyes
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
+    from agents.vision.run import pictures_of
     from assets.cache import digest, write_json
     from embodied.datasets.store import Dataset
     from embodied.locks import locked
@@ -99,6 +132,10 @@ def run_hari(args: argparse.Namespace) -> int:
         )
         if args.out:
             about = {"data": data.digest, "agent": digest(Path(file)), "splits": list(splits)}
+            if agent.executor.seeing:
+                drawn = {n: pictures_of(data, n, args.quality) for split in splits for n in data.names(split)}
+                about |= {"looking": sorted({r.agent for r in rows})}
+                about |= {"pictures": {n: dataclasses.asdict(p) for n, p in drawn.items()}}
             write_json(Path(args.out) / "run.json", fingerprint(seed=args.seed, tasks=args.tasks, **about), indent=1)
         _tell(args, rows, COLUMNS, {})
     return 0

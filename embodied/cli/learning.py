@@ -165,8 +165,8 @@ def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_fields(parser, VnlaSettings, skip=("asker", "ask_rules", "rules"), scales=VNLA_SCALES)
 
 
-def add_train_hari(parser: argparse.ArgumentParser) -> None:
-    """Two phases, one after the other."""
+def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """Two phases, one after the other; returns the parser of the second."""
     phases = parser.add_subparsers(dest="phase", metavar="PHASE", required=True)
     execution = phases.add_parser("execution", help="first: to understand descriptions and walk by them (DAgger)")
     _add_hari(execution, EXECUTION_SCALES)
@@ -183,6 +183,7 @@ def add_train_hari(parser: argparse.ArgumentParser) -> None:
     )
     add_quality(intention)
     add_fields(intention, IntentionConfig, scales=INTENTION_SCALES, words={"states": STATES})
+    return intention
 
 
 def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:

@@ -38,12 +38,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     learning.add_train_vnla(vnla)
     hari = kinds.add_parser("hari", help="the agent that learns which question to ask", description=run_hari.__doc__)
-    learning.add_train_hari(hari)
+    intention = learning.add_train_hari(hari)
     iliad = kinds.add_parser(
         "iliad", help="a student that learns from descriptions of what it did", description=run_iliad.__doc__
     )
     learning.add_train_iliad(iliad)
-    for parser in (hanna, vnla):
+    for parser in (hanna, vnla, intention):
         parser.add_argument(
             "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
         )
@@ -94,8 +94,9 @@ def run_vnla(args: argparse.Namespace) -> int:
 
 def run_hari(args: argparse.Namespace) -> int:
     """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
+    from agents.hari.agent import load_executor
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
-    from agents.hari.run import hari_data, train_execution, train_intention
+    from agents.hari.run import hari_data, train_execution, train_intention, with_eyes
     from agents.imitation.parallel import use_threads
     from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
@@ -103,13 +104,15 @@ def run_hari(args: argparse.Namespace) -> int:
     use_threads(args.threads)
     data = hari_data(args.data)
     if args.phase == "execution":
-        walking = chosen(args, EXECUTION_SCALES[args.scale])
-        encoder = encoder_of(args).digest if walking.sees == "features" else ""
-        how = {"encoder": encoder, "quality": args.quality, "minutes": args.minutes}
-        train_execution(data, walking, args.out, note=note, **how)
+        config = chosen(args, EXECUTION_SCALES[args.scale])
+        encoder = encoder_of(args).digest if config.sees == "features" else ""
+        quality, minutes = args.quality, args.minutes
+        train_execution(data, config, args.out, encoder=encoder, quality=quality, minutes=minutes, note=note)
     else:
         asking = chosen(args, INTENTION_SCALES[args.scale])
-        train_intention(data, args.execution, asking, args.out, quality=args.quality, minutes=args.minutes, note=note)
+        walking = with_eyes(load_executor(args.execution), data, args.quality)
+        watch = _recorder(args, sees=walking.seeing is not None) if args.rrd else None
+        train_intention(data, walking, asking, args.out, minutes=args.minutes, note=note, on_validation=watch)
     return 0
 
 
@@ -148,8 +151,8 @@ def run_nav(args: argparse.Namespace) -> int:
     return 0
 
 
-def _recorder(args: argparse.Namespace) -> Callable[[int, Sequence[Episode]], None]:
-    """Writes the first validation episodes of each validation as Rerun recordings, with what the agent saw."""
+def _recorder(args: argparse.Namespace, *, sees: bool = True) -> Callable[[int, Sequence[Episode]], None]:
+    """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
     from agents.vision.run import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
     from viz.recording import record_episode
@@ -160,8 +163,8 @@ def _recorder(args: argparse.Namespace) -> Callable[[int, Sequence[Episode]], No
     def keep(update: int, episodes: Sequence[Episode]) -> None:
         for number, episode in enumerate(episodes[:WATCHED]):
             name = episode.task.world
-            with drawn_world(data, name, args.cache, pictures_of(data, name, args.quality)) as eyes:
+            with drawn_world(data, name, args.cache, pictures_of(data, name, args.quality)) as world:
                 file = args.out / f"validation_{update:06d}_{number}.rrd"
-                record_episode(eyes, episode, Sinks(file), eyes=eyes)
+                record_episode(world, episode, Sinks(file), eyes=world if sees else None)
 
     return keep

@@ -21,7 +21,11 @@ from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
     from agents.vision.config import Looked
+    from assets.catalogue import Catalogue
+    from embodied.datasets.store import Dataset
+    from embodied.interface import Episode
     from viz.report import Listed
+    from viz.sinks import Sinks
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +83,6 @@ def show_file(args: argparse.Namespace) -> int:
 def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
-    from viz.recording import record_episode
     from viz.sinks import Sinks
 
     if not 0 <= args.episode < len(found):
@@ -91,23 +94,35 @@ def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
     episode = found[args.episode].episode
     file = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
     with viewers_of(args) as viewers:
-        catalogue, data = catalogue_of(args), Dataset(args.data)
-        if f"{episode.task.world}/house.json" not in data.index.files:
-            raise ValueError(f"{args.data} has no house {episode.task.world!r}; name the data set of the run")
-        name = episode.task.world
-        seen = looked_at(args.folder).by(episode.agent, name)
-        with contextlib.ExitStack() as stack:
-            eyes = None
-            if seen is not None:
-                from agents.vision.run import drawn_world  # loads torch
-
-                eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
-            world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
-            watch = lambda steps: bar(steps, "recording", "step")
-            record_episode(world, episode, Sinks(file, viewers), eyes=eyes, watch=watch)
-        note(f"recorded {episode.task.id}")
+        record_again(args.folder, Dataset(args.data), episode, Sinks(file, viewers), catalogue_of(args), args)
         show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
     return 0
+
+
+def record_again(
+    run: Path, data: Dataset, episode: Episode, sinks: Sinks, catalogue: Catalogue, args: argparse.Namespace
+) -> None:
+    """Record an episode of a run in its house, drawn again as `args.quality`, and with what its agent saw.
+
+    Raises:
+      ValueError: the house is not in the data set.
+    """
+    from viz.recording import record_episode
+
+    name = episode.task.world
+    if f"{name}/house.json" not in data.index.files:
+        raise ValueError(f"{data.folder} has no house {name!r}; name the data set of the run")
+    seen = looked_at(run).by(episode.agent, name)
+    with contextlib.ExitStack() as stack:
+        eyes = None
+        if seen is not None:
+            from agents.vision.run import drawn_world  # loads torch
+
+            eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
+        world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
+        watch = lambda steps: bar(steps, "recording", "step")
+        record_episode(world, episode, sinks, eyes=eyes, watch=watch)
+    note(f"recorded {episode.task.id}")
 
 
 def looked_at(run: Path) -> Looked:
