@@ -89,8 +89,7 @@ def run_study(
     variants = [v for n in names for v in TABLES[n]]
     if setting.executor is None and set(variants) - set(KINDS):
         torch.set_num_threads(setting.threads)
-        how = {"encoder": setting.encoder, "quality": setting.quality}
-        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note, **how)
+        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note)
     work = functools.partial(_run, setting, executor, note=note)
     run_all(variants, setting.repeats, work, workers=workers, note=note)
     writers: Mapping[str, Callable[[], Path]] = {

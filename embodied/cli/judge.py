@@ -131,7 +131,7 @@ def run_hari(args: argparse.Namespace) -> int:
             watch=lambda agents: bar(agents, "agents", "agent"),
         )
         if args.out:
-            about = {"data": data.digest, "agent": digest(Path(file)), "splits": list(splits)}
+            about: dict[str, object] = {"data": data.digest, "agent": digest(Path(file)), "splits": list(splits)}
             if agent.executor.seeing:
                 drawn = {n: pictures_of(data, n, args.quality) for split in splits for n in data.names(split)}
                 about |= {"looking": sorted({r.agent for r in rows})}

@@ -115,11 +115,12 @@ class HariEnv(HelpEnv):
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs
         check_states(states)
-        self._see: Callable[[Place, int], Description] = {
+        see: Mapping[str, Callable[[Place, int], Description]] = {
             "none": lambda world, node: (),
             "sparse": describer.sparse,
             "dense": describer.dense,
-        }[states]
+        }
+        self._see = see[states]
 
     def task_error(self, node: int, goal: int) -> float:
         """c(s, a_done): edges on the shortest path from node to goal (4.3.6; docs/sources.md, S61)."""
