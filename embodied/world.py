@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
 from tqdm import tqdm
 
 from assets.cache import digest
@@ -113,6 +114,13 @@ class World:
     def lit(self) -> LitPages | None:
         """The house with its baked light painted on; None where it is not lit. Bakes on first use."""
         return self._baked().lit if self.pictures.lit else None
+
+    def darkness(self, position: Sequence[float] | np.ndarray) -> float:
+        """How much darker than one where white paper has 100 cd/m2 the room at `position` is, by its exposure; 1 where
+        the house is not lit."""
+        if not self.pictures.lit:
+            return 1.0
+        return float(self._baked().exposure.at(np.asarray(position, float)[None]).mean())
 
     @property
     def renderer(self) -> Renderer:

@@ -163,3 +163,20 @@ def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
 def test_without_an_installed_encoder_the_error_names_the_remedies():
     with pytest.raises(module.UnableError, match="no encoder 'mine' is installed"):
         module.encoder_entry("mine")
+
+
+def test_a_robots_camera_is_seen_through_and_sees_the_same_again(world):
+    views = [ViewSettings(height=40, width=56, camera=c, device=1) for c in ("robot", "robot", "ideal")]
+    envs = [env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb", "ids"), v)) for v in views]
+    one, again, ideal = (e.reset(seed=0, options={"task": 1})[0] for e in envs)
+    assert envs[0].observation_space.contains(one)
+    assert np.array_equal(one["rgb"], again["rgb"]) and not np.array_equal(one["rgb"], ideal["rgb"])
+    assert np.array_equal(one["target_rgb"], again["target_rgb"])
+    assert set(np.unique(one["ids"])) <= set(np.unique(ideal["ids"]))
+    for frame in ("views36", "equirect"):
+        whole = ViewSettings(frame, 24, camera="phone")
+        eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth"), whole)
+        o, _ = env_of(world, eyes).reset(seed=0, options={"task": 0})
+        assert o["rgb"].shape == (*whole.shape, 3) and o["depth"].shape == whole.shape
+    with pytest.raises(ValueError, match="camera 'webcam' is unknown"):
+        ViewSettings(camera="webcam")

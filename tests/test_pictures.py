@@ -114,3 +114,19 @@ def test_what_is_missing_mixed_or_damaged_is_said(data):
     with pytest.raises(ValueError, match=r"several kinds .*\('fast', 8\), \('fast', 16\)"):
         pictures_of(data, ["train_0000", "val_0000"], wanted=True)
     path.write_bytes(whole)
+
+
+def test_cameras_are_drawn_for_each_item_and_epoch(data):
+    view = ViewSettings("view", 24, 32)
+    make = lambda **more: ViewpointPictures(data, "train", view=view, **more)
+    plain, taken, other = make(), make(cameras=("phone", "robot"), seed=1), make(cameras=("phone", "robot"), seed=2)
+    assert torch.equal(make(cameras=("ideal",))[7]["rgb"], plain[7]["rgb"])
+    assert torch.equal(taken[7]["rgb"], make(cameras=("phone", "robot"), seed=1)[7]["rgb"])
+    assert not torch.equal(taken[7]["rgb"], plain[7]["rgb"]) and not torch.equal(taken[7]["rgb"], other[7]["rgb"])
+    before = taken[7]["rgb"]
+    taken.set_epoch(1)
+    assert not torch.equal(before, taken[7]["rgb"])
+    with pytest.raises(ValueError, match="cameras take views"):
+        ViewpointPictures(data, "train", cameras=("phone",))
+    with pytest.raises(ValueError, match="'webcam' is unknown"):
+        make(cameras=("webcam",))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import torch
@@ -20,9 +21,10 @@ from agents.vision.encoder import Encoder, load_encoder, pool_views, random_enco
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import train_encoder, turned
+from agents.vision.training import taken, train_encoder, turned
 from embodied.interface import Sight
 from embodied.render.pictures import PictureSettings
+from embodied.seeds import stream
 
 
 def torchvision_layout(name: str) -> dict[str, tuple[int, ...]]:
@@ -357,3 +359,15 @@ def test_a_full_disk_is_one_line_that_names_the_file_of_weights(name, tmp_path):
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith(f"error: {tmp_path / name}: File too large")
     assert not list(tmp_path.iterdir())
+
+
+def test_training_strips_can_be_photographed_and_are_the_same_without(tmp_path):
+    rng = np.random.default_rng(0)
+    strip = rng.integers(0, 200, (192, 576, 3), dtype=np.uint8)
+    strip = cv2.GaussianBlur(strip, (0, 0), 8)
+    assert taken(strip, ("ideal",), rng=stream(0, "t")) is strip
+    shots = [taken(strip, ("phone", "robot"), rng=stream(k, "t")) for k in (0, 0, 1)]
+    assert np.array_equal(shots[0], shots[1]) and not np.array_equal(shots[0], shots[2])
+    assert all(s.shape == strip.shape and s.dtype == np.uint8 for s in shots)
+    with pytest.raises(ValueError, match="unknown"):
+        VisionConfig(cameras=("webcam",))

@@ -23,6 +23,7 @@ from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Sight, Step, Stop, Task
 from embodied.navigation.free_space import EYE
 from embodied.render.panorama import Panorama
+from embodied.render.photograph import PhotoCamera
 from embodied.world import World
 from viz.blueprint import blueprint_of
 from viz.described import log_described
@@ -56,6 +57,8 @@ class Pictures:
     """Height of the equirectangular panorama; twice as wide."""
     jpeg: int = 85
     """JPEG quality, 1 to 100."""
+    camera: PhotoCamera = PhotoCamera()
+    """What takes the first-person views; panoramas and targets stay as they are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +122,7 @@ def record_episode(
     sinks: Sinks,
     *,
     eyes: World | None = None,
+    pictures: Pictures = Pictures(),
     watch: Callable[[Sequence[Step]], Iterable[Step]] = iter,
 ) -> None:
     """Record a finished episode of `world`, with the layout that suits it.
@@ -126,6 +130,7 @@ def record_episode(
     Args:
       eyes: the world whose panoramas the agent's features were made from; what it sees is drawn from them, and
         said to be. None for an agent that looks at no pictures.
+      pictures: their sizes, and the camera.
       watch: wraps the iterator over steps (a progress bar).
 
     Raises:
@@ -135,7 +140,7 @@ def record_episode(
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
     with open_recording(sinks, layout, name=episode.task.request, properties=about) as recording:
-        for _ in record(recording, world, episode.task, watch(episode.steps), eyes=eyes):
+        for _ in record(recording, world, episode.task, watch(episode.steps), eyes=eyes, pictures=pictures):
             pass
 
 
@@ -277,7 +282,8 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
 
 def ahead(panorama: Panorama, pose: Pose, sizes: Pictures) -> rr.EncodedImage:
     """The first-person view from a panorama along the gaze."""
-    return encoded(panorama.view_rgb(pose.yaw, pose.pitch, VFOV, sizes.view), sizes.jpeg)
+    rgb = panorama.view_rgb(pose.yaw, pose.pitch, VFOV, sizes.view)
+    return encoded(sizes.camera.photographed(rgb, VFOV, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
 
 
 def on_floor(eyes: np.ndarray, height: float) -> np.ndarray:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
 NETWORKS = ("compact", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
@@ -55,8 +56,14 @@ class VisionConfig:
     """A class is learned if it is visible in at least this many training views."""
     seed: int = 0
     """Of everything that is drawn."""
+    cameras: tuple[str, ...] = ("ideal",)
+    """Kinds of camera, 'ideal', 'phone' or 'robot', one of which takes each strip, drawn evenly."""
 
     def __post_init__(self) -> None:
+        if not self.cameras:
+            raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
+        for name in self.cameras:
+            check_camera(name)
         if self.network not in NETWORKS:
             raise ValueError(f"network must be one of {NETWORKS}, got {self.network!r}")
         for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):

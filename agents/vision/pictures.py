@@ -9,6 +9,7 @@ Nothing is drawn here: the data set must hold panoramas.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -26,6 +27,8 @@ from embodied.gym.playground import pictures_of
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile
+from embodied.render.photograph import check_camera
+from embodied.seeds import stream
 
 OPEN = 16
 """Panorama files that a process holds open."""
@@ -59,6 +62,9 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
       house    int64, into `houses`
       node     int64
 
+    With `cameras` every picture is taken by another device of one of these kinds, drawn anew for each item and epoch
+    (`set_epoch`); depth, ids and what is visible follow its lens.
+
     Safe in a DataLoader's workers: each process opens the files for itself, when it first needs them.
     """
 
@@ -70,16 +76,24 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         view: ViewSettings | None = None,
         channels: Sequence[str] = PIXELS,
         classes: Sequence[str] | None = None,
+        cameras: Sequence[str] = (),
+        seed: int = 0,
     ) -> None:
         """
         Args:
           view: how the pictures are framed; the six faces as they are stored where not given.
           channels: some of 'rgb', 'depth', 'ids'; what is left out is not decoded. 'visible' comes with 'ids'.
           classes: what `visible` counts; the objects of the split's houses where not given.
+          cameras: some of embodied.render.photograph.CAMERAS, drawn evenly, as augmentation; the view's own where
+            none is given.
+          seed: of what is drawn.
 
         Raises:
-          ValueError: the data set has no such pictures, or no such channel.
+          ValueError: the data set has no such pictures, or no such channel; cameras for faces, which no camera takes.
         """
+        if cameras and view is None:
+            raise ValueError("cameras take views: give view=ViewSettings(...) with cameras=...")
+        self._cameras, self._seed, self._epoch = tuple(map(check_camera, cameras)), seed, 0
         if not channels or set(channels) - set(PIXELS):
             raise ValueError(f"channels should be some of {PIXELS}, got {tuple(channels)!r}")
         names = data.names(split)
@@ -92,6 +106,10 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         self._ends = np.cumsum([self._each * len(h.positions) for h in self._known])
         self._open: OrderedDict[int, PanoramaFile] = OrderedDict()
         self._process = os.getpid()
+
+    def set_epoch(self, epoch: int) -> None:
+        """Other cameras for the same pictures; before a DataLoader starts its workers."""
+        self._epoch = epoch
 
     def __len__(self) -> int:
         return int(self._ends[-1])
@@ -110,7 +128,7 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         node, k = divmod(item - before, self._each)
         known = self._known[house]
         yaw, pitch = (float(VIEW_YAWS[k]), float(VIEW_PITCHES[k])) if self._each > 1 else (0.0, 0.0)
-        found = self._seen(house, node, yaw, pitch)
+        found = self._seen(house, node, yaw, pitch, self._camera_of(item))
         out = {name: torch.from_numpy(_colours_first(name, a)) for name, a in found.items()}
         if "ids" in found:
             out["visible"] = torch.from_numpy(_visible(found["ids"], known.class_of_id, len(self.classes)))
@@ -127,13 +145,24 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         """To another process go no open files."""
         return {**self.__dict__, "_open": OrderedDict()}
 
-    def _seen(self, house: int, node: int, yaw: float, pitch: float) -> dict[str, np.ndarray]:
+    def _camera_of(self, item: int) -> ViewSettings | None:
+        """How item `item` is framed in this epoch, and by which device."""
+        if not self._cameras or self._view is None:
+            return self._view
+        rng = stream(self._seed, "cameras", self._epoch, item)
+        camera = self._cameras[int(rng.integers(len(self._cameras)))]
+        return dataclasses.replace(self._view, camera=camera, device=int(rng.integers(2**31)))
+
+    def _seen(
+        self, house: int, node: int, yaw: float, pitch: float, view: ViewSettings | None
+    ) -> dict[str, np.ndarray]:
         """The wanted channels of what is seen, colours last."""
         panorama = _decoded(self._file(house), node, self._channels)
-        if self._view is None:
+        if view is None:
             faces = {"rgb": panorama.rgb, "depth": np.minimum(panorama.depth, np.float32(FAR)), "ids": panorama.ids}
             return {name: faces[name] for name in self._channels}
-        return {name: framed(panorama, self._view, name, yaw, pitch) for name in self._channels}
+        place = self.houses[house], node
+        return {name: framed(panorama, view, name, yaw, pitch, place=place) for name in self._channels}
 
     def _file(self, house: int) -> PanoramaFile:
         """The panoramas of a house, opened by this process."""

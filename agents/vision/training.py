@@ -30,6 +30,7 @@ from agents.vision.strip import CELL, COLUMNS
 from assets.cache import write_json
 from assets.records import ROOM_KINDS
 from embodied.records import load_json
+from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
 
 SHADE = 0.3
@@ -93,9 +94,15 @@ def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tenso
 
 
 def batches(
-    houses: Sequence[HouseStrips], classes: Sequence[int], size: int, *, rng: np.random.Generator
+    houses: Sequence[HouseStrips],
+    classes: Sequence[int],
+    size: int,
+    cameras: Sequence[str] = ("ideal",),
+    *,
+    rng: np.random.Generator,
 ) -> Iterator[StripBatch]:
-    """One pass over all nodes in random order, each strip rolled, perhaps mirrored, and recoloured."""
+    """One pass over all nodes in random order, each strip rolled, perhaps mirrored, recoloured, and photographed by
+    one of `cameras`."""
     where = [(h, i) for h, house in enumerate(houses) for i in range(len(house.rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
@@ -104,7 +111,8 @@ def batches(
         rgb, share, rooms, depth, room = [], [], [], [], []
         for h, i in chosen:
             house, turn, mirror = houses[h], int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
-            rgb.append(recolour(turned(house.rgb[i], turn * CELL, mirror), rng=rng))
+            seen = recolour(turned(house.rgb[i], turn * CELL, mirror), rng=rng)
+            rgb.append(taken(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
             share.append(turned(house.share[i], turn, mirror)[..., columns])
             rooms.append(turned(house.rooms[i], turn, mirror))
             depth.append(turned(house.log_depth[i], turn, mirror))
@@ -141,6 +149,13 @@ def recolour(image: np.ndarray, *, rng: np.random.Generator) -> np.ndarray:
     return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
 
+def taken(strip: np.ndarray, cameras: Sequence[str], *, rng: np.random.Generator) -> np.ndarray:
+    """A strip as another device of one of `cameras` takes it: exposure, balance, bloom, noise and JPEG, but no lens,
+    since a strip is stitched of views and labels stand in its cells."""
+    traits = camera_traits(cameras[int(rng.integers(len(cameras)))], rng=rng)
+    return strip if traits is None else photograph(np.ascontiguousarray(strip), traits, None, rng=rng)
+
+
 def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
     """Indices of the classes visible in at least `least` views of `houses`."""
     count = sum(visible_in_views(h.share).sum((0, 1)) for h in houses)
@@ -173,7 +188,8 @@ def train_encoder(
     done, began = 0, time.monotonic()
     smooth: dict[str, float] = {}
     for epoch in range(config.epochs):
-        for batch in batches(houses, classes, config.batch, rng=stream(config.seed, "vision", "epoch", epoch)):
+        rng = stream(config.seed, "vision", "epoch", epoch)
+        for batch in batches(houses, classes, config.batch, config.cameras, rng=rng):
             loss, parts = vision_loss(network, heads, batch)
             if not torch.isfinite(loss):
                 raise FloatingPointError(f"vision loss became {float(loss)} at update {done}; lower the learning rate")

@@ -1,16 +1,19 @@
 """Render the panoramas of a generated house.
 
 Without --node, all viewpoints of the house go to DIR/panoramas.pano, one file with random access.
-With --node, one panorama is drawn, as an equirectangular picture.
+With --node, one panorama is drawn, as an equirectangular picture or a view out of it, perhaps photographed (--camera).
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
 from embodied.cli.options import any_path, face, file_to_write, whole
+from embodied.render.panorama import VFOV36
+from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import BACKENDS, QUALITIES
 
 if TYPE_CHECKING:
@@ -32,6 +35,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
     parser.add_argument("--equirect", type=file_to_write, metavar="PNG", help="where to write the picture of --node")
+    parser.add_argument("--look", type=file_to_write, metavar="PNG", help="where to write a view from --node")
+    parser.add_argument("--yaw", type=float, default=0.0, help="degrees of --look, counter-clockwise (default: 0)")
+    parser.add_argument(
+        "--camera",
+        choices=CAMERAS,
+        default="ideal",
+        help="what takes the picture of --node; panorama files hold what the ideal one sees, since a camera is exposed "
+        "for a view and not for a place (default: %(default)s)",
+    )
+    parser.add_argument("--device", type=int, default=0, help="seed: which device of that kind (default: %(default)s)")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -40,8 +53,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.world import open_folder
 
-    if (args.node is None) != (args.equirect is None):
-        raise ValueError("--node and --equirect go together: --node 3 --equirect node3.png")
+    if (args.node is None) != (args.equirect is None and args.look is None):
+        raise ValueError("--node goes together with --equirect or --look: --node 3 --equirect node3.png")
+    if args.camera != "ideal" and args.node is None:
+        raise ValueError(
+            "--camera takes pictures of one viewpoint: --node 3 --look node3.png --camera phone; panorama files stay "
+            "ideal, and environments and training photograph what they show of them"
+        )
     catalogue = catalogue_of(args)
     with open_folder(
         args.folder, catalogue, args.cache, size=args.size, quality=args.quality, backend=args.backend
@@ -61,16 +79,27 @@ def run(args: argparse.Namespace) -> int:
 
 
 def one(args: argparse.Namespace, world: World) -> int:
-    """Draw one viewpoint as an equirectangular PNG."""
+    """Draw one viewpoint as an equirectangular PNG, or a view from it, or both."""
     import cv2
 
     from assets.cache import write_bytes
+    from embodied.render.photograph import PhotoCamera
 
     nodes = len(world.graph.ids)
     if not 0 <= args.node < nodes:
         raise ValueError(f"--node {args.node} does not exist; this house has the nodes 0 to {nodes - 1}")
-    picture = world.panorama(args.node).equirect(2 * args.size)
-    write_bytes(args.equirect, cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1].tobytes())
-    note(f"node {args.node} in {world.graph.room_of_node[args.node]}")
-    show(args, {"node": args.node, "picture": str(args.equirect)}, f"wrote {args.equirect}")
+    camera, panorama = PhotoCamera(args.camera, args.device), world.panorama(args.node)
+    place = (world.name, args.node)
+    dark = world.darkness(world.graph.positions[args.node]) if camera.traits else 1.0
+    pictures = {}
+    if args.equirect:
+        pictures[args.equirect] = camera.photographed(panorama.equirect(2 * args.size), None, *place, light=dark)
+    if args.look:
+        rgb = panorama.view_rgb(math.radians(args.yaw), 0.0, VFOV36, (args.size, args.size * 4 // 3))
+        pictures[args.look] = camera.photographed(rgb, VFOV36, *place, light=dark)
+    for path, rgb in pictures.items():
+        write_bytes(path, cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))[1].tobytes())
+    note(f"node {args.node} in {world.graph.room_of_node[args.node]}, {args.camera} camera")
+    words = ", ".join(map(str, pictures))
+    show(args, {"node": args.node, "camera": args.camera, "pictures": list(map(str, pictures))}, f"wrote {words}")
     return 0

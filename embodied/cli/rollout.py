@@ -13,12 +13,18 @@ from typing import TYPE_CHECKING
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.options import any_path, face, file_to_write, video_side, whole
 from embodied.cli.recording import add_sinks, viewers_of
+from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from embodied.interface import Agent, Episode
+    from embodied.render.photograph import PhotoCamera
     from embodied.world import World
 
+VIDEO_ANGLE = 1.2
+"""Vertical field of view of videos, radians."""
 AGENTS = ("shortest", "random", "forward10")
 
 
@@ -43,6 +49,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar=("H", "W"),
         help="pixels, both even (default: 480 640)",
     )
+    parser.add_argument(
+        "--camera",
+        choices=CAMERAS,
+        default="ideal",
+        help="what films: the view in videos and recordings (default: %(default)s)",
+    )
     add_sinks(parser)
     add_cache(parser)
     add_packs(parser)
@@ -60,10 +72,12 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     from embodied.evaluation.metrics import PER_EPISODE
     from embodied.evaluation.rollout import play
     from embodied.language import People
+    from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task
-    from viz.recording import record_episode
+    from viz.recording import Pictures, record_episode
     from viz.sinks import Sinks
 
+    camera = PhotoCamera(args.camera, args.seed)
     with world_of(args) as world:
         fetch(world.catalogue, world.house)
         pool = find_pool(world, seed=args.seed)
@@ -84,13 +98,12 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
             row: dict[str, object] = {"task": episode.task.id, "request": episode.task.request}
             row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
             if args.video:
-                row["video"] = str(
-                    film(world, episode, numbered(args.video, number, args.episodes), tuple(args.video_size))
-                )
+                path = numbered(args.video, number, args.episodes)
+                row["video"] = str(film(world, episode, path, tuple(args.video_size), camera))
             if args.rrd or viewers:
                 rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
                 watch = lambda steps: bar(steps, "recording", "step")
-                record_episode(world, episode, Sinks(rrd, viewers), watch=watch)
+                record_episode(world, episode, Sinks(rrd, viewers), pictures=Pictures(camera=camera), watch=watch)
                 row["recording"] = str(rrd or ", ".join(viewers))
             rows.append(row)
         facts = {
@@ -98,6 +111,7 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
             "seed": args.seed,
             "world": world.name,
             "renderer": world.fingerprint,
+            "camera": args.camera,
             "episodes": rows,
         }
     lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
@@ -132,16 +146,19 @@ def numbered(path: Path, number: int, total: int) -> Path:
     return path.with_name(name.replace("%d", str(number)))
 
 
-def film(world: World, episode: Episode, path: Path, size: tuple[int, int]) -> Path:
+def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera) -> Path:
     """Write what the agent saw as a video with smooth motion; returns the path."""
     from viz.video import camera_track, captioned, write_video
 
     poses = [episode.task.start, *(s.next_pose for s in episode.steps)]
     track = camera_track(world.graph.positions, poses)
-    drawn = (
-        captioned(world.renderer.view(c[:3], c[3], c[4], 1.2, size).rgb, episode.task.request)
-        for c in bar(track, "video", "frame")
-    )
+
+    def frame(number: int, c: np.ndarray) -> np.ndarray:
+        rgb = world.renderer.view(c[:3], c[3], c[4], VIDEO_ANGLE, size).rgb
+        dark = world.darkness(c[:3]) if camera.traits else 1.0
+        return camera.photographed(rgb, VIDEO_ANGLE, "frame", number, light=dark)
+
+    drawn = (captioned(frame(i, c), episode.task.request) for i, c in enumerate(bar(track, "video", "frame")))
     write_video(path, drawn, size)
     note(f"{path}: {len(track)} frames")
     return path

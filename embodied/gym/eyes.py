@@ -20,7 +20,8 @@ from gymnasium import spaces
 
 from embodied.errors import UnableError
 from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight
-from embodied.render.panorama import Panorama, equirect_grid, grid36, perspective_grid
+from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
+from embodied.render.photograph import PhotoCamera, check_camera
 from embodied.world import World
 
 SEES = ("rgb", "depth", "ids", "features", "oracle")
@@ -62,6 +63,10 @@ class ViewSettings:
     """Pixels; of 'view' only."""
     vfov: float = math.radians(60.0)
     """Vertical field of 'view', radians; 60 degrees is the literature's (Anderson et al. 2018)."""
+    camera: str = "ideal"
+    """What takes the pictures, one of embodied.render.photograph.CAMERAS; 'ideal' shows what the renderer draws."""
+    device: int = 0
+    """Seed: which device of that kind."""
 
     def __post_init__(self) -> None:
         if self.frame not in FRAMES:
@@ -70,6 +75,7 @@ class ViewSettings:
             raise ValueError(f"a view of {self.height} x {self.width} pixels; each side needs 1 to 4096")
         if not 0 < self.vfov < math.pi:
             raise ValueError(f"vfov is {self.vfov} radians; a perspective picture needs more than 0 and less than pi")
+        check_camera(self.camera)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -79,11 +85,14 @@ class ViewSettings:
         return (self.height, 2 * self.height if self.frame == "equirect" else self.width)
 
 
-def framed(panorama: Panorama, view: ViewSettings, channel: str, yaw: float, pitch: float) -> np.ndarray:
+def framed(
+    panorama: Panorama, view: ViewSettings, channel: str, yaw: float, pitch: float, *, place: Sequence[str | int] = ()
+) -> np.ndarray:
     """One channel, 'rgb', 'depth' or 'ids', of what is seen: (*view.shape), rgb with three colours at the end.
 
     Args:
       yaw, pitch: where a 'view' looks, radians; the other frames show every direction.
+      place: what tells this place from others, for the noise of a camera.
     """
     s = panorama.size
     if view.frame == "views36":
@@ -93,7 +102,26 @@ def framed(panorama: Panorama, view: ViewSettings, channel: str, yaw: float, pit
         picture = panorama.through(equirect_grid(s, view.height), channel)
     else:
         picture = panorama.through(perspective_grid(s, yaw, pitch, view.vfov, view.height, view.width), channel)
+    if view.camera != "ideal":
+        picture = _photographed(picture, view, channel, (*place, round(math.degrees(yaw)), round(math.degrees(pitch))))
     return np.minimum(picture, np.float32(FAR)) if channel == "depth" else picture
+
+
+def _photographed(picture: np.ndarray, view: ViewSettings, channel: str, place: Sequence[str | int]) -> np.ndarray:
+    """A framed channel as the view's camera has it: each of the 36 views is exposed by itself."""
+    camera = _camera(view.camera, view.device)
+    vfov = {"view": view.vfov, "views36": VFOV36}.get(view.frame)
+    if channel != "rgb":
+        bent = lambda one: camera.bent(one, vfov)
+        return np.stack([bent(one) for one in picture]) if view.frame == "views36" else bent(picture)
+    if view.frame == "views36":
+        return np.stack([camera.photographed(one, vfov, *place, k) for k, one in enumerate(picture)])
+    return camera.photographed(picture, vfov, *place)
+
+
+@functools.lru_cache(maxsize=1024)
+def _camera(name: str, device: int) -> PhotoCamera:
+    return PhotoCamera(name, device)
 
 
 class PanoramaStore:
@@ -154,7 +182,8 @@ class PictureEyes:
 
     def look(self, o: Observation) -> dict[str, np.ndarray]:
         panorama = self._store.at(o.sight)
-        found = {name: framed(panorama, self._view, name, o.turn * STEP, o.tilt * STEP) for name in self._channels}
+        place, yaw, pitch = (o.sight._world, o.sight._node), o.turn * STEP, o.tilt * STEP
+        found = {name: framed(panorama, self._view, name, yaw, pitch, place=place) for name in self._channels}
         if "rgb" in self._channels:
             found["target_rgb"] = self._target(o.target)
         return found
@@ -162,7 +191,8 @@ class PictureEyes:
     def _target(self, sight: Sight | None) -> np.ndarray:
         if sight is None:
             return np.zeros((self.TARGET, 2 * self.TARGET, 3), np.uint8)
-        return self._store.at(sight).equirect(self.TARGET)
+        camera = _camera(self._view.camera, self._view.device)
+        return camera.photographed(self._store.at(sight).equirect(self.TARGET), None, sight._world, sight._node)
 
 
 class FeatureEyes:
