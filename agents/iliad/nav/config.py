@@ -59,14 +59,12 @@ NAV_SCALES: dict[str, NavConfig] = {
     "mini": NavConfig(
         hidden_size=128, heads=4, executor_iterations=4_000, describer_iterations=6_000, teacher_rate=5e-4
     ),
-    "tiny": NavConfig(
-        hidden_size=64, heads=4, executor_iterations=2_000, describer_iterations=4_000, teacher_rate=1e-3
-    ),
+    "tiny": NavConfig(hidden_size=64, heads=4, executor_iterations=600, describer_iterations=1_500, teacher_rate=2e-3),
     "paper": NavConfig(),
 }
 NAV_LEARNER_SCALES: dict[str, LearnerConfig] = {
     "mini": LearnerConfig(iterations=8_000, learning_rate=5e-4, cooldown=0.3, threshold=0.3, validate_every=250),
-    "tiny": LearnerConfig(iterations=2_500, learning_rate=1e-3, cooldown=0.3, threshold=0.3, validate_every=100),
+    "tiny": LearnerConfig(iterations=1_000, learning_rate=2e-3, cooldown=0.3, threshold=0.3, validate_every=50),
     "paper": LearnerConfig(iterations=25_000, learning_rate=1e-4, threshold=0.3),
 }
 """'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""

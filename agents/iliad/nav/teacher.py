@@ -87,16 +87,32 @@ class LearnedNavTeacher:
         return found
 
     def _pragmatic(self, trips: Sequence[Trip], walks: Sequence[NavWalk], uniforms: np.ndarray) -> list[list[str]]:
-        """D_prag of each walk: the likeliest description first."""
-        inputs = walked(self.eyes, trips, walks)
-        words = self.eyes.vocabulary
-        likely = said(words, self.describer.write(*inputs, likeliest, LONGEST))
-        drawn: list[str] = []
-        if self.candidates:
-            choose = drawn_with(uniforms.reshape(-1, LONGEST))
-            drawn = said(words, self.describer.write(*inputs, choose, LONGEST, self.candidates))
-        k = self.candidates
-        several = [[d, *drawn[i * k : (i + 1) * k]] for i, d in enumerate(likely)]
+        """D_prag of each walk, the likeliest description first; of the program's rule, which wants the first one only,
+        no more than that."""
+        drawn = self.candidates_of(trips, walks)
+        found = self._kept(trips, walks, drawn)
+        rest = [i for i in range(len(trips)) if self.pragmatics == "text" or not found[i]]
+        if rest and self.candidates:
+            some, those = [trips[i] for i in rest], [walks[i] for i in rest]
+            several = self._kept(some, those, self.candidates_of(some, those, uniforms[rest]))
+            for i, more in zip(rest, several):
+                found[i] = list(dict.fromkeys([*found[i], *more]))
+        return found
+
+    def candidates_of(
+        self, trips: Sequence[Trip], walks: Sequence[NavWalk], uniforms: np.ndarray | None = None
+    ) -> list[list[str]]:
+        """The likeliest description of each walk, or different ones sampled with `uniforms` (B, K, words)."""
+        copies = 1 if uniforms is None else uniforms.shape[1]
+        choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, LONGEST))
+        numbers = self.describer.write(*walked(self.eyes, trips, walks), choose, LONGEST, copies)
+        drawn = said(self.eyes.vocabulary, numbers)
+        return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(trips))]
+
+    def _kept(
+        self, trips: Sequence[Trip], walks: Sequence[NavWalk], several: Sequence[Sequence[str]]
+    ) -> list[list[str]]:
+        """Those that the executor carries out as the walk went."""
         cases = [(trip, walk, d) for trip, walk, many in zip(trips, walks, several) for d in many]
         done = self.executor.greedy([c[0] for c in cases], [c[2] or NOTHING for c in cases])
         perf = performance if self.pragmatics == "text" else arrival
