@@ -15,10 +15,10 @@ from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, policy_of
-from agents.hari.pretraining import Curriculum, guided_share, pretrain, pretraining_success
+from agents.hari.pretraining import Curriculum, _begin, guided_share, pretrain, pretraining_success, redirect
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
-from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
+from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, padded, percept
 from agents.imitation.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.imitation.checkpoint import CheckpointError
 from embodied.action_spaces import PanoramicMoves
@@ -27,7 +27,7 @@ from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
-from embodied.interface import Ask, Candidates, Feature, FindObject, Move, Pose, Stop, Task
+from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 
@@ -277,6 +277,26 @@ def test_a_walk_that_is_wholly_guided_takes_only_right_moves():
     executor = new_executor(dataclasses.replace(SMALL, guided=1.0, iterations=10**9), words_of(fork_world()))
     optimizer = torch.optim.Adam(executor.network.parameters(), 1e-4)
     assert [lesson(executor, optimizer, lessons, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
+
+
+def test_a_walk_is_redirected_as_the_assistant_would_and_the_others_go_on():
+    world, lessons = grid_lessons()
+    executor = new_executor(SMALL, words_of(world))
+    executor.network.eval()
+    walks = [_begin(lessons, t, np.random.default_rng(0)) for t in lessons.training[:3]]
+    goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
+    before = list(walks[0].task.goal_nodes), goals.alone()
+    env = HariEnv({"grid": world}, HariAssistant(lessons.describer), lessons.describer)
+    env.reset(walks[1].task)
+    env.step(Ask(Intention.SUB))
+    after = redirect(executor, lessons.describer, walks, [1], goals).alone()
+    (reply,) = [s.reply for s in env._steps]
+    assert walks[1].goal == reply.description and walks[1].task.goal_nodes == (reply.subtask.target,)
+    assert list(walks[0].task.goal_nodes) == before[0]
+    for i in (0, 2):
+        torch.testing.assert_close(after[i], before[1][i])
+    wanted = executor.network.encode(torch.from_numpy(executor.words.rows(reply.description, "goal")[None])).alone()[0]
+    torch.testing.assert_close(after[1], wanted)
 
 
 # Learning ---------------------------------------------------------------------------------------

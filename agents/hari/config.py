@@ -41,6 +41,8 @@ class ExecutionConfig(ValidatedRunSettings):
     guided: float = 0.0
     """Share of the updates, the first ones, over which the shortest path takes ever fewer of the steps: DAgger's beta
     falls linearly from 1 to 0 over them (docs/sources.md, S81)."""
+    redirected: float = 0.0
+    """Share of the training episodes that are given a sub-goal on their way, as SUB does (docs/sources.md, S132)."""
     clip: float = 1.0
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
@@ -58,7 +60,7 @@ class ExecutionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_ALL, "dropout", "environment_dropout")
-        require(self, SHARE, "cooldown", "guided", "described")
+        require(self, SHARE, "cooldown", "guided", "described", "redirected")
         require_word(self, "sees", SEES)
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")

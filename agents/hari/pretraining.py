@@ -24,6 +24,7 @@ from torch import Tensor
 
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig, as_dict
+from agents.hari.networks import Encoded
 from agents.hari.sight import hidden_channels
 from agents.hari.words import Inputs, collate, padded, percept
 from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
@@ -31,6 +32,7 @@ from agents.imitation.loop import Note, Progress, Session, dropout_of, falling_r
 from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
+from embodied.assistants.hari import described_subgoal
 from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Sight, Task
 from embodied.locks import locked
 from embodied.seeds import stream
@@ -39,6 +41,8 @@ from embodied.teachers.shortest import shortest_action
 FORMAT = "embodied-hari-execution-1"
 MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
 """Settings that may differ on resuming."""
+REDIRECTED = 5
+"""Steps after which a walk has been given its sub-goal, if it is to have one."""
 EVERY = 25
 """Updates per progress line."""
 
@@ -68,6 +72,8 @@ class Walk:
     """Share of its steps at which it is told d^s."""
     channels: np.ndarray | None = None
     """(D,) float32 that hides channels of what it sees, in training."""
+    redirected_at: int | None = None
+    """The step before which it is given a sub-goal; None for never."""
 
 
 def pretrain(
@@ -129,6 +135,10 @@ def learn_once(
         for walk in walks:
             walk.described = max(0.0, 1 - walk.rng.random() / config.described) if config.described else 0.0
             walk.channels = hidden_channels(executor.seeing.size, config.environment_dropout, walk.rng)
+    if config.redirected:
+        for walk in walks:
+            if walk.rng.random() < config.redirected:
+                walk.redirected_at = int(walk.rng.integers(REDIRECTED))
     executor.network.train()
     with dropout_of(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
@@ -160,10 +170,11 @@ def _play(
     beliefs = executor.network.begin(len(walks))  # (B, h)
     goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
     losses, right = [], []
-    for _ in range(horizon):
+    for t in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
             break
+        goals = redirect(executor, lessons.describer, walks, [i for i in alive if walks[i].redirected_at == t], goals)
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
         told = [_thinned(lessons.describer, walks[i]) for i in alive]
         batch = perceived(executor, [walks[i] for i in alive], told, [candidates for candidates, _ in reach])
@@ -187,6 +198,23 @@ def _begin(lessons: Curriculum, task: Task, rng: np.random.Generator) -> Walk:
         raise TypeError(f"HARI's tasks ask for objects; task {task.id!r} asks for {task.goal}")
     described = lessons.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
     return Walk(task, place, task.start, described, rng)
+
+
+def redirect(
+    executor: Executor, describer: Describer, walks: Sequence[Walk], which: Sequence[int], goals: Encoded
+) -> Encoded:
+    """Give some walks the sub-goal that the assistant would name where they are; all walks' goals as encoded.
+
+    The belief is carried on, as when SUB is asked in the middle of an episode.
+    """
+    if not which:
+        return goals
+    for walk in (walks[i] for i in which):
+        way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0])
+        walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
+    rows = torch.from_numpy(padded([executor.words.rows(walks[i].goal, "goal") for i in which]))
+    alone = dict(enumerate(goals.alone())) | dict(zip(which, executor.network.encode(rows).alone(), strict=True))
+    return Encoded.together([alone[i] for i in range(len(walks))])
 
 
 def perceived(

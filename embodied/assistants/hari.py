@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from embodied.assistants.descriptions import Describer
-from embodied.interface import Intention, Reply, Situation, Subtask
+from embodied.interface import Description, Intention, Place, Reply, Situation, Subtask
 
 STACK = 2
 """L, the most goals on the stack (Table E.2)."""
@@ -19,6 +19,17 @@ def subgoal(path: tuple[int, ...], longest: int = LONGEST) -> int:
     |p| counts nodes, so next to the goal k = 1 is the goal itself and at the goal k = 0 is here.
     """
     return path[min(len(path) // 2, longest, len(path) - 1)]
+
+
+def described_subgoal(
+    describer: Describer, world: Place, here: int, goal: int, longest: int = LONGEST
+) -> tuple[tuple[int, ...], Description]:
+    """The way to a sub-goal, which it ends at, and its description: dense, or the next action when one step away."""
+    path = world.graph.path(here, goal)
+    target = subgoal(path, longest)
+    way = path[: path.index(target) + 1]
+    near = len(way) <= 2
+    return way, describer.step(world, here, target) if near else describer.dense(world, target, goal=True)
 
 
 class HariAssistant:
@@ -44,12 +55,8 @@ class HariAssistant:
         if question is Intention.GOAL:
             return Reply(description=say.dense(s.world, goal, goal=True), intention=question)
         if question is Intention.SUB:
-            path = s.world.graph.path(here, goal)
-            target = subgoal(path, self._longest)
-            way = path[: path.index(target) + 1]
-            near = len(way) <= 2
-            description = say.step(s.world, here, target) if near else say.dense(s.world, target, goal=True)
-            return Reply(description=description, intention=question, subtask=Subtask("subgoal", target, path=way))
+            way, description = described_subgoal(say, s.world, here, goal, self._longest)
+            return Reply(description=description, intention=question, subtask=Subtask("subgoal", way[-1], path=way))
         raise ValueError(f"HARI's assistant answers cur, goal and sub, was asked {question.value!r}")
 
 
