@@ -7,5 +7,6 @@ from pathlib import Path
 WEIGHTS = Path(__file__).resolve().parent / "weights"
 SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
 SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
+SHIPPED_VNLA = WEIGHTS / "vnla_mini.safetensors"
 SHIPPED_STUDENT = WEIGHTS / "iliad_regex_tiny.safetensors"
 SHIPPED_NAV = WEIGHTS / "iliad_nav_tiny.safetensors"

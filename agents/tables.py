@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from embodied.evaluation.tables import Estimate, shown
 
-Printed = Mapping[str, Sequence[float]]
-"""Column to the numbers that were printed of a row, one per split."""
+Printed = Mapping[str, Sequence[float | None]]
+"""Column to the numbers that were printed of a row, one per split; None where we cannot cite one."""
 
 
 def side_by_side(
@@ -32,6 +32,7 @@ def side_by_side(
         for k, split in enumerate(splits):
             for column in columns:
                 cell, theirs = shown(column, value(label, split, column)), printed.get(column)
-                cells.append(cell if theirs is None else f"{cell} ({theirs[k]:g})")
+                known = None if theirs is None else theirs[k]
+                cells.append(cell if known is None else f"{cell} ({known:g})")
         text.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join([*text, "", how, ""])

@@ -52,6 +52,15 @@ def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_look
     assert "leaves the route" in asked.told()
 
 
+def test_requests_that_are_counted_run_out():
+    story = Story(task_of("vnla"), 2)
+    left = [story.left]
+    for _ in range(2):
+        told(story, step_of(Ask(Intention.HELP), reply=Reply(text="turn left")))
+        left.append(story.left)
+    assert left == [2, 1, 0] and Story(task_of("hanna")).left is None
+
+
 def test_the_goal_stack_grows_with_a_sub_goal_and_shrinks_when_it_is_dropped():
     world, reply = (
         line_world(),

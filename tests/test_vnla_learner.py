@@ -50,7 +50,9 @@ def test_attention_and_coverage_are_those_of_the_equations():
     attention.remembered.weight.data.fill_(0.5)
     attention.out.weight.data.copy_(torch.tensor([[1.0, 0.0]]))
     attention.memory.weight_ih.data.copy_(torch.tensor([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
-    text = ReadText(torch.tensor([[[1.0], [3.0]]]), torch.ones(1, 2, dtype=torch.bool), torch.tensor([[[2.0], [0.0]]]))
+    read = torch.tensor([[[1.0], [3.0]]])
+    mask, coverage = torch.ones(1, 2, dtype=torch.bool), torch.tensor([[[2.0], [0.0]]])
+    text = ReadText(read, attention.driving(read), mask, coverage)
     attended, weights, coverage = attention(torch.tensor([[0.5]]), text)
     words = np.array([1 + 0.5 * 2, 3.0])  # the coverage of a word is added to it
     scores = 2 * 0.5 * words
@@ -68,11 +70,13 @@ def test_words_behind_the_end_are_not_read():
     tokens = torch.tensor([[5, 6, 2, 0, 0, 0], [5, 6, 7, 8, 9, 2]])
     alone = agent.network.read(tokens[:1])
     together = agent.network.read(tokens)
-    assert torch.allclose(alone.words, together.words[:1]) and together.mask[0].tolist() == [True] * 3 + [False] * 3
+    assert torch.allclose(alone.words, together.words[:1, :3]) and together.mask[0].tolist() == [True] * 3 + [False] * 3
+    assert alone.mask.tolist() == [[True] * 3], "as long as the longest text"
     state = agent.network.start(1)
     state = DecoderState(state.hidden + 0.3, state.cell)
-    _, weights, _ = agent.network.attention(state.hidden, alone)
+    attended, weights, _ = agent.network.attention(state.hidden, together.select(torch.tensor([0])))
     assert weights[0, 3:].tolist() == [0.0] * 3
+    assert torch.allclose(attended, agent.network.attention(state.hidden, alone)[0])
 
 
 def percept(agents=3, left=2):

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from hand_data import build
 
+from agents.vision.config import drawing
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vnla.agent import load_agent
 from embodied.cli import main
+from embodied.cli.view import looked_at
+from embodied.interface import Episode
+from embodied.records import episodes_file, load_lines
 
 pytestmark = pytest.mark.slow
 
@@ -64,6 +68,9 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     by = {r["agent"]: r["values"] for r in facts["rows"]}
     assert by["shortest"]["success"]["mean"] == 1 and by["learned, asks never"]["requests"]["mean"] == 0
     assert facts["learned from"] == "unlit_192" and (tmp_path / "judged/table.md").exists()
+    run_json = json.loads((tmp_path / "judged/run.json").read_text())
+    assert "learned" in run_json["looking"] and "shortest" not in run_json["looking"] and run_json["pictures"]
+    assert run(*judge, "--rrd", 1) == 2 and "--rrd wants --out" in capsys.readouterr().err
     assert run(*judge, "--only", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
 
 
@@ -74,12 +81,32 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     words = (*words, "--without-rooms", without_rooms.folder)
     assert run(*words) == 0
     text = (tmp_path / "table_interventions.md").read_text()
-    assert "| direct, not in words |" in text and "seeds 123, 435, 6757, 867, 983" in text and "unlit_192" in text
+    assert "| direct, not in words (1 agent) |" in text and "unlit_192" in text
+    assert "seeds 123, 435, 6757, 867, 983" in text
     rooms = (tmp_path / "table_rooms.md").read_text()
-    assert "| learned, trained with rooms |" in rooms
+    assert "| learned, trained with rooms (1 agent) |" in rooms
     before = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}
     assert run(*words) == 0 and len(before) == 6
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("rows_*.json")}, "what is done is not done again"
+    assert run(*words, "--rows", "none") == 0 and "Not run yet" not in (tmp_path / "table_rooms.md").read_text()
+    askers = ("study", "vnla", "askers", *words[4:], "--rows", "learned")
+    assert run(*askers) == 0
+    text = (tmp_path / "table_askers.md").read_text()
+    assert "| teacher (1 agent) |" in text and "Not run yet: none, first, random." in text and "(34.95)" in text
+
+
+def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
+    recorded = []
+    monkeypatch.setattr("embodied.cli.view.record_again", lambda run, data, episode, *_: recorded.append(episode))
+    train = ("train", "vnla", "--data", data.folder, "--out", tmp_path, *SMALL, "--asker", "first", "--iterations", 1)
+    assert run(*train) == 0
+    judge = ("judge", "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random")
+    rows = ("--only", "learned", "shortest")
+    assert run(*judge, "--tasks", 3, *rows, "--out", tmp_path / "judged", "--rrd", 2) == 0
+    played = list(load_lines(tmp_path / "judged" / episodes_file("test_unseen", "learned"), Episode))
+    assert [(e.task, e.agent) for e in recorded] == [(e.task, "learned") for e in played[:2]]
+    seen = looked_at(tmp_path / "judged").by("learned", played[0].task.world)
+    assert seen is not None and drawing(seen) == "unlit_192"
 
 
 @pytest.mark.parametrize("rules", ["algorithm-6", "goal-aware"])

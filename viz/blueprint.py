@@ -41,6 +41,7 @@ def blueprint_of(
         stack=episode.task.kind == "hari",
         sees=sees_title(seen),
         lit=shown,
+        monocular=episode.task.kind == "vnla",
     )
 
 
@@ -53,6 +54,7 @@ def episode_blueprint(
     stack: bool = False,
     sees: str = "What the agent sees",
     lit: bool = False,
+    monocular: bool = False,
 ) -> rrb.Blueprint:
     """The house in 3D on the left, what the agent sees and hears on the right, plots below.
 
@@ -64,10 +66,12 @@ def episode_blueprint(
       stack: show HARI's goals and costs.
       sees: name of the picture along the agent's gaze.
       lit: show the same view as people are to see it.
+      monocular: it sees one view only, and its requests are counted (VNLA).
     """
     world = _house_view(house)
     ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees)
-    panorama = rrb.Spatial2DView(origin="/view/panorama", name="Panorama, gaze in the middle")
+    around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
+    panorama = rrb.Spatial2DView(origin="/view/panorama", name=around)
     for_people = [rrb.Spatial2DView(origin="/view/lit", name="The same, lit, for you")] if lit else []
     sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
     texts = [
@@ -79,7 +83,7 @@ def episode_blueprint(
             rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
-    plots = _plots(probabilities, stack)
+    plots = _plots(probabilities, stack, monocular)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(ahead, *(for_people or sent)),
@@ -119,7 +123,7 @@ def _house_view(house: House) -> rrb.Spatial3DView:
     )
 
 
-def _plots(probabilities: bool, cost: bool) -> list[rrb.View]:
+def _plots(probabilities: bool, cost: bool, budget: bool) -> list[rrb.View]:
     """Distance and mode over time, how likely asking was, and what it has cost so far."""
     plots: list[rrb.View] = [
         rrb.TimeSeriesView(
@@ -138,4 +142,6 @@ def _plots(probabilities: bool, cost: bool) -> list[rrb.View]:
         )
     if cost:
         plots.append(rrb.TimeSeriesView(origin="/plot/cost", name="Cost so far"))
+    if budget:
+        plots.append(rrb.TimeSeriesView(origin="/plot/budget", name="Requests left"))
     return plots

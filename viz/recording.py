@@ -11,6 +11,7 @@ Entity tree (timeline 'step'):
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -42,7 +43,8 @@ PALETTE = {
 }
 HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20}
 """Metres above the floor that things are drawn at, so that none hides another."""
-VFOV = np.deg2rad(75.0)
+VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
+"""How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
 SHORT = 60
 """Letters of a request that is shown as a heading."""
 
@@ -70,6 +72,8 @@ class Views:
     shown: World | None
     """The same house as people are to see it; None where that is no other."""
     sizes: Pictures
+    vfov: float = VFOV
+    """Of the picture along the gaze, radians."""
 
 
 def views_of(world: World, eyes: World | None, sizes: Pictures = Pictures()) -> Views:
@@ -88,6 +92,7 @@ def record(
     eyes: World | None = None,
     pictures: Pictures = Pictures(),
     with_house: bool = True,
+    budget: int | None = None,
 ) -> Iterator[Step]:
     """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
 
@@ -99,6 +104,7 @@ def record(
       eyes: the world whose panoramas the agent looks at; None for an agent that looks at none.
       pictures: sizes of the pictures.
       with_house: False when the recording holds the house already.
+      budget: requests that the episode allowed; None where they were not counted.
 
     Yields:
       The same steps.
@@ -106,7 +112,9 @@ def record(
     if with_house:
         log_world(recording, world)
     log_task(recording, world, task)
-    state, views = Story(task), views_of(world, eyes, pictures)
+    state, views = Story(task, budget), views_of(world, eyes, pictures)
+    if task.kind == "vnla":
+        views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
         log_step(recording, world, task, step, state, views)
@@ -140,7 +148,8 @@ def record_episode(
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
     with open_recording(sinks, layout, name=episode.task.request, properties=about) as recording:
-        for _ in record(recording, world, episode.task, watch(episode.steps), eyes=eyes, pictures=pictures):
+        steps = watch(episode.steps)
+        for _ in record(recording, world, episode.task, steps, eyes=eyes, pictures=pictures, budget=episode.budget):
             pass
 
 
@@ -217,7 +226,8 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
         recording.log("plot/distance/target", rr.Scalars(target))
     state.before(step)
     recording.log("mode", rr.StateChange(state=mode_name(step)))
-    recording.log("text/instruction", rr.TextDocument(instruction_text(step), media_type=rr.MediaType.MARKDOWN))
+    told = instruction_text(step, state.left)
+    recording.log("text/instruction", rr.TextDocument(told, media_type=rr.MediaType.MARKDOWN))
     if task.kind == "hari":
         recording.log("text/goals", rr.TextDocument(state.stack(world, step), media_type=rr.MediaType.MARKDOWN))
         recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
@@ -226,6 +236,8 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     log_path(recording, world, state.nodes)
     state.after(step)
     recording.log("plot/requests", rr.Scalars(state.requests))
+    if state.left is not None:
+        recording.log("plot/budget/requests left", rr.Scalars(state.left))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
     recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
     log_aim(recording, world, state, views)
@@ -260,15 +272,15 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
         rr.Pinhole(
             width=width,
             height=height,
-            focal_length=float(height / 2 / np.tan(VFOV / 2)),
+            focal_length=float(height / 2 / np.tan(views.vfov / 2)),
             camera_xyz=rr.ViewCoordinates.RDF,
             image_plane_distance=0.6,
             color=PALETTE["agent"],
         ),
-        ahead(panorama, pose, sizes),
+        ahead(panorama, pose, sizes, views.vfov),
     )
     if views.shown is not None:
-        recording.log("view/lit", ahead(views.shown.panorama(pose.node), pose, sizes))
+        recording.log("view/lit", ahead(views.shown.panorama(pose.node), pose, sizes, views.vfov))
     equirect = panorama.equirect(sizes.panorama)
     shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), sizes.jpeg))
@@ -280,10 +292,10 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     )
 
 
-def ahead(panorama: Panorama, pose: Pose, sizes: Pictures) -> rr.EncodedImage:
-    """The first-person view from a panorama along the gaze."""
-    rgb = panorama.view_rgb(pose.yaw, pose.pitch, VFOV, sizes.view)
-    return encoded(sizes.camera.photographed(rgb, VFOV, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
+def ahead(panorama: Panorama, pose: Pose, sizes: Pictures, vfov: float = VFOV) -> rr.EncodedImage:
+    """The first-person view from a panorama along the gaze, `vfov` radians high."""
+    rgb = panorama.view_rgb(pose.yaw, pose.pitch, vfov, sizes.view)
+    return encoded(sizes.camera.photographed(rgb, vfov, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
 
 
 def on_floor(eyes: np.ndarray, height: float) -> np.ndarray:
@@ -329,12 +341,14 @@ def mode_name(step: Step) -> str:
     return "sub-task" if step.mode is Mode.SUB else "main task"
 
 
-def instruction_text(step: Step) -> str:
-    """What the agent is trying to carry out right now, as Markdown."""
+def instruction_text(step: Step, left: int | None = None) -> str:
+    """What the agent is trying to carry out right now, as Markdown; `left` requests remain where they are counted."""
     mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
     if isinstance(step.action, Ask):
         return f"**{mode}**\n\n> {step.instruction}\n\n**The agent asks for help.**"
     helpers = "\n\n*Somebody is near who can be asked.*" if step.can_ask else ""
+    if left is not None:
+        helpers = f"\n\n*{left} request{'s' * (left != 1)} left.*"
     return f"**{mode}**\n\n> {step.instruction}{helpers}"
 
 

@@ -35,8 +35,9 @@ class Story:
     Call `before` when a step is about to be taken and `after` when it was.
     """
 
-    def __init__(self, task: Task) -> None:
-        self.task = task
+    def __init__(self, task: Task, budget: int | None = None) -> None:
+        """`budget`: requests that the episode allows; None where they are not counted."""
+        self.task, self.budget = task, budget
         self.dialogue = [f"**Requester:** {task.request}"]
         self.nodes = [task.start.node]
         self.goals = [task.goal_nodes[0]]
@@ -50,6 +51,11 @@ class Story:
         self.cost = 0.0
         """Of all steps so far (HARI)."""
         self.last: Step | None = None
+
+    @property
+    def left(self) -> int | None:
+        """Requests that remain; None where they are not counted."""
+        return None if self.budget is None else max(self.budget - self.requests, 0)
 
     def before(self, step: Step) -> None:
         """Forget what no longer holds at the beginning of `step`."""

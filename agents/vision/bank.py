@@ -41,3 +41,8 @@ class FeatureBank:
         rows = torch.tensor([0 if s is None else self._rows.row(s) for s in sights], device=self._table.device)
         known = torch.tensor([s is not None for s in sights], device=self._table.device)
         return self._table[rows] * known[:, None, None]
+
+    def look(self, sights: Sequence[Sight], views: Sequence[int]) -> torch.Tensor:
+        """(n, D) features of one view of each sight."""
+        rows = torch.tensor([self._rows.row(s) for s in sights], device=self._table.device)
+        return self._table[rows, torch.tensor(views, device=self._table.device)]

@@ -80,10 +80,11 @@ class VnlaSettings(ImitationSettings):
 
 SCALES: dict[str, VnlaSettings] = {
     "mini": VnlaSettings(
-        hidden_size=256,
+        hidden_size=128,
+        word_embedding=64,
         dropout=0.3,
-        iterations=1500,
-        learning_rate=7e-4,
+        iterations=1000,
+        learning_rate=1e-3,
         cooldown=0.4,
         batch=64,
         environment_dropout=0.4,
@@ -92,4 +93,4 @@ SCALES: dict[str, VnlaSettings] = {
     ),
     "paper": VnlaSettings(),
 }
-"""'mini': some 20 minutes of one core; 'paper': the program's, for one GPU (docs/sources.md, S113)."""
+"""'mini': some minutes of one core; 'paper': the program's, for one GPU (docs/sources.md, S113)."""

@@ -17,11 +17,12 @@ from embodied.interface import Agent, Episode
 COLUMNS = ("success", "room success", "navigation error", "requests", "oracle success", "steps")
 """Those of the first paper, and how far the agents came."""
 WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
+TEACHER = "learned, asks as its teacher"
 ASKED = {
     "learned, asks never": "none",
     "learned, asks first": "first",
     "learned, asks at random": "random",
-    "learned, asks as its teacher": "teacher",
+    TEACHER: "teacher",
 }
 """Rows that put another asker in front of the same networks (docs/sources.md, S39), and that asker."""
 DIRECT = "learned, direct intervention"
@@ -48,18 +49,19 @@ def judge(
     agent: VnlaAgent,
     splits: Sequence[str],
     *,
-    seed: int = 0,
+    seeds: Sequence[int] = (0,),
     limit: int | None = None,
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
 ) -> list[Row]:
-    """One row per player and split, over the same tasks, under the rule of play that the agent is judged under.
+    """One row per player, split and seed, over the same tasks, under the rule of play that the agent is judged under.
 
     Args:
+      seeds: of everything that is drawn, budgets included.
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for all.
-      keep: is given split, name and episodes (to save them).
+      keep: is given split, name and episodes of the first seed (to save them).
       watch: wraps the iterator over rows (a progress bar).
 
     Raises:
@@ -74,6 +76,7 @@ def judge(
             rules = "direct" if name == DIRECT else agent.config.rules
             players: Mapping[str, Agent] = {name: player(agent, bank, name)}
             kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
-            whole = lessons.data.split(split, vnla=rules)
-            rows += evaluate(whole, players, seed=seed, limit=limit, batch=agent.config.evaluation_batch, keep=kept)
+            whole, batch = lessons.data.split(split, vnla=rules), agent.config.evaluation_batch
+            for k, seed in enumerate(seeds):
+                rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=None if k else kept)
     return rows

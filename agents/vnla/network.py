@@ -8,6 +8,7 @@ that only its own head learns from its loss.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -33,6 +34,8 @@ class ReadText:
 
     words: Tensor
     """(B, L, h)."""
+    driving: Tensor
+    """(B, L, 3 c) what of each word enters the memory of attention; the same at every step."""
     mask: Tensor
     """(B, L) bool, which of them are words."""
     coverage: Tensor
@@ -40,15 +43,24 @@ class ReadText:
 
     def select(self, rows: Tensor) -> ReadText:
         """The texts of some agents, in the order of `rows` (k,)."""
-        return ReadText(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+        return self._each(lambda mine, _: mine[rows], self)
 
     def put(self, rows: Tensor, other: ReadText) -> ReadText:
-        """The texts with those of `rows` replaced."""
+        """The texts with those of `rows` (k,), ascending, replaced; as long as the longest of both."""
+        if len(rows) == len(self.mask):
+            return other
+        longest = max(self.mask.shape[1], other.mask.shape[1])
+        mine, new = self._padded(longest), other._padded(longest)
+        return mine._each(lambda a, b: a.index_copy(0, rows, b), new)
+
+    def _padded(self, length: int) -> ReadText:
+        more = length - self.mask.shape[1]
+        return self._each(lambda x, _: F.pad(x, (0, 0) * (x.dim() - 2) + (0, more)), self) if more else self
+
+    def _each(self, change: Callable[[Tensor, Tensor], Tensor], other: ReadText) -> ReadText:
+        """A text whose tensors are made of those of this one and of another."""
         return ReadText(
-            **{
-                f.name: getattr(self, f.name).index_copy(0, rows, getattr(other, f.name))
-                for f in dataclasses.fields(self)
-            }
+            **{f.name: change(getattr(self, f.name), getattr(other, f.name)) for f in dataclasses.fields(self)}
         )
 
 
@@ -62,8 +74,10 @@ class DecoderState:
     def select(self, rows: Tensor) -> DecoderState:
         return DecoderState(self.hidden[rows], self.cell[rows])
 
-    def put(self, rows: Tensor, other: DecoderState) -> DecoderState:
-        return DecoderState(self.hidden.index_copy(0, rows, other.hidden), self.cell.index_copy(0, rows, other.cell))
+    def where(self, rows: Tensor, other: DecoderState) -> DecoderState:
+        """This state where `rows` (B,) is true, else the other."""
+        chosen = rows[:, None]
+        return DecoderState(self.hidden.where(chosen, other.hidden), self.cell.where(chosen, other.cell))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +97,25 @@ class VnlaPercept:
 
 
 class CoverageAttention(nn.Module):
-    """Dot attention over words that remembers, for each, the attention it had (Tu et al. 2016, as in the program)."""
+    """Dot attention over words that remembers, for each, the attention it had (Tu et al. 2016, as in the program).
+
+    What is attended to is a word plus a linear function of its coverage; a GRU cell takes that, the state and the
+    weight into the coverage. Products with the words are taken apart from those with the rest, so that what does not
+    change from step to step is computed once per text (`driving`) and nothing of size (B, L, h) is made at a step.
+    """
 
     def __init__(self, hidden: int, coverage: int) -> None:
         super().__init__()
+        self.hidden = hidden
         self.query = nn.Linear(hidden, hidden, bias=False)
         self.out = nn.Linear(2 * hidden, hidden, bias=False)
         self.remembered = nn.Linear(coverage, hidden)
         self.memory = nn.GRUCell(2 * hidden + 1, coverage)
+
+    def driving(self, words: Tensor) -> Tensor:
+        """(B, L, 3 c) what `words` (B, L, h), without coverage, give to the gates of the memory."""
+        of_words = self.memory.weight_ih[:, : self.hidden]
+        return F.linear(words, of_words, self.memory.bias_ih + of_words @ self.remembered.bias)
 
     def forward(self, state: Tensor, text: ReadText) -> tuple[Tensor, Tensor, Tensor]:
         """Attend.
@@ -101,13 +126,24 @@ class CoverageAttention(nn.Module):
         Returns:
           The attended state (B, h), the weights (B, L) and the coverage after it (B, L, c).
         """
-        words = text.words + self.remembered(text.coverage)  # (B, L, h)
-        scores = torch.einsum("bh,blh->bl", self.query(state), words)
-        weights = scores.masked_fill(~text.mask, -torch.inf).softmax(-1)
-        context = torch.einsum("bl,blh->bh", weights, words)
-        seen = torch.cat([words, state[:, None].expand_as(words), weights[..., None]], -1)  # (B, L, 2h + 1)
-        coverage = self.memory(seen.flatten(0, 1), text.coverage.flatten(0, 1)).view_as(text.coverage)
-        return torch.tanh(self.out(torch.cat([context, state], -1))), weights, coverage
+        query = self.query(state)[..., None]  # (B, h, 1)
+        scores = text.words @ query + text.coverage @ (self.remembered.weight.T @ query)  # the bias moves all alike
+        weights = scores[..., 0].masked_fill(~text.mask, -torch.inf).softmax(-1)
+        context = weights[:, None] @ text.words + self.remembered(weights[:, None] @ text.coverage)  # (B, 1, h)
+        attended = torch.tanh(self.out(torch.cat([context[:, 0], state], -1)))
+        return attended, weights, self._remember(state, text, weights)
+
+    def _remember(self, state: Tensor, text: ReadText, weights: Tensor) -> Tensor:
+        """The coverage (B, L, c) after a step: a GRU cell on [word and its coverage; state; weight]."""
+        h, c = self.hidden, text.coverage.shape[-1]
+        of_words, of_state, of_weight = self.memory.weight_ih.split([h, h, 1], 1)
+        given = text.driving + F.linear(state, of_state)[:, None] + weights[..., None] * of_weight[:, 0]
+        both = torch.cat([of_words @ self.remembered.weight, self.memory.weight_hh])  # (6 c, c)
+        from_coverage, kept = F.linear(text.coverage, both).split(3 * c, -1)
+        given, kept = given + from_coverage, kept + self.memory.bias_hh
+        reset, update = torch.sigmoid(given[..., : 2 * c] + kept[..., : 2 * c]).chunk(2, -1)
+        new = torch.tanh(given[..., 2 * c :] + reset * kept[..., 2 * c :])
+        return torch.lerp(new, text.coverage, update)
 
 
 class VnlaNetwork(nn.Module):
@@ -141,18 +177,23 @@ class VnlaNetwork(nn.Module):
         zero = self.navigation.weight.new_zeros(agents, self.hidden_size)
         return DecoderState(zero, zero)
 
-    def blank(self, agents: int, length: int) -> ReadText:
+    def blank(self, agents: int) -> ReadText:
         """No text yet."""
-        zero = self.navigation.weight.new_zeros(agents, length, self.hidden_size)
-        return ReadText(zero, zero[..., 0] > 0, zero[..., :1].expand(-1, -1, self.coverage))
+        nothing = lambda width: self.navigation.weight.new_zeros(agents, 0, width)
+        mask = torch.zeros(agents, 0, dtype=torch.bool, device=self.navigation.weight.device)
+        return ReadText(nothing(self.hidden_size), nothing(3 * self.coverage), mask, nothing(self.coverage))
 
     def read(self, tokens: Tensor) -> ReadText:
-        """New texts, (B, L) int64 with the last word first and the end last; nothing of them was attended to yet."""
+        """New texts, (B, L) int64 with the last word first and the end last; nothing of them was attended to yet.
+
+        As long as the longest of them: padding comes last and changes nothing before it.
+        """
         mask = tokens != 0
-        longest = int(mask.sum(1).max())  # padding comes last and changes nothing before it
+        longest = int(mask.sum(1).max())
+        mask = mask[:, :longest]
         words, _ = self.reader(self.dropout(self.embedding(tokens[:, :longest])))
-        words = F.pad(self.dropout(words), (0, 0, 0, tokens.shape[1] - longest)) * mask[..., None]
-        return ReadText(words, mask, words.new_zeros(*tokens.shape, self.coverage))
+        words = self.dropout(words) * mask[..., None]
+        return ReadText(words, self.attention.driving(words), mask, words.new_zeros(*mask.shape, self.coverage))
 
     def decode(
         self, percept: VnlaPercept, state: DecoderState, text: ReadText

@@ -197,7 +197,7 @@ class VnlaPolicy:
         return VnlaMemory(
             positions,
             self.network.start(k),
-            self.network.blank(k, self.instruction_length),
+            self.network.blank(k),
             torch.full((k,), NO_MOVE, device=device),
             torch.full((k,), NO_ASK, device=device),
             (None,) * k,
@@ -228,15 +228,15 @@ class VnlaPolicy:
 
     def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
         device = memory.previous_move.device
-        views = torch.tensor([Pose(0, o.turn, o.tilt).view for o in seen], device=device)
-        view = self.bank.gather([o.sight for o in seen])[torch.arange(len(seen), device=device), views]  # (k, D)
+        view = self.bank.look([o.sight for o in seen], [Pose(0, o.turn, o.tilt).view for o in seen])  # (k, D)
+        allowed = torch.from_numpy(np.stack([o.candidates.allowed for o in seen])).to(device)
         left = [MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
         return VnlaPercept(
             view=view if memory.channels is None else view * memory.channels,
             previous_move=memory.previous_move,
             previous_ask=memory.previous_ask,
             left=torch.tensor(left, device=device),
-            allowed=torch.tensor([[*o.candidates.allowed.tolist(), True] for o in seen], device=device),
+            allowed=F.pad(allowed, (0, 1), value=True),  # stopping is always possible
         )
 
     def _consider(
@@ -245,10 +245,11 @@ class VnlaPolicy:
         """The first pass: what each of `rows` was about to do and whether it would ask, and logits (m, 2)."""
         if not rows:
             return {}, percept.view.new_zeros(0, 2)
-        index = torch.tensor(rows, device=percept.view.device)
-        moves, asks = self.network.consider(
-            _rows(percept, index), memory.state.select(index), memory.text.select(index)
-        )
+        state, text = memory.state, memory.text
+        if len(rows) < len(memory.positions):
+            index = torch.tensor(rows, device=percept.view.device)
+            percept, state, text = _rows(percept, index), state.select(index), text.select(index)
+        moves, asks = self.network.consider(percept, state, text)
         chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
         thoughts = {
             row: Thought(chance, {"help": h, "nothing": 1 - h})
@@ -262,20 +263,19 @@ class VnlaPolicy:
         """The second pass: memory after it and logits (n, 6)."""
         if not rows:
             return memory, percept.view.new_zeros(0, STOP + 1)
-        index = torch.tensor(rows, device=percept.view.device)
-        asked = [
-            ASK if memory.before[r] is None and not seen[r].can_ask and int(percept.previous_ask[r]) == ASK else DONT
-            for r in rows
-        ]
-        now = dataclasses.replace(_rows(percept, index), previous_ask=torch.tensor(asked, device=index.device))
-        moves, state, text = self.network.navigate(now, memory.state.select(index), memory.text.select(index))
-        after = dataclasses.replace(
-            memory,
-            state=memory.state.put(index, state),
-            text=memory.text.put(index, text),
-            previous_ask=memory.previous_ask.index_copy(0, index, now.previous_ask),
-        )
-        return after, moves
+        device = percept.view.device
+        index = torch.tensor(rows, device=device)
+        acts = torch.zeros(len(seen), dtype=torch.bool, device=device).index_fill(0, index, True)
+        just_asked = [b is None and not o.can_ask for b, o in zip(memory.before, seen, strict=True)]
+        told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
+        asked = torch.where(acts, torch.where(told, ASK, DONT), percept.previous_ask)
+        now = dataclasses.replace(percept, previous_ask=asked)
+        moves, state, text = self.network.navigate(now, memory.state, memory.text)  # who asks acts later: not kept
+        if len(rows) < len(seen):
+            state = state.where(acts, memory.state)
+            coverage = text.coverage.where(acts[:, None, None], memory.text.coverage)
+            moves, text = moves[index], dataclasses.replace(text, coverage=coverage)
+        return dataclasses.replace(memory, state=state, text=text, previous_ask=asked), moves
 
 
 @dataclass(frozen=True, eq=False)

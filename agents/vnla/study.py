@@ -2,30 +2,32 @@
 
 A study is a folder: `VARIANT/seed_N` holds an agent and what it did. Variants that tables share are trained once, and
 everything goes on where it stopped. Agents are judged with the program's five seeds, from which budgets are drawn.
+Who asks as its teacher does is the learned asker's agent: they are trained alike (docs/sources.md, S160).
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import joblib
 import torch
 
 from agents.imitation.lessons import Lessons
 from agents.imitation.loop import Note
-from agents.tables import side_by_side
+from agents.imitation.studies import refuse_unknown, run_all, seeds_with
+from agents.tables import Printed, side_by_side
 from agents.vision.encoder import Encoder
 from agents.vnla.agent import load_agent
 from agents.vnla.config import VnlaSettings
-from agents.vnla.judging import DIRECT, LEARNED, judge
+from agents.vnla.judging import DIRECT, LEARNED, TEACHER, judge
 from agents.vnla.run import train_agent, vnla_data
 from assets.cache import write_bytes
-from embodied.evaluation.tables import Estimate, Row, across_seeds, as_json
+from embodied.evaluation.tables import Estimate, across_seeds, as_json
 from embodied.interface import Episode
 from embodied.records import episodes_file, save_lines
 
@@ -48,7 +50,6 @@ VARIANTS: Mapping[str, VnlaVariant] = {
     "none": VnlaVariant({"asker": "none"}),
     "first": VnlaVariant({"asker": "first"}),
     "random": VnlaVariant({"asker": "random"}),
-    "teacher": VnlaVariant({"asker": "teacher"}),
     "direct, not in words": VnlaVariant({"rules": "direct-mute"}),
     "rules a and e": VnlaVariant({"ask_rules": "a and e"}),
     "rules b to d": VnlaVariant({"ask_rules": "b to d"}),
@@ -66,7 +67,7 @@ class VnlaLine:
     played: str = LEARNED
     """A row of agents.vnla.judging."""
     rooms: bool = True
-    printed: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    printed: Printed = field(default_factory=dict)
     """Column to the paper's numbers, one per split of SPLITS; only those that we can cite."""
 
     @property
@@ -77,7 +78,13 @@ class VnlaLine:
 TABLES: Mapping[str, tuple[str, tuple[VnlaLine, ...]]] = {
     "askers": (
         "Who decides when to ask",
-        tuple(VnlaLine(name, name) for name in ("none", "first", "random", "teacher", "learned")),
+        (
+            VnlaLine("none", "none", printed={"success": (28.39, 6.36)}),
+            VnlaLine("first", "first", printed={"success": (None, 20.0)}),
+            VnlaLine("random", "random", printed={"success": (None, 25.05)}),
+            VnlaLine("teacher", "learned", TEACHER, printed={"success": (None, 34.95)}),
+            VnlaLine("learned", "learned", printed={"success": (52.09, 34.5)}),
+        ),
     ),
     "interventions": (
         "Direct and indirect intervention",
@@ -115,7 +122,9 @@ class VnlaStudySetting:
     without_rooms: Path | None = None
     """A data set whose requests name no room, for the table 'rooms'."""
     seeds: int = 3
-    """Agents of each variant."""
+    """Agents of the learned asker."""
+    others: int = 3
+    """Agents of every other variant."""
     tasks: int | None = None
     """Judge on at most so many tasks of a split, from all houses alike."""
     quality: str | None = None
@@ -123,9 +132,9 @@ class VnlaStudySetting:
     threads: int = 1
     """Of PyTorch, per agent."""
 
-    @property
-    def repeats(self) -> list[int]:
-        return [self.config.seed + k for k in range(self.seeds)]
+    def repeats(self, variant: str) -> list[int]:
+        """Training seeds of a variant."""
+        return [self.config.seed + k for k in range(self.seeds if variant == LEARNED else self.others)]
 
     def folder(self, variant: str, seed: int) -> Path:
         return self.out / variant.replace(",", "").replace(" ", "_") / f"seed_{seed}"
@@ -151,53 +160,61 @@ class VnlaStudySetting:
 
 
 def run_study(
-    setting: VnlaStudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print
+    setting: VnlaStudySetting,
+    names: Sequence[str],
+    *,
+    rows: Sequence[str] | None = None,
+    workers: int = 1,
+    note: Note = print,
 ) -> dict[str, Path]:
     """Train and judge what is missing and write the tables; returns the Markdown files.
 
     Results do not depend on `workers`.
 
+    Args:
+      rows: train and judge these variants only; tables say which rows they lack.
+
     Raises:
-      ValueError: an unknown table, or data that it lacks.
+      ValueError: an unknown table or variant, or data that it lacks.
     """
-    if unknown := [n for n in names if n not in TABLES]:
-        raise ValueError(f"unknown tables {unknown}; VNLA's are {list(TABLES)}")
+    refuse_unknown(names, TABLES)
+    refuse_unknown(rows or (), VARIANTS)
     wanted: dict[str, dict[str, VnlaLine]] = {}
-    for name in names:
-        for line in TABLES[name][1]:
+    for line in (line for name in names for line in TABLES[name][1]):
+        if rows is None or line.variant in rows:
             wanted.setdefault(line.variant, {})[line.key] = line
     for rooms in sorted(
         {r for v, lines in wanted.items() for r in (VARIANTS[v].rooms, *(x.rooms for x in lines.values()))}
     ):
         setting.lessons(rooms)  # refused before anything is trained
-    jobs = [(v, s) for v in wanted for s in setting.repeats]
-    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
-    for said in parallel(joblib.delayed(_run)(setting, v, s, list(wanted[v].values()), note) for v, s in jobs):
-        note(said)
+    work = functools.partial(_run, setting, wanted, note)
+    for n in sorted({setting.seeds, setting.others}):
+        alike = [v for v in wanted if len(setting.repeats(v)) == n]
+        run_all(alike, range(setting.config.seed, setting.config.seed + n), work, workers=workers, note=note)
     return {name: _write(setting, name) for name in names}
 
 
-def _run(setting: VnlaStudySetting, variant: str, seed: int, lines: Sequence[VnlaLine], note: Note) -> str:
-    """Train one agent and judge it for some rows, unless that is done."""
+def _run(
+    setting: VnlaStudySetting, wanted: Mapping[str, Mapping[str, VnlaLine]], note: Note, seed: int, variant: str
+) -> str:
+    """Train one agent and judge it for the rows that are made of it, unless that is done."""
     torch.set_num_threads(setting.threads)
     about, folder = VARIANTS[variant], setting.folder(variant, seed)
     config = dataclasses.replace(setting.config, seed=seed, **about.changes)
     mine: Note = lambda line: note(f"{variant}, seed {seed}: {line}")
     train_agent(setting.lessons(about.rooms), config, folder, note=mine)
     agent = load_agent(folder / "best.safetensors")
-    for line in lines:
+    for line in wanted[variant].values():
         path = _rows_file(setting, line, seed)
         if path.exists():
             continue
-        lessons, rows = setting.lessons(line.rooms), list[Row]()
 
         def keep(split: str, name: str, episodes: Sequence[Episode], line: VnlaLine = line) -> None:
             save_lines(folder / "episodes" / episodes_file(split, line.key), episodes)
 
-        for k, judged in enumerate(EVALUATION_SEEDS):
-            first: Callable[[str, str, Sequence[Episode]], None] | None = None if k else keep
-            rows += judge(lessons, agent, SPLITS, seed=judged, limit=setting.tasks, only=[line.played], keep=first)
-        write_bytes(path, as_json(rows).encode())
+        lessons, limit = setting.lessons(line.rooms), setting.tasks
+        found = judge(lessons, agent, SPLITS, seeds=EVALUATION_SEEDS, limit=limit, only=[line.played], keep=keep)
+        write_bytes(path, as_json(found).encode())
     return f"{variant}, seed {seed}: trained and judged"
 
 
@@ -205,10 +222,15 @@ def _rows_file(setting: VnlaStudySetting, line: VnlaLine, seed: int) -> Path:
     return setting.folder(line.variant, seed) / f"rows_{line.key.replace(', ', '_').replace(' ', '_')}.json"
 
 
+def judged_with(setting: VnlaStudySetting, line: VnlaLine) -> list[int]:
+    """The training seeds of a row that were judged."""
+    return seeds_with(setting.repeats(line.variant), lambda seed: _rows_file(setting, line, seed).exists())
+
+
 def estimate(setting: VnlaStudySetting, line: VnlaLine, split: str, column: str) -> Estimate:
     """A number of a row: over trained agents, each the mean of its judgings; of a single agent over its judgings."""
     means = []
-    for seed in setting.repeats:
+    for seed in judged_with(setting, line):
         body = json.loads(_rows_file(setting, line, seed).read_text(encoding="utf-8"))
         means.append([r["values"][column]["mean"] for r in body if r["split"] == split])
     if len(means) == 1:
@@ -218,23 +240,39 @@ def estimate(setting: VnlaStudySetting, line: VnlaLine, split: str, column: str)
 
 def _write(setting: VnlaStudySetting, name: str) -> Path:
     title, lines = TABLES[name]
-    by = {line.label: line for line in lines}
-    first = json.loads(_rows_file(setting, lines[0], setting.repeats[0]).read_text(encoding="utf-8"))
-    counts = "; ".join(
-        f"{s}: {r['episodes']} episodes in {r['houses']} houses"
-        for s in SPLITS
-        for r in first[::1]
-        if r["split"] == s and r["seed"] == EVALUATION_SEEDS[0]
-    )
-    c, over = setting.config, "trained agents" if setting.seeds > 1 else "judgings of one agent"
-    pictures = load_agent(setting.folder(lines[0].variant, setting.repeats[0]) / "best.safetensors").pictures
-    how = (
-        f"{counts}, judged with seeds {', '.join(map(str, EVALUATION_SEEDS))}. Mean and Student's 95 % interval over "
-        f"{over} ({setting.seeds} per row). Trained {c.iterations} updates of {c.batch} episodes on pictures "
-        f"{pictures}. Rates in per cent."
-    )
+    counts = {line.label: len(judged_with(setting, line)) for line in lines}
+    there = [line for line in lines if counts[line.label]]
+    by = {_labelled(line, counts): line for line in there}
     value = lambda label, split, column: estimate(setting, by[label], split, column)
-    text = side_by_side(title, SPLITS, COLUMNS, [(line.label, line.printed) for line in lines], value, how)
+    rows = [(label, line.printed) for label, line in by.items()]
+    text = side_by_side(title, SPLITS, COLUMNS, rows, value, _made_with(setting, there))
+    if missing := [label for label, n in counts.items() if not n]:
+        text += f"\nNot run yet: {', '.join(missing)}.\n"
     path = setting.out / f"table_{name}.md"
     write_bytes(path, text.encode())
     return path
+
+
+def _labelled(line: VnlaLine, counts: Mapping[str, int]) -> str:
+    n = counts[line.label]
+    return f"{line.label} ({n} agent{'s' * (n > 1)})"
+
+
+def _made_with(setting: VnlaStudySetting, there: Sequence[VnlaLine]) -> str:
+    """The sentences below a table of the rows that are there."""
+    if not there:
+        return "No row was run."
+    seed = judged_with(setting, there[0])[0]
+    first = json.loads(_rows_file(setting, there[0], seed).read_text(encoding="utf-8"))
+    counts = "; ".join(
+        f"{r['split']}: {r['episodes']} episodes in {r['houses']} houses"
+        for r in first
+        if r["seed"] == EVALUATION_SEEDS[0]
+    )
+    pictures = load_agent(setting.folder(there[0].variant, seed) / "best.safetensors").pictures
+    return (
+        f"{counts}, judged with seeds {', '.join(map(str, EVALUATION_SEEDS))}. Mean and Student's 95 % interval over "
+        "trained agents, each the mean of its judgings; of a single agent over its judgings, which says nothing about "
+        f"another agent. Trained {setting.config.iterations} updates of {setting.config.batch} episodes on pictures "
+        f"{pictures}. In brackets the paper's. Rates in per cent."
+    )

@@ -19,6 +19,7 @@ from embodied.cli.options import whole
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from embodied.datasets.store import Dataset
     from embodied.evaluation.tables import Row
     from embodied.interface import Episode
 
@@ -74,30 +75,35 @@ def run_vnla(args: argparse.Namespace) -> int:
     """The learned asker beside others, direct intervention and agents without learning."""
     from agents.imitation.lessons import Lessons
     from agents.imitation.parallel import use_threads
-    from agents.shipped import SHIPPED_AGENT
-    from agents.vision.run import encoder_of
+    from agents.shipped import SHIPPED_AGENT, SHIPPED_VNLA
+    from agents.vision.run import encoder_of, pictures_of
     from agents.vnla.agent import load_agent
-    from agents.vnla.judging import COLUMNS, judge
+    from agents.vnla.judging import COLUMNS, WITHOUT_LEARNING, judge
     from agents.vnla.run import vnla_data
 
-    if args.agent == SHIPPED_AGENT:
+    file = SHIPPED_VNLA if args.agent == SHIPPED_AGENT else args.agent
+    if file == SHIPPED_VNLA and not file.exists():
         raise ValueError("no VNLA agent ships yet; name yours with --agent (`embodied train vnla`)")
     use_threads(args.threads)
-    agent = load_agent(args.agent)
+    agent, splits = load_agent(file), args.split or ("test_unseen",)
     agent = dataclasses.replace(agent, config=dataclasses.replace(agent.config, evaluation_batch=args.batch))
     lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality)
-
-    rows = judge(
-        lessons,
-        agent,
-        args.split or ("test_unseen",),
-        seed=args.seed,
-        limit=args.tasks,
-        only=args.only or (),
-        keep=lambda split, name, episodes: _keep(args, split, name, episodes),
-        watch=lambda agents: bar(agents, "agents", "agent"),
-    )
-    _tell(args, rows, COLUMNS, {"rules": agent.config.rules, "learned from": agent.pictures})
+    with _locked(args.out):
+        rows = judge(
+            lessons,
+            agent,
+            splits,
+            seeds=(args.seed,),
+            limit=args.tasks,
+            only=args.only or (),
+            keep=lambda split, name, episodes: _keep(args, split, name, episodes),
+            watch=lambda agents: bar(agents, "agents", "agent"),
+        )
+        names = [n for split in splits for n in lessons.data.names(split)]
+        drawn = {n: dataclasses.asdict(pictures_of(lessons.data, n, args.quality)) for n in names}
+        looking = sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
+        _depends(args, lessons.data, file, looking=looking, pictures=drawn)
+        _tell(args, rows, COLUMNS, {"rules": agent.config.rules, "learned from": agent.pictures})
     return 0
 
 
@@ -109,17 +115,14 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
     from agents.vision.run import pictures_of
-    from assets.cache import digest, write_json
     from embodied.datasets.store import Dataset
-    from embodied.locks import locked
-    from embodied.records import fingerprint
 
     file = SHIPPED_HARI if args.agent == SHIPPED_AGENT else args.agent
     data, agent, splits = Dataset(args.data), load_agent(file), args.split or TEST
     agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, data, args.quality))
     use_threads(args.threads)
 
-    with locked(args.out) if args.out else contextlib.nullcontext():
+    with _locked(args.out):
         rows = judge(
             data,
             agent,
@@ -130,15 +133,31 @@ def run_hari(args: argparse.Namespace) -> int:
             keep=lambda split, name, episodes: _keep(args, split, name, episodes),
             watch=lambda agents: bar(agents, "agents", "agent"),
         )
-        if args.out:
-            about: dict[str, object] = {"data": data.digest, "agent": digest(Path(file)), "splits": list(splits)}
-            if agent.executor.seeing:
-                drawn = {n: pictures_of(data, n, args.quality) for split in splits for n in data.names(split)}
-                about |= {"looking": sorted({r.agent for r in rows})}
-                about |= {"pictures": {n: dataclasses.asdict(p) for n, p in drawn.items()}}
-            write_json(Path(args.out) / "run.json", fingerprint(seed=args.seed, tasks=args.tasks, **about), indent=1)
+        about: dict[str, object] = {"splits": list(splits)}
+        if agent.executor.seeing:
+            about["looking"] = sorted({r.agent for r in rows})
+            drawn = {n: pictures_of(data, n, args.quality) for split in splits for n in data.names(split)}
+            about["pictures"] = {n: dataclasses.asdict(p) for n, p in drawn.items()}
+        _depends(args, data, file, **about)
         _tell(args, rows, COLUMNS, {})
     return 0
+
+
+def _locked(out: Path | None) -> contextlib.AbstractContextManager[None]:
+    """Nobody else writes into `out`, where there is one."""
+    from embodied.locks import locked
+
+    return locked(out) if out else contextlib.nullcontext()
+
+
+def _depends(args: argparse.Namespace, data: Dataset, agent: Path, **facts: object) -> None:
+    """Write run.json: what the judgement depends on, and `facts`."""
+    from assets.cache import digest, write_json
+    from embodied.records import fingerprint
+
+    if args.out:
+        about = {"data": data.digest, "agent": digest(Path(agent)), "seed": args.seed, "tasks": args.tasks, **facts}
+        write_json(Path(args.out) / "run.json", fingerprint(**about), indent=1)
 
 
 def _keep(args: argparse.Namespace, split: str, name: str, episodes: Sequence[Episode]) -> None:

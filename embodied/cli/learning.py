@@ -158,7 +158,17 @@ def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     )
     add_scale(parser, VNLA_SCALES)
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(),
+        default=3,
+        metavar="N",
+        help="agents of the learned asker, from --seed on (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--others", type=whole(), metavar="N", help="agents of every other row (default: as many as --seeds)"
+    )
+    parser.add_argument(
+        "--rows", nargs="+", metavar="NAME", help="train and judge these only; tables say which rows they lack"
     )
     add_judged_tasks(parser)
     add_agents_side_by_side(parser)

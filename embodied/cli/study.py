@@ -104,11 +104,12 @@ def run_vnla(args: argparse.Namespace) -> list[Path]:
         chosen(args, SCALES[args.scale]),
         without_rooms=args.without_rooms,
         seeds=args.seeds,
+        others=args.others or args.seeds,
         tasks=args.tasks,
         quality=args.quality,
         threads=args.threads,
     )
-    return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+    return list(run_study(setting, args.tables, rows=args.rows, workers=args.workers, note=note).values())
 
 
 def run_bandit(args: argparse.Namespace) -> list[Path]:

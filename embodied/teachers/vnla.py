@@ -62,6 +62,7 @@ class MonocularPlan:
         self._backwards = csr_matrix((weight, (there, here)), shape=(states, states))
         self._cost: dict[tuple[int, ...], np.ndarray] = {}
         self._cost_to: dict[Pose, np.ndarray] = {}
+        self._actions: dict[tuple[int, ...], np.ndarray] = {}
         self._counts: dict[tuple[int, ...], np.ndarray] = {}
 
     def cost(self, goals: tuple[int, ...]) -> np.ndarray:
@@ -73,7 +74,14 @@ class MonocularPlan:
 
     def action(self, pose: Pose, goals: tuple[int, ...]) -> int | None:
         """Index into WORDS of the best move; None at a goal (stop)."""
-        return None if pose.node in goals else self._descent(pose, self.cost(goals))
+        return None if pose.node in goals else int(self._best(goals)[state_of(pose)])
+
+    def _best(self, goals: tuple[int, ...]) -> np.ndarray:
+        """(states,) int8 index into WORDS of the best move to the nearest of `goals`, the first of equals."""
+        if goals not in self._actions:
+            total = np.round(self.weight + self.cost(goals)[self.next], 9)
+            self._actions[goals] = np.argmin(total, axis=1).astype(np.int8)
+        return self._actions[goals]
 
     def action_to(self, pose: Pose, end: Pose) -> int | None:
         """Index into WORDS of the best move towards a pose, its angles included; None in it.
@@ -85,11 +93,8 @@ class MonocularPlan:
             return None
         if end not in self._cost_to:
             self._cost_to[end] = dijkstra(self._backwards, indices=state_of(end))
-        return self._descent(pose, self._cost_to[end])
-
-    def _descent(self, pose: Pose, cost: np.ndarray) -> int:
         state = state_of(pose)
-        return int(np.argmin(np.round(self.weight[state] + cost[self.next[state]], 9)))
+        return int(np.argmin(np.round(self.weight[state] + self._cost_to[end][self.next[state]], 9)))
 
     def after(self, pose: Pose, words: Sequence[str]) -> Pose:
         """The pose that `words` lead to."""
@@ -114,8 +119,7 @@ class MonocularPlan:
         """(states,) int64: actions of the teacher, the final stop included; -1 where no goal can be reached."""
         if goals not in self._counts:
             cost = self.cost(goals)
-            total = np.round(self.weight + cost[self.next], 9)
-            follow = self.next[np.arange(len(cost)), np.argmin(total, axis=1)]
+            follow = self.next[np.arange(len(cost)), self._best(goals)]
             arrived = np.isin(np.arange(len(cost)) // VIEWS, goals)
             lost, here = ~np.isfinite(cost), np.arange(len(cost))
             counts = np.ones(len(cost), dtype=np.int64)
