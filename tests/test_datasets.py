@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hand_data import build, content, hand_house
 
-from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
+from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
 from embodied.datasets.scale import PAPER, own_size, quota, scale
 from embodied.datasets.store import Dataset, DatasetError
@@ -233,3 +236,20 @@ def test_a_warning_names_what_differs_between_pictures():
         {"size": 192, "quality": "unlit", "house": "a", "code": "b"},
     )
     assert differing(held, wanted) == "code None instead of 'b', size 256 instead of 192"
+
+
+HELD: list[np.ndarray] = []
+
+
+def grow(unit: int, folder: Path) -> str:
+    """Keeps 336 MB, as a program that lights houses does, and writes down who did."""
+    time.sleep(1.2)  # joblib looks once a second
+    HELD.append(np.ones(42_000_000))
+    (folder / f"{unit}_{os.getpid()}").touch()
+    return str(unit)
+
+
+def test_workers_last_though_they_grow(tmp_path):
+    """Each was ended after a house or two, and half of the processor time went into beginning anew."""
+    for_each_unit(grow, range(6), (tmp_path,), workers=2, watch=None, ray_address=None)
+    assert len({p.name.split("_")[1] for p in tmp_path.iterdir()}) == 2

@@ -89,9 +89,10 @@ def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tm
 @pytest.mark.slow
 def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(tmp_path):
     pytest.importorskip("stable_baselines3")
-    short = ("--quality", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3")
+    short = ("--quality", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3", "--flats", "1")
     said = run("ppo_pixels.py", tmp_path, *short, "--out", "ppo")
-    assert re.search(r"finds it in \d+ % of 3 episodes, random walk \d+ %", said)
+    for where in ("flats it learned in", "a flat it never saw"):
+        assert re.search(where + r": succeeds in \d+ % \(\d+ to \d+\) of 3 episodes, random walk \d+ %", said)
     assert (tmp_path / "ppo" / "agent.zip").exists()
     rows = (tmp_path / "ppo" / "curve.csv").read_text().splitlines()
-    assert rows[0] == "steps,episodes,success,reward" and 1 < len(rows) <= 3
+    assert rows[0] == "steps,episodes,success,reward,seconds" and 1 < len(rows) <= 3

@@ -11,9 +11,10 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import joblib
+from joblib.externals.loky import process_executor
 
 from assets.cache import digest, draft_prefix, write_bytes
 from assets.catalogue import Catalogue, load_catalogue
@@ -37,6 +38,8 @@ W = TypeVar("W")
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
 VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
+GROWTH = 3 * 2**30
+"""Bytes by which a worker may grow before it is ended and another one begun."""
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
 
@@ -227,10 +230,17 @@ def for_each_unit(
         done = run_on_ray(job, work, arguments, ray_address)
     else:
         done = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
-            joblib.delayed(job)(u, *arguments) for u in work
+            joblib.delayed(_lasting)(job, u, *arguments) for u in work
         )
     for _ in watch(done, len(work)) if watch else done:
         pass
+
+
+def _lasting(job: Callable[..., str], *arguments: Any) -> str:
+    """job(*arguments), in a worker that may grow: joblib ends those that have grown by 300 MB, which everybody who lights
+    a house has, and the next one imports, unpacks and compiles everything again: as much work as a house."""
+    process_executor._MAX_MEMORY_LEAK_SIZE = GROWTH
+    return job(*arguments)
 
 
 def build_unit(
