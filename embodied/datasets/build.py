@@ -237,8 +237,8 @@ def for_each_unit(
 
 
 def _lasting(job: Callable[..., str], *arguments: Any) -> str:
-    """job(*arguments), in a worker that may grow: joblib ends those that have grown by 300 MB, as all that light a house
-    have, and the next one imports, unpacks and compiles everything again, which is as much work as a house."""
+    """job(*arguments), in a worker that may grow: joblib ends those that grew by 300 MB, as all that light a house
+    do, and the next one imports, unpacks and compiles everything again, which is as much work as a house."""
     process_executor._MAX_MEMORY_LEAK_SIZE = GROWTH
     return job(*arguments)
 
