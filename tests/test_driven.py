@@ -10,7 +10,7 @@ import embodied.gym.env
 from assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
 from embodied.datasets.store import StoredPlace
-from embodied.envs.driven import DrivenHannaEnv, Driver
+from embodied.envs.driven import DrivenHannaEnv, Driver, is_overhead
 from embodied.envs.hanna import HannaEnv
 from embodied.interface import Ask, FindObject, Move, Pose, Route, Stop, Task
 from embodied.navigation.graph import build_graph
@@ -90,3 +90,10 @@ class Blank:
 
     def features(self, sight):
         return np.zeros((36, 3), dtype=np.float32)
+
+
+def test_only_what_hangs_over_the_body_is_left_out():
+    floors = [0.0, 2.9]
+    assert is_overhead(1.6, 2.2, floors) and is_overhead(4.6, 5.3, floors)  # wall cabinets
+    assert not is_overhead(0.0, 2.6, floors) and not is_overhead(2.6, 2.9, floors)  # a wall; the upper floor
+    assert not is_overhead(1.4, 2.0, floors) and not is_overhead(2.9, 3.6, floors)

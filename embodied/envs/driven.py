@@ -8,7 +8,7 @@ leaves the agent where it came from.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -252,9 +252,12 @@ def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dic
     root = arena.mjcf_model
     root.option.timestep, root.option.integrator = 0.004, "implicitfast"
     root.compiler.angle = "radian"
-    owners = {}
+    owners, floors = {}, [s.elevation for s in house.storeys]
     for g in range(model.ngeom):
         if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_BOX:
+            continue
+        middle, half = data.geom_xpos[g][2], float(np.abs(data.geom_xmat[g][6:]) @ model.geom_size[g])
+        if is_overhead(middle - half, middle + half, floors):
             continue
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[g])
@@ -263,6 +266,12 @@ def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dic
         )
         owners[f"box{g}"] = owner_of_name(model.geom(g).name)
     return arena, owners
+
+
+def is_overhead(low: float, high: float, floors: Sequence[float]) -> bool:
+    """Whether what reaches from one height to another hangs above a body on any of the floors, and under the next."""
+    above = [*floors[1:], math.inf]
+    return any(low > floor + HEIGHT + 0.1 and high < upper - 0.05 for floor, upper in zip(floors, above, strict=True))
 
 
 class _Driven(HelpEnv):

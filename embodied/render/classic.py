@@ -103,6 +103,7 @@ class Renderer:
         self._is_visual = np.array([k != "collision" for k in self.scene.kind_of_geom])
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, self.scene)
+        self._middles, self._reaches = world_boxes(model, self._data)
         self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
 
     def view(
@@ -211,14 +212,14 @@ class Renderer:
         return self._seen_from[1]
 
     def _in_frustum(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        """(ngeom,) bool: whose bounding sphere reaches into the field of view."""
+        """(ngeom,) bool: whose bounding box reaches into the field of view."""
         forward, up = np.array(camera.forward), np.array(camera.up)
         right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
         wide = tall * size[1] / size[0]
         planes = np.stack([forward * wide - right, forward * wide + right, forward * tall - up, forward * tall + up])
         planes /= np.linalg.norm(planes, axis=1, keepdims=True)
-        apart = self._data.geom_xpos - np.array(camera.position)
-        return np.all(apart @ planes.T >= -self.scene.model.geom_rbound[:, None] - 1e-3, axis=1)
+        apart = self._middles - np.array(camera.position)
+        return np.all(apart @ planes.T >= -self._reaches @ np.abs(planes.T) - 1e-3, axis=1)
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""
@@ -253,6 +254,13 @@ class Renderer:
         depth = depth_of_reversed_z(reversed_z)
         depth[ids == 0] = np.inf  # a painted sky is no thing
         return depth[::-1], ids[::-1]
+
+
+def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """(ngeom, 3) middles and (ngeom, 3) half sizes of boxes along the world's axes that hold the geoms, metres."""
+    axes = data.geom_xmat.reshape(-1, 3, 3)
+    middles = data.geom_xpos + np.einsum("gij,gj->gi", axes, model.geom_aabb[:, :3])
+    return middles, np.einsum("gij,gj->gi", np.abs(axes), model.geom_aabb[:, 3:])
 
 
 def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> np.ndarray:
