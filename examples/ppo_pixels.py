@@ -8,8 +8,8 @@ seen from where the agent stands (what a compass and a positioning system tell; 
 and stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of
 such an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings
 the agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in one
-it never saw, beside a random walk that stops as often as suits it best. --blind shows black pictures instead: what the
-goal alone gives.
+it never saw, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png.
+--blind shows black pictures instead: what the goal alone gives.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+import matplotlib.pyplot as plt
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -241,12 +242,26 @@ def walker(chance: float, rng: np.random.Generator) -> Callable[[dict[str, np.nd
     return lambda o: STOP if rng.random() < chance else int(rng.integers(STOP))
 
 
-def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> None:
+def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> float:
+    """Says how the learner and the random walk fare, and returns the share of the latter."""
     env, rng = make(), np.random.default_rng(args.seed)
     learned = judged(env, lambda o: int(learner.predict(o, deterministic=False)[0]), args.judge, 1000)
     random = max(judged(env, walker(chance, rng), args.judge, 1000) for chance in STOPS)
     n = args.judge
     print(f"{name}: succeeds in {interval(learned, n)} of {n} episodes, random walk {interval(random, n)}", flush=True)
+    return random
+
+
+def draw_curve(table: Path, random: float, picture: Path) -> None:
+    """Success of the training's episodes against its steps, and the random walk's."""
+    rows = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True))
+    figure, axes = plt.subplots(figsize=(5.2, 2.8), layout="constrained")
+    axes.plot(rows["steps"] / 1000, 100 * rows["success"], label="PPO while it learns, drawn actions")
+    axes.axhline(100 * random, color="grey", linestyle="--", label="random walk, at the end")
+    axes.set(xlabel="thousand steps", ylabel="success, %", ylim=(0, 100))
+    axes.legend(loc="upper left", frameon=False, fontsize=8)
+    figure.savefig(picture, dpi=150)
+    plt.close(figure)
 
 
 def main() -> None:
@@ -286,7 +301,8 @@ def main() -> None:
     )
     learner.learn(args.steps, callback=Curve(args.out / "curve.csv", args.minutes))
     learner.save(args.out / "agent.zip")
-    report("flats it learned in", make, learner, args)
+    random = report("flats it learned in", make, learner, args)
+    draw_curve(args.out / "curve.csv", random, args.out / "curve.png")
     away = arena(args, [args.flats], home.goals)
     if away.tasks:
         report("a flat it never saw", maker(away, args.blind), learner, args)
