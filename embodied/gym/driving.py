@@ -16,7 +16,7 @@ import numpy as np
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
 from embodied.geometry import wrap
 from embodied.gym.eyes import FAR, PIXELS
-from embodied.gym.floor_ways import FloorWays, Ways
+from embodied.gym.floor_ways import DrivingWays, FloorWays
 from embodied.gym.spaces import codes_of, word_number
 from embodied.language.plain import with_article
 from embodied.navigation.free_space import EYE
@@ -144,7 +144,7 @@ class Driving:
         self.bumps: list[str] = []
         self.touched = False
         self.ended: str | None = None
-        self._wide: Ways | None = None
+        self._wide: DrivingWays | None = None
 
     def step(self, action: Sequence[float] | np.ndarray) -> Outcome:
         """Hold a command: `settings.numbers` numbers from -1 to 1.

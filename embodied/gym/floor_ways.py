@@ -43,19 +43,19 @@ class FloorWays:
         """The cell nearest to (x, y)."""
         return int(self._tree.query(np.asarray(xy)[:2])[1])
 
-    def ways(self, goals: np.ndarray) -> Ways:
+    def ways(self, goals: np.ndarray) -> DrivingWays:
         """The shortest ways from everywhere to the nearest of some cells, an array of their indices, at least one."""
         return self._ways(self._steps, goals)
 
-    def wide_ways(self, goals: np.ndarray) -> Ways:
+    def wide_ways(self, goals: np.ndarray) -> DrivingWays:
         """Ways that keep away from things where there is room for that; their metres are longer than they are."""
         return self._ways(self._wide, goals)
 
-    def _ways(self, steps: csr_matrix, goals: np.ndarray) -> Ways:
+    def _ways(self, steps: csr_matrix, goals: np.ndarray) -> DrivingWays:
         metres, after, _ = dijkstra(
             steps, directed=False, indices=np.asarray(goals), min_only=True, return_predecessors=True
         )
-        return Ways(self, metres, after)
+        return DrivingWays(self, metres, after)
 
     def is_free(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """(m,) bool: whether the straight lines from a (2,) to b (m, 2) stay where the centre may be."""
@@ -63,7 +63,7 @@ class FloorWays:
         return np.asarray(shapely.covers(self._space, shapely.linestrings(lines)))
 
 
-class Ways:
+class DrivingWays:
     """How far every cell is from the nearest goal, metres over the grid (`metres`), and ways there."""
 
     def __init__(self, ground: FloorWays, metres: np.ndarray, after: np.ndarray) -> None:
