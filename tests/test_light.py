@@ -138,6 +138,13 @@ def test_sites_are_one_luxel_in_nine_and_carry_a_gradient_to_all_luxels():
     np.testing.assert_allclose(spread(slope(sites.position))[inner], slope(lux.position)[inner], rtol=0.02)
 
 
+def test_a_glint_that_reaches_no_site_adds_nothing():
+    """Dr.Jit refuses loops over no points: a flat of 56 (seed 0) could not be lit."""
+    lux, sites = SimpleNamespace(), SimpleNamespace(luxel=np.arange(9))
+    problem = SimpleNamespace(space=None, lux=lux, sites=sites)
+    assert solve._lit_by(problem, None, np.zeros(0, np.int64)).shape == (0, 3)
+
+
 def test_what_is_no_shell_can_have_fewer_sites():
     fine, coarse = (sites_of(sheets(flat_luxels(0.0, 0), shell=shell), 2.5, things=2.0) for shell in (True, False))
     assert len(coarse.luxel) == pytest.approx(len(fine.luxel) / 4, rel=0.25)

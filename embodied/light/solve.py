@@ -311,7 +311,9 @@ def _nowhere() -> Portal:
 
 
 def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray:
-    """(k, 3) e of sunlit patches at some sites."""
+    """(k, 3) e of sunlit patches at some sites; of none at none (a glint may reach no site)."""
+    if not len(which):
+        return np.zeros((0, 3), np.float32)
     return radiosity.patch_light(problem.space, subset(problem.lux, problem.sites.luxel[which]), patches)
 
 
