@@ -55,8 +55,10 @@ def test_back_ends_agree(house, lit):
 
 @pytest.mark.slow
 def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
-    """Only the floor changes; where one looks along it, it takes on what stands behind (Fresnel) and darkens nowhere, but for
-    single pixels (seen once: one of 3,211 nine levels darker)."""
+    """Only the floor changes; where one looks along it, it takes on what stands behind (Fresnel).
+
+    It darkens nowhere, but for single pixels (seen once: one of 3,211 nine levels darker).
+    """
     shiny = dataclasses.replace(
         lit, meshes=tuple(dataclasses.replace(m, gloss=(0.05, 0.5)) if "/floor" in m.owner else m for m in lit.meshes)
     )
