@@ -10,7 +10,16 @@ import pytest
 import torch
 from hand_worlds import HandWorld, hand_graph, room, thing
 
-from agents.hari.agent import Executor, HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent
+from agents.hari.agent import (
+    Executor,
+    HariAgent,
+    begun_with,
+    load_agent,
+    load_executor,
+    new_executor,
+    new_heads,
+    save_agent,
+)
 from agents.hari.config import STATES, ExecutionConfig, IntentionConfig
 from agents.hari.policy import policy_of
 from agents.hari.pretraining import Curriculum, learn_once, pretraining_success
@@ -153,6 +162,16 @@ def test_a_policy_that_sees_wants_eyes_and_one_that_reads_has_no_use_for_them():
         blind.look([Sight("east", 0)])
     reads = new_executor(dataclasses.replace(CONFIG, sees="words"), blind.words)
     assert reads.look([Sight("east", 0)]) == [None] and reads.network.sight is None
+
+
+def test_a_policy_that_reads_can_be_taught_to_see():
+    reads = new_executor(dataclasses.replace(CONFIG, sees="words", seed=5), fresh().words)
+    begun = begun_with(fresh(), reads)
+    assert torch.equal(begun.network.names.weight, reads.network.names.weight) and begun.network.sight is not None
+    with pytest.raises(ValueError, match="other sizes"):
+        begun_with(fresh(dataclasses.replace(CONFIG, hidden_size=16)), reads)
+    with pytest.raises(ValueError, match="sight.row.weight"):
+        begun_with(reads, fresh())
 
 
 # What is learned --------------------------------------------------------------------------------

@@ -105,6 +105,22 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
         return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
 
 
+def begun_with(executor: Executor, other: Executor) -> Executor:
+    """`executor` with the words and weights of another; one that reads alone may so be taught to see.
+
+    Raises:
+      ValueError: the other has other sizes, or sees what this one does not.
+    """
+    new = new_executor(executor.config, other.words, executor.seeing, executor.eyes)
+    try:
+        lost = new.network.load_state_dict(other.network.state_dict(), strict=False)
+    except RuntimeError as e:
+        raise ValueError(f"an execution policy of other sizes cannot be begun with ({e})") from e
+    if lost.unexpected_keys or any(not k.startswith("sight.") for k in lost.missing_keys):
+        raise ValueError(f"cannot begin with a policy that has {lost.unexpected_keys} and lacks {lost.missing_keys}")
+    return new
+
+
 def save_executor(executor: Executor, path: Path) -> None:
     """Write an execution policy, atomically."""
     _save({"execution": executor.network}, _settings_of(executor), executor.words, path)

@@ -60,23 +60,24 @@ def costs_figure(
     path: Path,
 ) -> None:
     """Figure 4.6: (a) success against the cost of an action per condition and horizon, (b) actions at the longest."""
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    figure = Figure(figsize=(9, 3.9), layout="constrained")
     left, right = figure.subplots(1, 2)
     horizons = sorted({h for _, h in success})
     for (condition, h), found in success.items():
         style = dict(zip(horizons, (":", "--", "-"), strict=False)).get(h, "-")
         colour = dict(zip(WORDS, ("#2b6cb0", "#c05621", "#2f855a"), strict=True)).get(condition, "#4a5568")
         label = f"{WORDS.get(condition, condition)}, H = {h}"
-        left.errorbar(
-            costs, [100 * e.mean for e in found], [100 * e.half for e in found], ls=style, color=colour, label=label
-        )
+        mean, half = [100 * e.mean for e in found], [100 * e.half for e in found]
+        left.errorbar(costs, mean, half, ls=style, marker="os^"[horizons.index(h) % 3], color=colour, label=label)
     for name, numbers in actions.items():
         right.plot(costs, numbers, marker="o", color=COLOURS[name], label=name)
     for axes, title in ((left, "success (%)"), (right, "actions per episode")):
         axes.set_xscale("log")
+        axes.set_xticks(costs, [f"{c:g}" for c in costs])
+        axes.minorticks_off()
         axes.set_xlabel("cost of an action")
         axes.set_ylabel(title)
-        axes.legend(frameon=False, fontsize=7)
+        axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16))
     _save(figure, path)
 
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from agents.hari.agent import Executor, HariAgent, new_executor, new_heads
+from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
@@ -83,6 +83,7 @@ def train_execution(
     *,
     encoder: str = "",
     quality: str | None = None,
+    begin: Path | None = None,
     minutes: float | None = None,
     note: Note = print,
 ) -> Progress:
@@ -91,6 +92,7 @@ def train_execution(
     Args:
       encoder: digest of the one whose features a policy sees that does.
       quality: of the pictures that these were made from, as in agents.vision.run.pictures_of.
+      begin: with the words and weights of this execution policy, not with random ones; one that reads learns to see so.
     """
     lessons = lessons_of(data)
     describe = lessons.describer.dense
@@ -102,6 +104,8 @@ def train_execution(
         eyes, seeing = eyes_of(data, encoder, splits=("pretrain", "pretrain_val"), quality=quality)
         note(f"sees features of {seeing.size} numbers per view, pictures: {seeing.pictures}")
     executor = new_executor(config, words, seeing, eyes)
+    if begin is not None:
+        executor = begun_with(executor, load_executor(begin))
     size = sum(p.numel() for p in executor.network.parameters())
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(words)} names, {size:,} parameters")
     return pretrain(executor, lessons, folder, minutes=minutes, note=note)

@@ -181,6 +181,12 @@ def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     execution = phases.add_parser("execution", help="first: to understand descriptions and walk by them (DAgger)")
     _add_hari(execution, EXECUTION_SCALES)
     add_encoder(execution)
+    execution.add_argument(
+        "--begin",
+        type=any_path,
+        metavar="FILE",
+        help="begin with this execution policy's weights, not with random ones",
+    )
     add_fields(execution, ExecutionConfig, scales=EXECUTION_SCALES, words={"sees": SEES})
     intention = phases.add_parser("intention", help="then: which question to ask when (actor-critic)")
     _add_hari(intention, INTENTION_SCALES)

@@ -106,8 +106,8 @@ def run_hari(args: argparse.Namespace) -> int:
     if args.phase == "execution":
         config = chosen(args, EXECUTION_SCALES[args.scale])
         encoder = encoder_of(args).digest if config.sees == "features" else ""
-        quality, minutes = args.quality, args.minutes
-        train_execution(data, config, args.out, encoder=encoder, quality=quality, minutes=minutes, note=note)
+        how = {"quality": args.quality, "begin": args.begin, "minutes": args.minutes}
+        train_execution(data, config, args.out, encoder=encoder, note=note, **how)
     else:
         asking = chosen(args, INTENTION_SCALES[args.scale])
         walking = with_eyes(load_executor(args.execution), data, args.quality)
