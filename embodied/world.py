@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.light import Bake
     from embodied.light.reference import Tracer
+    from embodied.render.gloss import Shine
 
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
@@ -96,7 +97,7 @@ class World:
         """All that the panoramas depend on, and what draws them."""
         return (
             self._origin
-            | dataclasses.asdict(self.pictures)
+            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if (k, v) != ("look", "matte")}
             | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
         )
 
@@ -132,13 +133,18 @@ class World:
         if self._renderer is None:
             if self.pictures.quality == "none":
                 raise ValueError(f"world {self.name!r} was opened without pictures; open it with another quality")
-            painter = None
+            painter = overlay = None
+            if self.pictures.look == "gloss":
+                from embodied.render.gloss import Gloss  # late: loads Embree
+
+                bake = self._baked()
+                overlay = Gloss(bake.lit, shine_of(bake, [room.id for room in self.house.rooms]))
             if self.lit is not None and self.pictures.backend == "filament":
                 from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
                 painter = FilamentPainter(self.house, self.catalogue, self.lit)
             self._renderer = Renderer(
-                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, painter=painter
+                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, painter=painter, overlay=overlay
             )
         return self._renderer
 
@@ -305,11 +311,48 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_diff
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
+def shine_of(bake: Bake, rooms: Sequence[str]) -> Shine:
+    """What a bake knows of its house's gloss; colours of metal faces from the middle of each face.
+
+    Args:
+      rooms: ids of the house's rooms, in their order.
+    """
+    from embodied.render.gloss import Shine
+
+    own, lit = bake.manifest["own_pages"], bake.lit
+    with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
+        gloss = [z[f"g{i}"] if f"g{i}" in z.files and m.page < own else None for i, m in enumerate(lit.meshes)]
+    tint: list[np.ndarray | None] = []
+    glow: list[np.ndarray | None] = [None] * len(lit.pages)
+    for page in range(own):
+        with np.load(bake.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
+            glow[page] = z["glow"] if z["glow"].size else None
+    colours: dict[int, np.ndarray] = {}
+    for mesh, shine in zip(lit.meshes, gloss, strict=True):
+        if shine is None or not shine[:, 2].any():
+            tint.append(None)
+            continue
+        if mesh.page not in colours:
+            colours[mesh.page] = bake.ingredients(mesh.page).albedo
+        picture = colours[mesh.page]
+        h, w = picture.shape[:2]
+        at = mesh.uv[mesh.faces].mean(1)
+        x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
+        v = picture[y, x] / 255.0
+        tint.append(np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4).astype(np.float32))
+    exposure, middle = bake.exposure, np.median(bake.exposure.gains, axis=0)
+    gain_of_room = dict(zip(rooms, exposure.gains, strict=True))
+    gains = [exposure.outdoors if m.kind == "outdoor" else gain_of_room.get(m.room, middle) for m in lit.meshes]
+    return Shine(gloss, tint, glow, [g.astype(np.float32) for g in gains], float(np.median(exposure.gains)))
+
+
 def makers(pictures: PictureSettings) -> tuple[str, ...]:
     """Modules that draw and keep such pictures; cached pictures made by other code than theirs are not used."""
     modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
     if pictures.lit:
         modules.append("embodied.light.baking")
+    if pictures.look == "gloss":
+        modules.append("embodied.render.gloss")
     if pictures.backend == "filament":
         modules.append("embodied.render.filament")
     if pictures.quality in TRACED:

@@ -19,7 +19,8 @@ def drawing(pictures: PictureSettings) -> str:
     """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
     lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
     other = () if pictures.backend == "classic" else (pictures.backend,)
-    return "_".join([pictures.quality, *map(str, lit), *other, str(pictures.size)])
+    look = () if pictures.look == "matte" else (pictures.look,)
+    return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size)])
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import dataclasses
 from collections.abc import Iterable
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, show
-from embodied.cli.options import face, folder_to_write, whole
+from embodied.cli.options import LOOK_HELP, face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
-from embodied.render.pictures import QUALITIES, PictureSettings
+from embodied.render.pictures import LOOKS, QUALITIES, PictureSettings
 
 WORDS_ONLY = ("hari",)
 """Kinds that are not drawn unless asked: all that HARI's agent perceives are words, its learner and its tables (4.7
@@ -85,6 +85,7 @@ def _add_drawing(parser: argparse.ArgumentParser) -> None:
         help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
         "that are there already, else fast; hari: none)",
     )
+    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP.replace("%(default)s", "as are there, else matte"))
     parser.add_argument(
         "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
     )
@@ -125,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray
     )
     data = Dataset(args.out)
-    pictures = chosen_pictures(args.kind, args.panoramas, args.size, data.pictures)
+    pictures = chosen_pictures(args.kind, args.panoramas, args.size, data.pictures, args.look)
     if pictures.quality != "none":
         note(f"drawing panoramas: {pictures.quality}, faces of {pictures.size} pixels; what is drawn already is kept")
         draw_panoramas(
@@ -150,18 +151,21 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def chosen_pictures(kind: str, quality: str | None, size: int | None, held: PictureSettings | None) -> PictureSettings:
+def chosen_pictures(
+    kind: str, quality: str | None, size: int | None, held: PictureSettings | None, look: str | None = None
+) -> PictureSettings:
     """How the panoramas of a data set are drawn; quality 'none': not at all.
 
     Args:
       quality, size: what --panoramas and --size say; None where they are left out.
+      look: what --look says, likewise.
       held: how those that the data set holds were drawn, None where it holds none. They are gone on with rather than
         drawn again in another way that nobody asked for.
     """
     if quality is None and held is not None:
-        return held if size is None else dataclasses.replace(held, size=size)
+        return dataclasses.replace(held, size=size or held.size, look=look or held.look)
     chosen = quality or ("none" if kind in WORDS_ONLY else "fast")
-    return PictureSettings(size or PictureSettings().size, chosen)
+    return PictureSettings(size or PictureSettings().size, chosen, look=look or "matte")
 
 
 def chosen_scale(args: argparse.Namespace) -> str:

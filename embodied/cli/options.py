@@ -134,6 +134,10 @@ def _refuse_unwritable(wanted: Path) -> None:
         raise argparse.ArgumentTypeError(f"{there} may not be written by you; choose another place than {wanted}")
 
 
+LOOK_HELP = (
+    "matte: what baked light shows to everybody; gloss: reflections laid over it, for qualities fast and normal, at "
+    "two to three times the price (default: %(default)s)"
+)
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
 

@@ -11,10 +11,10 @@ import math
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-from embodied.cli.options import any_path, face, file_to_write, whole
+from embodied.cli.options import LOOK_HELP, any_path, face, file_to_write, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import BACKENDS, QUALITIES
+from embodied.render.pictures import BACKENDS, LOOKS, QUALITIES, PictureSettings
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -33,10 +33,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan"
     )
+    parser.add_argument("--look", choices=LOOKS, default="matte", help=LOOK_HELP)
     parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
     parser.add_argument("--equirect", type=file_to_write, metavar="PNG", help="where to write the picture of --node")
-    parser.add_argument("--look", type=file_to_write, metavar="PNG", help="where to write a view from --node")
-    parser.add_argument("--yaw", type=float, default=0.0, help="degrees of --look, counter-clockwise (default: 0)")
+    parser.add_argument("--view", type=file_to_write, metavar="PNG", help="where to write a view from --node")
+    parser.add_argument("--yaw", type=float, default=0.0, help="degrees of --view, counter-clockwise (default: 0)")
     parser.add_argument(
         "--camera",
         choices=CAMERAS,
@@ -53,17 +54,16 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.world import open_folder
 
-    if (args.node is None) != (args.equirect is None and args.look is None):
-        raise ValueError("--node goes together with --equirect or --look: --node 3 --equirect node3.png")
+    if (args.node is None) != (args.equirect is None and args.view is None):
+        raise ValueError("--node goes together with --equirect or --view: --node 3 --equirect node3.png")
     if args.camera != "ideal" and args.node is None:
         raise ValueError(
-            "--camera takes pictures of one viewpoint: --node 3 --look node3.png --camera phone; panorama files stay "
+            "--camera takes pictures of one viewpoint: --node 3 --view node3.png --camera phone; panorama files stay "
             "ideal, and environments and training photograph what they show of them"
         )
     catalogue = catalogue_of(args)
-    with open_folder(
-        args.folder, catalogue, args.cache, size=args.size, quality=args.quality, backend=args.backend
-    ) as world:
+    pictures = PictureSettings(args.size, args.quality, args.backend, look=args.look)
+    with open_folder(args.folder, catalogue, args.cache, pictures) as world:
         fetch(catalogue, world.house)
         if args.node is not None:
             return one(args, world)
@@ -94,9 +94,9 @@ def one(args: argparse.Namespace, world: World) -> int:
     pictures = {}
     if args.equirect:
         pictures[args.equirect] = camera.photographed(panorama.equirect(2 * args.size), None, *place, light=dark)
-    if args.look:
+    if args.view:
         rgb = panorama.view_rgb(math.radians(args.yaw), 0.0, VFOV36, (args.size, args.size * 4 // 3))
-        pictures[args.look] = camera.photographed(rgb, VFOV36, *place, light=dark)
+        pictures[args.view] = camera.photographed(rgb, VFOV36, *place, light=dark)
     for path, rgb in pictures.items():
         write_bytes(path, cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))[1].tobytes())
     note(f"node {args.node} in {world.graph.room_of_node[args.node]}, {args.camera} camera")

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import any_path, face, file_to_write, video_side, whole
+from embodied.cli.options import LOOK_HELP, any_path, face, file_to_write, video_side, whole
 from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import DRAWN
+from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--episodes", type=whole(), default=1, metavar="N", help="how many tasks (default: %(default)s)"
     )
     parser.add_argument("--quality", choices=DRAWN, default="normal", help="how the house is drawn (default: normal)")
+    parser.add_argument("--look", choices=LOOKS, default="matte", help=LOOK_HELP)
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
@@ -124,11 +125,11 @@ def world_of(args: argparse.Namespace) -> World:
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world
 
-    catalogue = catalogue_of(args)
+    catalogue, pictures = catalogue_of(args), PictureSettings(args.size, args.quality, look=args.look)
     if args.house:
-        return open_folder(args.house, catalogue, args.cache, size=args.size, quality=args.quality)
+        return open_folder(args.house, catalogue, args.cache, pictures)
     house = generate_house(args.seed, catalogue=catalogue)
-    return open_world(house, catalogue, args.cache, size=args.size, quality=args.quality)
+    return open_world(house, catalogue, args.cache, pictures)
 
 
 def policy_of(name: str) -> Agent:

@@ -49,6 +49,14 @@ class Painter(Protocol):
     def close(self) -> None: ...
 
 
+class Overlay(Protocol):
+    """Adds to the colours of a house what no page holds."""
+
+    def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
+        """(h, w, 3) uint8: the picture that `camera` drew, with it."""
+        ...
+
+
 class Renderer:
     """Draws one house. Owns textures and display lists on the graphics side until `close`.
 
@@ -65,6 +73,7 @@ class Renderer:
         lit: LitPages | None = None,
         painter: Painter | None = None,
         scene: Scene | None = None,
+        overlay: Overlay | None = None,
     ) -> None:
         """Compile `house`, open OpenGL and upload.
 
@@ -75,6 +84,7 @@ class Renderer:
           lit: the baked pages to show; even light from all sides without.
           painter: draws the colours instead, from the same pages; it is closed with the renderer.
           scene: a scene compiled before from the same house and pages, to save compiling again.
+          overlay: adds reflections; depth and ids stay as they are.
 
         Raises:
           ValueError: impossible size.
@@ -82,7 +92,7 @@ class Renderer:
         """
         check_size(size)
         self.house, self.size = house, size
-        self._mjr, self._painter = None, painter
+        self._mjr, self._painter, self._overlay = None, painter, overlay
         self.scene = scene or compile_scene(house, catalogue, collisions=False, lit=lit)
         model = self.scene.model
         self._data = mujoco.MjData(model)
@@ -227,6 +237,10 @@ class Renderer:
         return math.ceil(size[0] * factor), math.ceil(size[1] * factor)
 
     def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        rgb = self._drawn_rgb(camera, size)
+        return rgb if self._overlay is None else self._overlay.over(rgb, camera)
+
+    def _drawn_rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         if self._painter is not None:
             return self._painter.rgb(camera, size, NEAR, FAR)
         height, width = self._drawn_size(size)

@@ -13,6 +13,8 @@ TRACED = ("glossy", "reference")
 """Qualities whose panoramas are ray-traced, from the viewpoints only."""
 BACKENDS = ("classic", "filament")
 """Who draws colours: MuJoCo's OpenGL, or its Filament through Vulkan. Depth and ids are always the classic one's."""
+LOOKS = ("matte", "gloss")
+"""What baked light is shown with: what the pages hold, or reflections by rays from what is seen laid over it."""
 SIZES = (8, 4096)
 """Smallest and largest side of a cube face, pixels."""
 
@@ -29,6 +31,8 @@ class PictureSettings:
     """One of BACKENDS."""
     light: str | None = None
     """Light settings by name (embodied.light); those that the quality stands for if None."""
+    look: str = "matte"
+    """One of LOOKS; 'gloss' is for the qualities 'fast' and 'normal' of the classic renderer."""
 
     def __post_init__(self) -> None:
         if self.quality not in QUALITIES:
@@ -39,6 +43,13 @@ class PictureSettings:
         if self.backend == "filament" and self.quality not in ("fast", "normal"):
             raise ValueError(
                 f"backend 'filament' draws qualities 'fast' and 'normal', not {self.quality!r}; use backend 'classic'"
+            )
+        if self.look not in LOOKS:
+            raise ValueError(f"look {self.look!r} is unknown; use one of {LOOKS}")
+        if self.look == "gloss" and (self.quality not in ("fast", "normal") or self.backend != "classic"):
+            raise ValueError(
+                f"look 'gloss' is laid over what the classic renderer draws in qualities 'fast' and 'normal', not over "
+                f"{self.quality!r} by {self.backend!r}; use look 'matte'"
             )
         if self.light is not None and not self.lit:
             raise ValueError(f"quality {self.quality!r} is without light, so light={self.light!r} means nothing")

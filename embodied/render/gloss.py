@@ -1,0 +1,517 @@
+"""Gloss: reflections laid over pictures of a lit house, by rays from what is seen into the baked light.
+
+A page holds the light that a surface sends to everybody; what it mirrors depends on who looks. Here the glossy pixels
+of a picture that is drawn already send one ray each: to the surface, whose roughness, specular and metallic share are
+known per face, and on by its lobe to what it mirrors, whose light is read from the same pages. Rough surfaces are
+looked at in half the resolution, each pixel along another direction of the lobe, and averaged over their neighbours on
+the same surface; smooth ones in full. The directions depend on the pixel alone, so that frames of a video do not
+flicker against each other. Depth and ids stay.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+import cv2
+import numpy as np
+
+from embodied.errors import UnableError
+from embodied.geometry import r2
+from embodied.render.camera import Camera
+from embodied.scene.lit_pages import LitMesh, LitPages
+
+MATTE = 0.7
+"""Roughness from which on nothing is looked for: the lobe is so wide that three views gained 0.0 to 0.3 dB by it and cost
+half as much again."""
+FAINT = 0.006
+"""Share of the light that has to be mirrored for a ray to be worth it."""
+SMOOTH = 0.12
+"""Roughness below which every pixel looks for itself: mirrors, panes, tiles, polished metal."""
+METAL = 0.3
+"""Metallic share from which on a page wears a picture of what the face mirrors for somebody in the middle of the
+room."""
+BRIGHTEST = 12.0
+"""Reflected light is cut at this multiple of what is shown as a white sheet, as in the tracer."""
+COARSER = 4
+"""Texels of a page, in one direction, that are averaged for what rough surfaces mirror."""
+LIFT = 1e-3
+"""Metres that a ray begins above its surface."""
+TILE = 4
+"""Pixels after which the directions in the lobe repeat."""
+CREASE = 0.9
+"""Cosine of two normals below which they belong to two surfaces."""
+ROOKS = ((-0.25, -0.25), (0.25, 0.25))
+"""Where in a pixel smooth surfaces are looked at, from its centre: no two in a row or column."""
+WHITE = 5.0
+"""Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
+GLASS = 0.81
+"""Share of the outdoors' light that comes in through double glazing, as the bake has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shine:
+    """What a bake knows of a house's gloss besides its pages; each sequence goes with LitPages.meshes or .pages."""
+
+    gloss: Sequence[np.ndarray | None]
+    """Per mesh (m, 3) uint8: roughness, specular and metallic share of each face, times 255; None: matte."""
+    tint: Sequence[np.ndarray | None]
+    """Per mesh (m, 3) float32 linear colour of each face; None where none is of metal."""
+    glow: Sequence[np.ndarray | None]
+    """Per page (h, w, 3) radiance of what glows; None where nothing does."""
+    gains: Sequence[np.ndarray]
+    """Per mesh (3,) what light is multiplied by in its room before it is shown; outdoors, what windows show."""
+    middle: float
+    """What light is multiplied by in rooms, in the median."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """All opaque faces of a house, m, one after another."""
+
+    corners: np.ndarray
+    """(m, 3, 3) float32 metres."""
+    normal: np.ndarray
+    """(m, 3) float32."""
+    uv: np.ndarray
+    """(m, 3, 2) float32."""
+    page: np.ndarray
+    """(m,) int32."""
+    owner: np.ndarray
+    """(m,) int32, of meshes."""
+    gloss: np.ndarray
+    """(m, 3) float32 roughness, specular, metallic; zero where matte."""
+    tint: np.ndarray
+    """(m, 3) float32."""
+    gain: np.ndarray
+    """(m, 3) float32 what light is multiplied by before it is shown on the face."""
+
+
+class Gloss:
+    """Owns the faces of a lit house, arranged for rays, and its light, coarser than the pages."""
+
+    def __init__(self, lit: LitPages, shine: Shine) -> None:
+        """
+        Raises:
+          UnableError: Embree is not installed.
+        """
+        self._faces = _faces_of(lit, shine)
+        self._pages = lit.pages
+        self._scene = _scene_of(self._faces.corners)
+        gain_of_page = {m.page: g for m, g in zip(lit.meshes, shine.gains, strict=True)}
+        small = [_coarse(p, g, gain_of_page.get(i)) for i, (p, g) in enumerate(zip(lit.pages, shine.glow, strict=True))]
+        self._width = np.array([s.shape[1] for s in small], np.int32)
+        self._height = np.array([s.shape[0] for s in small], np.int32)
+        texels = self._width.astype(np.int64) * self._height
+        self._base = np.cumsum(texels) - texels
+        self._light = np.concatenate([s.reshape(-1, 3) for s in small])
+        self._middle = shine.middle
+
+    def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
+        """The picture (h, w, 3) uint8 that `camera` drew, with what its surfaces mirror; matte pixels stay."""
+        h, w = rgb.shape[:2]
+        out = np.array(rgb)
+        seen = self._seen(camera, _directions(camera, (h, w), step=2))
+        grid = _Grid(((h + 1) // 2, (w + 1) // 2), seen, self._faces.owner[seen.face])
+        if seen.dull.any():
+            self._rough(seen, camera, grid)
+            values = self._enlarged(camera, grid, (h, w))
+            where = np.flatnonzero(values[..., :3].any(-1))
+            lost, mirrored = values.reshape(-1, 6)[where, :3], values.reshape(-1, 6)[where, 3:]
+            own = light_of(out.reshape(-1, 3)[where])
+            out.reshape(-1, 3)[where] = shown_of(own * (1 - lost) + mirrored)
+        sharp = np.zeros(grid.shape, np.uint8)
+        sharp.ravel()[seen.pixel[seen.sharp]] = 1
+        if sharp.any():
+            near = cv2.dilate(sharp, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+            near = cv2.resize(near, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_NEAREST)[:h, :w]
+            self._lay_smooth(out, rgb, camera, near)
+        return out
+
+    def _seen(self, camera: Camera, directions: np.ndarray, pixels: np.ndarray | None = None) -> _Seen:
+        """What is seen along directions (n, 3) from a camera, `pixels` of its picture."""
+        faces = self._faces
+        origin = np.broadcast_to(np.asarray(camera.position, np.float32), directions.shape)
+        face, distance, _, _ = _first(self._scene, np.ascontiguousarray(origin), directions)
+        hit = np.flatnonzero(face >= 0)
+        face, ahead = face[hit], directions[hit]
+        gloss = faces.gloss[face]
+        cos = -np.einsum("ij,ij->i", faces.normal[face], ahead)
+        facing = np.where(cos < 0, np.float32(-1), np.float32(1))
+        metal = gloss[:, 2]
+        f0 = 0.08 * gloss[:, 1] * (1 - metal) + metal
+        worth = (schlick(f0, np.abs(cos), gloss[:, 0]) > FAINT) & (gloss[:, 0] < MATTE) & (gloss[:, 1] > 0)
+        pixels = hit if pixels is None else pixels[hit]
+        sharp = (gloss[:, 0] < SMOOTH) | (metal > METAL)
+        normal = faces.normal[face] * facing[:, None]
+        return _Seen(pixels, face, distance[hit], ahead, normal, gloss[:, 0], worth & ~sharp, worth & sharp, hit)
+
+    def _mirrored(self, camera: Camera, seen: _Seen, half: np.ndarray, *, sharp: bool) -> tuple[np.ndarray, np.ndarray]:
+        """What shares of their own light surfaces lose, and what they send for it, each (n, 3) exposed.
+
+        Args:
+          half: (n, 3) half vectors: the normals that the rays are mirrored at.
+        """
+        faces = self._faces
+        c = np.maximum(-np.einsum("ij,ij->i", seen.ahead, half), 0)[:, None]
+        onward = seen.ahead + 2 * c * half
+        above = np.einsum("ij,ij->i", onward, seen.normal)[:, None] > 0
+        start = np.asarray(camera.position, np.float32) + seen.ahead * seen.distance[:, None] + seen.normal * LIFT
+        face, _, u, v = _first(self._scene, start, onward)
+        light = self._light_at(face, u, v, sharp=sharp) / faces.gain[face]
+        light = np.minimum(light, BRIGHTEST / self._middle) * faces.gain[seen.face]
+        gloss = faces.gloss[seen.face]
+        rough, specular, metal = gloss[:, :1], gloss[:, 1:2], gloss[:, 2:]
+        f0 = 0.08 * specular * (1 - metal) + faces.tint[seen.face] * metal
+        f = schlick(f0, c, rough) * above
+        return (1 - (1 - metal) * (1 - f)) * above, light * f
+
+    def _light_at(self, face: np.ndarray, u: np.ndarray, v: np.ndarray, *, sharp: bool) -> np.ndarray:
+        """(n, 3) exposed light of the places where rays ended."""
+        faces, hit = self._faces, face >= 0
+        face = np.where(hit, face, 0)
+        corners = faces.uv[face]
+        at = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
+        page = faces.page[face]
+        x = np.clip(at[:, 0] * self._width[page], 0, self._width[page] - 1).astype(np.int64)
+        y = np.clip(at[:, 1] * self._height[page], 0, self._height[page] - 1).astype(np.int64)
+        light = self._light[self._base[page] + y * self._width[page] + x]
+        if sharp:
+            light = np.where((light > 4.0).any(1)[:, None], light, self._fine(page, at))
+        light[~hit] = 0
+        return light
+
+    def _fine(self, page: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """(n, 3) exposed light at places (n, 2) of whole pages, between texels."""
+        out, order = np.empty((len(page), 3), np.float32), np.argsort(page, kind="stable")
+        ends = np.flatnonzero(np.diff(page[order], append=-1)) + 1
+        for i in np.split(order, ends[:-1]):
+            picture = self._pages[page[i[0]]]
+            h, w = picture.shape[:2]
+            x, y = (np.clip(at[i, k] * n - 0.5, 0, n - 1) for k, n in ((0, w), (1, h)))
+            x0, y0 = x.astype(np.int32), y.astype(np.int32)
+            x1, y1, fx, fy = np.minimum(x0 + 1, w - 1), np.minimum(y0 + 1, h - 1), (x - x0)[:, None], (y - y0)[:, None]
+            upper = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
+            lower = picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx
+            out[i] = light_of(upper * (1 - fy) + lower * fy)
+        return out
+
+    def _rough(self, seen: _Seen, camera: Camera, grid: _Grid) -> None:
+        """Fill `grid` with what rough surfaces lose and mirror, averaged over neighbours on the same surface."""
+        row, column = np.divmod(seen.pixel, grid.shape[1])
+        chosen, k = seen.of(seen.dull), ((row % TILE) * TILE + column % TILE)[seen.dull]
+        half = _half_vectors(chosen.normal, chosen.rough, k)
+        lost, mirrored = self._mirrored(camera, chosen, half, sharp=False)
+        grid.values.reshape(-1, 6)[chosen.pixel] = np.concatenate([lost, mirrored], axis=1)
+        grid.weight.ravel()[chosen.pixel] = 1
+        grid.smooth()
+
+    def _enlarged(self, camera: Camera, grid: _Grid, size: tuple[int, int]) -> np.ndarray:
+        """(h, w, 6) what is lost and mirrored, in full size: between surfaces every pixel asks whose it is."""
+        h, w = size
+        values = cv2.resize(grid.values, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_LINEAR)[:h, :w]
+        unsure = cv2.resize(grid.edges(), (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_NEAREST)
+        pixels = np.flatnonzero(unsure[:h, :w])
+        if not len(pixels):
+            return values
+        values = np.ascontiguousarray(values)
+        flat = values.reshape(-1, 6)
+        flat[pixels] = 0
+        seen = self._seen(camera, _directions(camera, size, pixels), pixels)
+        seen = seen.of(seen.dull)
+        flat[seen.pixel] = grid.nearest(*np.divmod(seen.pixel, w), self._faces.owner[seen.face], seen.normal)
+        return values
+
+    def _lay_smooth(self, out: np.ndarray, rgb: np.ndarray, camera: Camera, where: np.ndarray) -> None:
+        """Write what mirrors and polished things show into `out`, looking once for every pixel in `where` (h, w)."""
+        pixels = np.flatnonzero(where)
+        all_pixels = np.tile(pixels, len(ROOKS))
+        aside = np.repeat(np.array(ROOKS, np.float32), len(pixels), axis=0)
+        seen = self._seen(camera, _directions(camera, rgb.shape[:2], all_pixels, aside=aside), all_pixels)
+        turn = np.repeat(np.arange(len(ROOKS)), len(pixels))
+        row, column = np.divmod(all_pixels, rgb.shape[1])
+        k = (row % TILE * 2 + column % 2) * len(ROOKS) + turn
+        k = k[seen.which[seen.sharp]]
+        seen = seen.of(seen.sharp)
+        if not len(seen.pixel):
+            return
+        half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, k))
+        lost, mirrored = self._mirrored(camera, seen, half, sharp=True)
+        where, which = np.unique(seen.pixel, return_inverse=True)
+        sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(3)], axis=1) / len(ROOKS)
+        own = light_of(out.reshape(-1, 3)[where])
+        out.reshape(-1, 3)[where] = shown_of(own * (1 - sums(lost)) + sums(np.minimum(mirrored, WHITE)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What n rays met first."""
+
+    pixel: np.ndarray
+    """(n,) flat positions in the picture."""
+    face: np.ndarray
+    distance: np.ndarray
+    ahead: np.ndarray
+    """(n, 3) the rays."""
+    normal: np.ndarray
+    """(n, 3) towards the camera."""
+    rough: np.ndarray
+    dull: np.ndarray
+    sharp: np.ndarray
+    """(n,) bool: whether it mirrors enough to look, and is looked at in half the size or in full."""
+    which: np.ndarray
+    """(n,) of the rays that were sent."""
+
+    def of(self, which: np.ndarray) -> _Seen:
+        """Some of them."""
+        names = ("pixel", "face", "distance", "ahead", "normal", "rough", "dull", "sharp", "which")
+        return _Seen(*(getattr(self, name)[which] for name in names))
+
+
+class _Grid:
+    """A picture of half the size: whose surface each pixel shows, and what it loses and mirrors."""
+
+    def __init__(self, shape: tuple[int, int], seen: _Seen, owner: np.ndarray) -> None:
+        """`owner`: (n,) of what was seen."""
+        self.shape = shape
+        self.owner = np.full(shape, -1, np.int32)
+        self.owner.ravel()[seen.pixel] = np.where(seen.dull, owner, -2 - owner)
+        self.normal = np.zeros((*shape, 3), np.float32)
+        self.normal.reshape(-1, 3)[seen.pixel] = seen.normal
+        self.values = np.zeros((*shape, 6), np.float32)
+        self.weight = np.zeros((*shape, 1), np.float32)
+
+    def smooth(self) -> None:
+        """Average over TILE pixels along rows and then columns, on the same surface."""
+        for axis, step in ((1, 1), (0, 1), (1, 3), (0, 3)):
+            total, weight = self.values.copy(), self.weight.copy()
+            for k in range(1, TILE // 2 + 1):
+                share = np.float32(0.5 if k == TILE // 2 else 1.0)
+                near, far = _apart(axis, k * step)
+                same = (self._alike(near, far) * share)[..., None]
+                total[near] += self.values[far] * same
+                total[far] += self.values[near] * same
+                weight[near] += self.weight[far] * same
+                weight[far] += self.weight[near] * same
+            self.values, self.weight = total, weight
+        self.values /= np.maximum(self.weight, 1e-6)
+
+    def edges(self) -> np.ndarray:
+        """(h, w) uint8: pixels beside another surface of which one mirrors."""
+        edge = np.zeros(self.shape, np.uint8)
+        for axis in (0, 1):
+            near, far = _apart(axis, 1)
+            other = ~self._alike(near, far) & ((self.owner[near] >= 0) | (self.owner[far] >= 0))
+            edge[near] |= other
+            edge[far] |= other
+        return edge
+
+    def nearest(self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """(n, 6) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
+        total, found = self._around(row, column, owner, normal, (0, 1))
+        if len(left := np.flatnonzero(~found)):
+            total[left] = self._around(row[left], column[left], owner[left], normal[left], (-1, 0, 1, 2))[0]
+        return total
+
+    def _around(
+        self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray, steps: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`nearest` among so many neighbours each way, and for which pixels there was one; zeros for the others."""
+        h, w = self.shape
+        y0, x0 = (row - 1) >> 1, (column - 1) >> 1
+        y, x = (row - 0.5) / 2 - y0, (column - 0.5) / 2 - x0
+        owners, normals, values = self.owner.ravel(), self.normal.reshape(-1, 3), self.values.reshape(-1, 6)
+        total, weight = np.zeros((len(row), 6), np.float32), np.zeros(len(row), np.float32)
+        for dy in steps:
+            for dx in steps:
+                at = np.clip(y0 + dy, 0, h - 1) * w + np.clip(x0 + dx, 0, w - 1)
+                near = np.exp(-2 * ((y - dy) ** 2 + (x - dx) ** 2)).astype(np.float32)
+                near *= (owners[at] == owner) & (np.einsum("ij,ij->i", normals[at], normal) > CREASE)
+                total += values[at] * near[:, None]
+                weight += near
+        return total / np.maximum(weight, 1e-6)[:, None], weight > 0
+
+    def _alike(self, near: tuple[slice, slice], far: tuple[slice, slice]) -> np.ndarray:
+        """Whether pixels and their neighbours show the same surface."""
+        same = self.owner[near] == self.owner[far]
+        return same & (np.einsum("ijk,ijk->ij", self.normal[near], self.normal[far]) > CREASE)
+
+
+def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Index of all pixels but the last k along `axis`, and of all but the first k."""
+    near, far = slice(None, -k), slice(k, None)
+    return ((near, slice(None)), (far, slice(None))) if axis == 0 else ((slice(None), near), (slice(None), far))
+
+
+def schlick(f0: np.ndarray, cos: np.ndarray, rough: np.ndarray) -> np.ndarray:
+    """Share of the light that is mirrored: Schlick 1994, less at grazing angles on rough surfaces, as in the tracer."""
+    grazing = np.square(np.square(1 - cos)) * (1 - cos)
+    return f0 + (1 - f0) * grazing * (1 - 0.9 * np.square(rough))
+
+
+def light_of(rgb: np.ndarray) -> np.ndarray:
+    """Exposed light of shown values from 0 to 255, float32, between whole values too: the bake's film curve undone,
+    channel by channel, which is exact for greys and near enough for colours."""
+    if rgb.dtype == np.uint8:
+        return _light_of_values()[rgb]
+    return np.interp(rgb, np.arange(256), _light_of_values()).astype(np.float32)
+
+
+def shown_of(light: np.ndarray) -> np.ndarray:
+    """Exposed light as uint8: the inverse of `light_of`."""
+    codes = (light / (1 + light) * (CODES - 1) + 0.5).astype(np.int32)
+    return _values_of_light()[codes]
+
+
+CODES = 16384
+
+
+@functools.cache
+def _values_of_light() -> np.ndarray:
+    """(CODES,) uint8 of light x at x / (1 + x), evenly."""
+    t = np.arange(CODES) / CODES
+    return (np.clip(film(t / (1 - t)), 0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+@functools.cache
+def _light_of_values() -> np.ndarray:
+    """(256,) float32."""
+    t = np.arange(CODES) / CODES
+    x = t / (1 - t)
+    return np.interp(np.arange(256) / 255, film(x)[x <= 5], x[x <= 5]).astype(np.float32)
+
+
+def film(x: np.ndarray) -> np.ndarray:
+    """Exposed light of a grey as sRGB in [0, 1]: the curve of embodied.light.tone, which this module may not import;
+    a test compares them."""
+    y = np.minimum(x * (1 + x / 25.0) / (1 + x), 1.0)
+    lifted = np.where(y <= 0.0031308, 12.92 * y, 1.055 * y ** (1 / 2.4) - 0.055) * 1.12
+    return lifted - np.square(np.maximum(lifted - 0.78, 0)) * (0.12 / 0.34**2)
+
+
+def _half_vectors(normal: np.ndarray, rough: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """(n, 3) float32 directions in the lobes around `normal`, the k-th of TILE * TILE that repeat.
+
+    Source: Walter et al. 2007 eq. 35 and 36 (GGX), the far tail left out as in the tracer; basis of Duff et al. 2017.
+    """
+    u0, u1 = _lobe()[k].T
+    a2 = np.square(np.maximum(np.square(rough), 1e-3))
+    cos = np.sqrt((1 - u0) / (1 + (a2 - 1) * u0))
+    sin, phi = np.sqrt(np.maximum(1 - cos * cos, 0)), 2 * math.pi * u1
+    x, y, z = normal.T
+    sign = np.where(z < 0, np.float32(-1), np.float32(1))
+    a = -1 / (sign + z)
+    b = x * y * a
+    one = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    two = np.stack([b, sign + y * y * a, -y], axis=1)
+    half = one * (sin * np.cos(phi))[:, None] + two * (sin * np.sin(phi))[:, None] + normal * cos[:, None]
+    return half.astype(np.float32)
+
+
+@functools.cache
+def _lobe() -> np.ndarray:
+    """(TILE * TILE, 2) float32 evenly spread numbers in [0, 1): neighbours in the picture are far apart in the lobe."""
+    n = TILE * TILE
+    points = np.array([r2(k + 1) for k in range(n)]) % 1.0
+    first = (np.argsort(np.argsort(points[:, 0])) + 0.5) / n * 0.98
+    return np.stack([first, points[:, 1]], axis=1).astype(np.float32)
+
+
+def _directions(
+    camera: Camera,
+    size: tuple[int, int],
+    pixels: np.ndarray | None = None,
+    step: int = 1,
+    aside: np.ndarray | None = None,
+) -> np.ndarray:
+    """(n, 3) float32 unit rays through pixels (flat positions; all without) of a picture of `size`.
+
+    Args:
+      step: every so many pixels only; then `pixels` is None.
+      aside: (n, 2) pixels to the right and down from the centres.
+    """
+    h, w = size
+    forward, up = np.asarray(camera.forward, np.float32), np.asarray(camera.up, np.float32)
+    right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
+    x = ((np.arange(0, w, step) + step / 2) / w * 2 - 1) * tall * w / h
+    y = (1 - (np.arange(0, h, step) + step / 2) / h * 2) * tall
+    if pixels is None:
+        rays = forward + x[None, :, None] * right + y[:, None, None] * up
+        rays = rays.reshape(-1, 3)
+    else:
+        row, column = np.divmod(pixels, w)
+        across, along = x[column], y[row]
+        if aside is not None:
+            across, along = across + aside[:, 0] * (2 * tall / h), along - aside[:, 1] * (2 * tall / h)
+        rays = forward + across[:, None] * right + along[:, None] * up
+    return (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
+
+
+def _first(
+    scene: object, start: np.ndarray, onward: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Face (-1 for none), distance and barycentrics of what rays meet first; (n,) each."""
+    found = scene.run(  # type: ignore[attr-defined]
+        np.ascontiguousarray(start, np.float32), np.ascontiguousarray(onward, np.float32), output=1
+    )
+    return found["primID"], found["tfar"], found["u"], found["v"]
+
+
+def _scene_of(corners: np.ndarray) -> object:
+    """An Embree scene of triangles (m, 3, 3)."""
+    scene_module, mesh_module = _embree()
+    scene = scene_module.EmbreeScene()
+    mesh_module.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
+    return scene
+
+
+def _embree() -> tuple[ModuleType, ModuleType]:
+    try:
+        from embreex import mesh_construction, rtcore_scene
+    except ImportError as e:
+        raise UnableError(
+            "gloss needs Intel's Embree, which is not installed here: pip install 'embreex>=4.4', or draw without "
+            f"gloss ({e})"
+        ) from e
+    return rtcore_scene, mesh_construction
+
+
+def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
+    """The faces of what is not seen through, and of the sky."""
+    solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= 0.9 and len(m.faces)]
+    each = lambda value: np.concatenate([np.full(len(m.faces), value(i, m)) for i, m in solid])
+    corners = np.concatenate([m.vertices[m.faces] for _, m in solid]).astype(np.float32)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    outer = each(lambda i, m: m.kind == "outdoor")
+    gain = np.concatenate([np.tile(shine.gains[i], (len(m.faces), 1)) for i, m in solid]).astype(np.float32)
+    gain[outer] /= GLASS
+    gloss = np.concatenate([_or_zeros(shine.gloss[i], m) for i, m in solid]).astype(np.float32) / 255
+    gloss[outer] = 0
+    return _Faces(
+        corners,
+        (normal / np.maximum(length, 1e-12)).astype(np.float32),
+        np.concatenate([m.uv[m.faces] for _, m in solid]).astype(np.float32),
+        each(lambda i, m: m.page).astype(np.int32),
+        each(lambda i, m: i).astype(np.int32),
+        gloss,
+        np.concatenate([_or_zeros(shine.tint[i], m) for i, m in solid]).astype(np.float32),
+        gain,
+    )
+
+
+def _or_zeros(values: np.ndarray | None, mesh: LitMesh) -> np.ndarray:
+    return np.zeros((len(mesh.faces), 3), np.float32) if values is None else values
+
+
+def _coarse(page: np.ndarray, glow: np.ndarray | None, gain: np.ndarray | None) -> np.ndarray:
+    """(h, w, 3) float32 exposed light of a page, COARSER times smaller, with the full light of what glows."""
+    h, w = (max(n // COARSER, 1) for n in page.shape[:2])
+    light = cv2.resize(light_of(page), (w, h), interpolation=cv2.INTER_AREA)
+    if glow is None or gain is None:
+        return light
+    shines = cv2.resize(glow.astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR) * gain
+    return np.maximum(light, shines.astype(np.float32))

@@ -1,0 +1,141 @@
+"""Reflections: what mirrors show is what stands there, rough things show it blurred, matte ones stay as they are."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from assets.records import Finish
+from embodied.render.camera import Camera
+from embodied.render.gloss import Gloss, Shine, film, light_of, schlick, shown_of
+from embodied.render.pictures import PictureSettings
+from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.world import open_world
+
+LOOKING_DOWN = Camera((0.0, 0.0, 1.5), (math.sqrt(0.5), 0.0, -math.sqrt(0.5)), (math.sqrt(0.5), 0.0, math.sqrt(0.5)))
+GREY, RED = (120, 120, 120), (200, 30, 30)
+
+
+def test_the_film_curve_is_the_bakes_own_and_is_undone():
+    tone = pytest.importorskip("embodied.light.tone")
+    x = np.geomspace(1e-3, 5, 200)[:, None].repeat(3, 1)
+    assert np.allclose(film(x), tone.develop(x, np.ones(3)), atol=2e-3)
+    values = np.arange(256, dtype=np.uint8)[:, None].repeat(3, 1)
+    assert np.abs(shown_of(light_of(values)).astype(int) - values).max() <= 1
+    assert light_of(values)[255, 0] == pytest.approx(5.0, rel=0.02)
+
+
+def test_schlick_is_f0_ahead_and_one_along_a_smooth_surface():
+    assert schlick(0.04, np.float32(1.0), np.float32(0.0)) == pytest.approx(0.04)
+    assert schlick(0.04, np.float32(0.0), np.float32(0.0)) == pytest.approx(1.0)
+    assert schlick(0.04, np.float32(0.0), np.float32(1.0)) < 0.15
+
+
+def quad(name: str, corners, page: int) -> LitMesh:
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    return LitMesh(name, "floor", "room", page, np.array(corners, np.float32), faces, uv)
+
+
+def house(rough: float, specular: float = 0.5, metal: float = 0.0, gains=(1.0, 1.0)) -> Gloss:
+    """A grey floor and, behind it, a wall whose lower half is grey and whose upper half is red."""
+    pytest.importorskip("embreex")
+    wall = np.zeros((64, 64, 3), np.uint8)
+    wall[:32], wall[32:] = RED, GREY
+    pages = (np.full((64, 64, 3), GREY, np.uint8), wall)
+    floor = quad("floor", [(-1, -4, 0), (4, -4, 0), (4, 4, 0), (-1, 4, 0)], 0)
+    back = quad("wall", [(4, 4, 4), (4, -4, 4), (4, -4, 0), (4, 4, 0)], 1)
+    shine = np.tile(np.round(255 * np.array([rough, specular, metal])).astype(np.uint8), (2, 1))
+    tint = np.full((2, 3), 0.9, np.float32) if metal else None
+    exposed = [np.full(3, g, np.float32) for g in gains]
+    return Gloss(LitPages((floor, back), pages, "x"), Shine([shine, None], [tint, None], [None, None], exposed, 1.0))
+
+
+def drawn(size: int = 96) -> np.ndarray:
+    return np.full((size, size, 3), GREY, np.uint8)
+
+
+def rows_that_mirror_red(rgb: np.ndarray) -> np.ndarray:
+    middle = rgb[:, rgb.shape[1] // 2].astype(int)
+    return np.flatnonzero(middle[:, 0] > middle[:, 1] + 60)
+
+
+def test_a_mirror_on_the_floor_shows_the_wall_where_geometry_says():
+    out = house(0.0, 1.0, 1.0).over(drawn(), LOOKING_DOWN)
+    red = rows_that_mirror_red(out)
+    # a ray down to (x, 0) rises again at the same slope and meets the wall at height 1.5 (4 - x) / x: red above 2
+    x = 4 * 1.5 / (1.5 + 2.0)
+    angle = math.atan2(1.5, x) - math.pi / 4
+    border = 48 + math.tan(angle) * 48
+    assert red.size and abs(red.min() - border) <= 1.5
+    floor_begins = 48 - math.tan(math.pi / 4 - math.atan2(1.5, 4)) * 48
+    between = out[math.ceil(floor_begins) + 3 : math.floor(border) - 3, 48]
+    assert np.abs(between.astype(int) - GREY).max() < 12, "the grey half of the wall, a little darker"
+
+
+def test_matte_floors_and_what_has_no_gloss_stay_to_the_byte():
+    rgb = drawn()
+    for flat in (house(0.9), house(0.3, specular=0.0)):
+        out = flat.over(rgb, LOOKING_DOWN)
+        assert np.array_equal(out, rgb) and out is not rgb
+    before = rgb.copy()
+    house(0.3).over(rgb, LOOKING_DOWN)
+    assert np.array_equal(rgb, before)
+
+
+def test_a_rough_floor_shows_a_faint_blurred_picture_of_a_brighter_room():
+    sharp, rough = (house(r, gains=(1.0, 0.1)).over(drawn(), LOOKING_DOWN).astype(int) for r in (0.05, 0.4))
+    edge = lambda a: np.abs(np.diff(a[:, 48, 0])).max()
+    assert edge(sharp) > 1.5 * edge(rough)
+    assert (rough[:, 48, 0] - 120).max() > 10, "but it is there"
+    steep, flat = rough[90, 48, 0] - 120, rough[40:60, 48, 0].max() - 120
+    assert flat > steep, "more along the floor than down at it"
+
+
+def test_rough_reflections_are_smooth_and_the_same_for_any_size_of_picture():
+    rough = house(0.4, gains=(1.0, 0.1))
+    out = rough.over(drawn(97), LOOKING_DOWN).astype(int)
+    inside = out[45:, 20:77, 0]
+    grain = np.abs(np.diff(inside, axis=1))
+    assert grain.max() <= 6, "no grain between neighbours in a row of the same floor"
+    half = rough.over(drawn(48), LOOKING_DOWN)
+    assert np.abs(out[60:90:2, 48, 0] - half[30:45, 24, 0].astype(int)).mean() < 5
+    assert np.array_equal(out, rough.over(drawn(97), LOOKING_DOWN)), "and the same every time"
+
+
+def test_gloss_goes_with_baked_pages_of_the_classic_renderer():
+    assert PictureSettings(64, "fast", look="gloss").look == "gloss"
+    for wrong in (("unlit", "classic"), ("glossy", "classic"), ("normal", "filament")):
+        with pytest.raises(ValueError, match="look 'gloss'"):
+            PictureSettings(64, *wrong, look="gloss")
+    with pytest.raises(ValueError, match="look 'shiny' is unknown"):
+        PictureSettings(64, "fast", look="shiny")
+    assert dataclasses.asdict(PictureSettings())["look"] == "matte"
+
+
+class Polished(HandCatalogue):
+    """Where floors, walls and ceilings shine."""
+
+    def finish(self, key: str) -> Finish:
+        return dataclasses.replace(super().finish(key), roughness=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_world_with_gloss_shows_the_same_things_at_the_same_places_in_another_light(tmp_path):
+    pytest.importorskip("embreex")
+    house = furnished(two_rooms())
+    matte, gloss = (
+        open_world(house, Polished(), tmp_path, size=48, quality="fast", look=look) for look in ("matte", "gloss")
+    )
+    with matte, gloss:
+        a, b = matte.panorama(0), gloss.panorama(0)
+        assert np.array_equal(a.depth, b.depth) and np.array_equal(a.ids, b.ids)
+        assert "look" not in matte.fingerprint and gloss.fingerprint["look"] == "gloss" and matte.path != gloss.path
+        changed = (a.rgb != b.rgb).any(-1)
+        assert 0 < changed.mean() < 1 and np.abs(a.rgb.astype(int) - b.rgb).mean() < 20
