@@ -25,8 +25,8 @@ from embodied.render.camera import Camera
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 MATTE = 0.7
-"""Roughness from which on nothing is looked for: the lobe is so wide that three views gained 0.0 to 0.3 dB by it and cost
-half as much again."""
+"""Roughness from which on nothing is looked for: the lobe is so wide that three views gained 0.0 to 0.3 dB by it and
+cost half as much again."""
 FAINT = 0.006
 """Share of the light that has to be mirrored for a ray to be worth it."""
 SMOOTH = 0.12
@@ -241,9 +241,12 @@ class Gloss:
         half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, k))
         lost, mirrored = self._mirrored(camera, seen, half, sharp=True)
         where, which = np.unique(seen.pixel, return_inverse=True)
-        sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(3)], axis=1) / len(ROOKS)
+        sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(a.shape[1])], axis=1) / len(ROOKS)
+        mirrored, rough = sums(np.minimum(mirrored, WHITE)), sums((seen.rough >= SMOOTH)[:, None])[:, 0] > 0.5
+        if rough.any():
+            mirrored[rough] = _evened(mirrored[rough], where[rough], rgb.shape[:2])
         own = light_of(out.reshape(-1, 3)[where])
-        out.reshape(-1, 3)[where] = shown_of(own * (1 - sums(lost)) + sums(np.minimum(mirrored, WHITE)))
+        out.reshape(-1, 3)[where] = shown_of(own * (1 - sums(lost)) + mirrored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,6 +341,17 @@ class _Grid:
         """Whether pixels and their neighbours show the same surface."""
         same = self.owner[near] == self.owner[far]
         return same & (np.einsum("ijk,ijk->ij", self.normal[near], self.normal[far]) > CREASE)
+
+
+def _evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(n, 3) values of pixels, averaged over those of them around each that look along the other directions of the
+    lobe: TILE rows, two columns."""
+    sums = np.zeros((size[0] * size[1], 4), np.float32)
+    sums[pixels, :3], sums[pixels, 3] = values, 1
+    across, down = np.float32([0.5, 1, 0.5]), np.float32([0.5, 1, 1, 1, 0.5])
+    sums = cv2.sepFilter2D(sums.reshape(*size, 4), -1, across, down, borderType=cv2.BORDER_CONSTANT)
+    sums = sums.reshape(-1, 4)[pixels]
+    return sums[:, :3] / sums[:, 3:]
 
 
 def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
