@@ -36,6 +36,8 @@ LEARN = ("--data", "d", "--out", "o")
         (("judge", "--data", "d", "--threads", "-1"), "--threads: should be a whole number of at least 1"),
         (("judge", "--data", "d", "--batch", "-3"), "--batch: should be"),
         (("judge", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
+        (("judge", "--data", "d", "--rrd", "2"), "--rrd wants --out DIR beside it"),
+        (("eval", "hari", "--data", "d", "--states", "some"), "--states: invalid choice: 'some'"),
         (("eval", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
         (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
         (("features", "--data", "d", "--quality", "nope"), "--quality: invalid choice: 'nope'"),
