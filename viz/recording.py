@@ -237,7 +237,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     state.after(step)
     recording.log("plot/requests", rr.Scalars(state.requests))
     if state.left is not None:
-        recording.log("plot/budget/requests left", rr.Scalars(state.left))
+        recording.log("plot/budget/left", rr.Scalars(state.left))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
     recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
     log_aim(recording, world, state, views)

@@ -82,8 +82,6 @@ def run_vnla(args: argparse.Namespace) -> int:
     from agents.vnla.run import vnla_data
 
     file = SHIPPED_VNLA if args.agent == SHIPPED_AGENT else args.agent
-    if file == SHIPPED_VNLA and not file.exists():
-        raise ValueError("no VNLA agent ships yet; name yours with --agent (`embodied train vnla`)")
     use_threads(args.threads)
     agent, splits = load_agent(file), args.split or ("test_unseen",)
     agent = dataclasses.replace(agent, config=dataclasses.replace(agent.config, evaluation_batch=args.batch))

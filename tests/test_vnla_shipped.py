@@ -1,0 +1,66 @@
+"""The VNLA agent that ships: it loads, keeps to its budget, and what it is told moves it towards the goal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hand_vnla import tasks_of
+from hand_worlds import grid_world
+
+from agents.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
+from agents.vision.bank import FeatureBank
+from agents.vision.encoder import load_encoder
+from agents.vnla.agent import VnlaAgent, load_agent
+from embodied.envs.make import environment_maker
+from embodied.evaluation.rollout import play
+from embodied.interface import Episode
+
+
+@pytest.fixture(scope="module")
+def agent() -> VnlaAgent:
+    return load_agent(SHIPPED_VNLA)
+
+
+def test_it_is_small_and_says_what_it_was_trained_as(agent):
+    assert SHIPPED_VNLA.stat().st_size < 6e6
+    assert (agent.config.asker, agent.config.rules) == ("learned", "indirect") and agent.pictures
+    assert agent.encoder_digest == load_encoder(SHIPPED_ENCODER).digest
+    assert {"find", "forward", "steps", "left"} <= set(agent.vocabulary.words)
+
+
+def played(agent: VnlaAgent, asker: str | None = None) -> list[Episode]:
+    """Sixteen tasks of a house by hand, whose pictures tell nothing: all it knows it was told."""
+    world = grid_world()
+    blank = FeatureBank({"grid": np.zeros((len(world.graph.ids), 36, agent.feature_size))}, agent.encoder_digest)
+    make = environment_maker("vnla", {"grid": world})
+    with torch.inference_mode():
+        return play(make, agent.player(blank, asker), tasks_of(world, 16), seed=0, batch=8)
+
+
+@pytest.mark.slow
+def test_it_plays_asks_within_its_budget_and_ends(agent):
+    episodes = played(agent)
+    assert all(e.requests <= e.budget and e.ended in ("stop", "limit") for e in episodes)
+    assert any(e.requests for e in episodes)
+
+
+@pytest.mark.slow
+def test_it_does_what_it_is_told(agent):
+    """Of the moves that follow a request, as many as were spoken of, most are those that were said."""
+    said = done = 0
+    for e in played(agent, "first"):
+        words: list[str] = []
+        for step in e.steps:
+            if step.reply is not None:
+                words = list(step.reply.subtask.words)
+            elif words:
+                word, *words = words
+                said, done = said + 1, done + (word == _word(step))
+    assert said > 30 and done / said > 0.6
+
+
+def _word(step) -> str:
+    from embodied.action_spaces import WORDS
+
+    return WORDS[step.action.candidate] if hasattr(step.action, "candidate") else "stop"
