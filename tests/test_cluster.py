@@ -1,10 +1,10 @@
-"""Units of work on Ray: what is asked of it, with a stand-in and, where Ray is installed, with two nodes of which one is
-killed; without Ray the error names the remedy.
+"""Units of work on Ray: what is asked of it, with a stand-in and, where Ray is installed, with two nodes of which one
+is killed; without Ray the error names the remedy.
 
-With houses that are generated it was run by hand with Ray 2.60 on a local cluster of two nodes (ray.cluster_utils.Cluster,
-one processor each), `embodied dataset hanna --scale tiny --area 60 90 --seed 4 --ray ADDRESS`. When one
-house of four was whole and both nodes held a draft, the second node's raylet and worker were killed with
-SIGKILL. Ray reported "Task build_unit failed because the node it was running on is dead ... will be
+With houses that are generated it was run by hand with Ray 2.60 on a local cluster of two nodes
+(ray.cluster_utils.Cluster, one processor each), `embodied dataset hanna --scale tiny --area 60 90 --seed 4
+--ray ADDRESS`. When one house of four was whole and both nodes held a draft, the second node's raylet and worker were
+killed with SIGKILL. Ray reported "Task build_unit failed because the node it was running on is dead ... will be
 retried", the first node built the rest, the command ended with 0, no draft was left, and `diff -r`
 found no difference from a build with one process (digest 4b6783e58d002317).
 """
