@@ -3,9 +3,10 @@
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
 with help, seen with pixels, drive a body on wheels with live pictures; light compares the ways of
 drawing with a path tracer, growth lights houses of 40 to 400 m² and fits how the cost grows (fast, or
---quality normal), codecs compares ways of storing what was drawn (choose --quality fast). Close other
-programs first: the numbers are only as good as the quiet. freeze measures nothing: it makes houses, a
-lit flat, data sets, episodes, tables and features in OUT/freeze and writes their digests; with
+--quality normal), codecs compares ways of storing what was drawn (choose --quality fast), look asks a
+network that has seen photographs only what the objects of three flats are (--quality, --look; optional
+packages). Close other programs first: the numbers are only as good as the quiet. freeze measures
+nothing: it makes houses, a lit flat, data sets, episodes, tables and features in OUT/freeze and writes their digests; with
 --against it says of every part whether it is the same as in a file of them (docs/freeze.json), or
 differs and why that is meant.
 """
@@ -20,12 +21,25 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import any_path, folder_to_write, whole
-from embodied.render.pictures import DRAWN
+from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-PARTS = ("houses", "pictures", "steps", "plays", "seen", "drive", "memory", "light", "growth", "codecs", "freeze")
+PARTS = (
+    "houses",
+    "pictures",
+    "steps",
+    "plays",
+    "seen",
+    "drive",
+    "memory",
+    "light",
+    "growth",
+    "codecs",
+    "look",
+    "freeze",
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
     parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
+    parser.add_argument("--look", choices=LOOKS, default="matte", help="with what look shows crops (default: matte)")
     parser.add_argument(
         "--houses", type=whole(), default=1000, help="houses that memory loads and drops (default: %(default)s)"
     )
@@ -61,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
         return codecs(args, catalogue)
     if "growth" in parts:
         return growth(args, catalogue)
+    if "look" in parts:
+        return look(args, catalogue)
     if "freeze" in parts:
         return freeze(args, catalogue)
     lines = {
@@ -87,6 +104,18 @@ def light(args: argparse.Namespace, catalogue: Catalogue) -> int:
     from embodied.bench.light import compare
 
     report = compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+    show(args, report.facts, report.text)
+    return 0
+
+
+def look(args: argparse.Namespace, catalogue: Catalogue) -> int:
+    """How much of what is drawn a network knows that has seen photographs only."""
+    from agents.vision.stranger import Stranger
+    from embodied.bench.look import recognised
+
+    pictures = PictureSettings(256, args.quality, look=args.look)
+    judge = Stranger().first_five
+    report = recognised(catalogue, args.cache, args.out, judge, seed=args.seed, pictures=pictures, progress=note)
     show(args, report.facts, report.text)
     return 0
 

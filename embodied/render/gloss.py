@@ -348,7 +348,7 @@ def _evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np
     lobe: TILE rows, two columns."""
     sums = np.zeros((size[0] * size[1], 4), np.float32)
     sums[pixels, :3], sums[pixels, 3] = values, 1
-    across, down = np.float32([0.5, 1, 0.5]), np.float32([0.5, 1, 1, 1, 0.5])
+    across, down = np.array([0.5, 1, 0.5]), np.array([0.5, 1, 1, 1, 0.5])
     sums = cv2.sepFilter2D(sums.reshape(*size, 4), -1, across, down, borderType=cv2.BORDER_CONSTANT)
     sums = sums.reshape(-1, 4)[pixels]
     return sums[:, :3] / sums[:, 3:]

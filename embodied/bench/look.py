@@ -1,0 +1,264 @@
+"""Would a stranger recognise it? Crops of our objects before a judge that has seen photographs only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from assets.cache import write_bytes, write_json
+from embodied.generate import HouseConfig, generate_house
+from embodied.render.pictures import PictureSettings
+from embodied.world import World, open_world
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.house.house import House, Placement
+
+HOUSES = 3
+"""How many are looked at."""
+AREA = (35.0, 70.0)
+"""Square metres of each, as in `bench light`."""
+LEAST, SIDE = 96, 224
+"""Pixels of the longer side of an object before it is shown, and of what is shown."""
+DRAWN = 448
+"""Pixels of the views that crops are cut from."""
+MARGIN = 1.25
+"""Side of a crop over the longer side of its object."""
+WORST = 30
+
+_CHAIR = (423, 559, 765, 857)
+_LAMP = (619, 818, 846)
+_SOFA = (831,)
+_DRAWERS = (493, 526, 553)
+_PLANT = (738, 883)
+MAPPED: dict[str, tuple[int, ...]] = {
+    "alarm clock": (409, 530, 892),
+    "armchair": (*_CHAIR, 831),
+    "backpack": (414,),
+    "bathroom vanity": (896, 648),
+    "bathtub": (435, 876),
+    "bed": (564, 750, 831),
+    "bedside table": _DRAWERS,
+    "beer bottle": (440, 907),
+    "bookcase": (453,),
+    "bowl": (659, 809),
+    "ceiling lamp": _LAMP,
+    "coffee cup": (504, 967, 968),
+    "coffee maker": (505, 550),
+    "coffee table": (532,),
+    "computer": (508, 527, 664),
+    "cooker": (827,),
+    "cooking pot": (521, 567),
+    "cooktop": (827,),
+    "corner sofa": _SOFA,
+    "crib": (520,),
+    "cup": (504, 968),
+    "desk": (526,),
+    "desk lamp": _LAMP,
+    "dining chair": _CHAIR,
+    "dining table": (532,),
+    "dishwasher": (534,),
+    "doormat": (539,),
+    "drawer cabinet": _DRAWERS,
+    "dresser": _DRAWERS,
+    "espresso machine": (505, 550),
+    "ficus": _PLANT,
+    "floor lamp": _LAMP,
+    "floor vase": (883, 738),
+    "fridge": (760,),
+    "frying pan": (567,),
+    "glass-door cabinet": (453, 495),
+    "grand piano": (579,),
+    "hanging towel": (434,),
+    "kettle": (505, 725, 849),
+    "laptop": (620, 681),
+    "laundry basket": (588, 790),
+    "media cabinet": (548,),
+    "microwave": (651,),
+    "mixing bowl": (659, 809),
+    "mobile phone": (487, 590),
+    "mug": (504, 968),
+    "office chair": _CHAIR,
+    "office table": (526,),
+    "orchid": _PLANT,
+    "oven": (651, 827),
+    "pendant lamp": _LAMP,
+    "plate": (923,),
+    "potted plant": _PLANT,
+    "printer": (742,),
+    "radiator": (753,),
+    "remote control": (761,),
+    "salad bowl": (659, 809),
+    "shelving unit": (453,),
+    "side table": (493, 526, 532),
+    "sideboard": (493, 495, 526),
+    "small plant": _PLANT,
+    "soap dispenser": (631, 804),
+    "sofa": _SOFA,
+    "sofa bed": _SOFA,
+    "speaker": (632,),
+    "suitcase": (414, 636),
+    "table fan": (545,),
+    "table lamp": _LAMP,
+    "teapot": (849,),
+    "teddy bear": (850,),
+    "telephone": (487, 528, 707),
+    "television": (548, 664, 851),
+    "toaster": (859,),
+    "toilet": (861,),
+    "towel": (434,),
+    "trash can": (412, 463),
+    "umbrella": (879,),
+    "upright piano": (881,),
+    "vase": (883, 738),
+    "wall lamp": _LAMP,
+    "wall television": (548, 664, 851),
+    "wall washbasin": (896,),
+    "wardrobe": (894,),
+    "washbasin": (896,),
+    "washing machine": (897,),
+    "waste bin": (412, 463),
+    "watch": (409, 531),
+    "wicker basket": (588, 790),
+    "wine bottle": (907,),
+}
+"""Our classes, and ImageNet's (challenge of 2012, numbered from 0) that name the same thing or hold it. What
+ImageNet has no word for is not judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crop:
+    """One object as it is shown to the judge."""
+
+    house: str
+    owner: str
+    object_class: str
+    rgb: np.ndarray
+    """(SIDE, SIDE, 3) uint8."""
+
+
+@dataclass(frozen=True)
+class LookReport:
+    """What `embodied bench look` shows."""
+
+    facts: dict
+    text: str
+
+
+def recognised(
+    catalogue: Catalogue,
+    cache: Path,
+    out: Path,
+    judge: Callable[[np.ndarray], np.ndarray],
+    *,
+    seed: int,
+    pictures: PictureSettings,
+    progress: Callable[[str], None] = lambda text: None,
+) -> LookReport:
+    """Show every mapped object of HOUSES houses to a judge; write look.json and the worst crops to look_worst.jpg.
+
+    Args:
+      judge: from (n, SIDE, SIDE, 3) uint8 to (n, 5) classes of ImageNet, the likeliest first.
+      seed: of the first house.
+    """
+    crops: list[Crop] = []
+    for k in range(HOUSES):
+        house = generate_house(seed + k, HouseConfig(area=AREA), catalogue=catalogue)
+        with open_world(house, catalogue, cache, pictures) as world:
+            crops += crops_of(world)
+        progress(f"house {seed + k}: {len(house.placements)} objects, {len(crops)} crops so far")
+    five = judge(np.stack([c.rgb for c in crops])) if crops else np.zeros((0, 5), int)
+    right = np.array([bool(set(MAPPED[c.object_class]) & set(map(int, f))) for c, f in zip(crops, five, strict=True)])
+    by_class = {}
+    for name in sorted({c.object_class for c in crops}):
+        mine = _of(crops, name)
+        by_class[name] = (right[mine].tolist(), mine)
+    worst = sorted(by_class, key=lambda n: (np.mean(by_class[n][0]), -len(by_class[n][0])))[:WORST]
+    facts = {
+        "houses": [seed + k for k in range(HOUSES)],
+        "quality": pictures.quality,
+        "look": pictures.look,
+        "crops": len(crops),
+        "objects": float(right.mean()) if len(right) else None,
+        "classes": float(np.mean([np.mean(r) for r, _ in by_class.values()])) if by_class else None,
+        "by_class": {name: {"shown": len(r), "recognised": int(np.sum(r))} for name, (r, _) in by_class.items()},
+        "guesses": [{"object": c.owner, "class": c.object_class, "five": f.tolist()} for c, f in zip(crops, five)],
+        "worst": worst,
+    }
+    write_json(out / "look.json", facts, indent=1)
+    shown = [crops[by_class[name][1][0]] for name in worst]
+    if shown:
+        picture = sheet(shown)[..., ::-1]
+        write_bytes(out / "look_worst.jpg", cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes())
+    return LookReport(facts, table(facts))
+
+
+def crops_of(world: World) -> list[Crop]:
+    """Every mapped object of a house that is LEAST pixels large in the best view of it."""
+    wanted = [p for p in world.house.placements if p.object_class in MAPPED]
+    number = {owner: i + 1 for i, owner in enumerate(world.owners)}
+    nodes = [(at, np.bincount(world.renderer.seen(at)[1].ravel())) for at in world.graph.positions]
+    crops = []
+    for thing in wanted:
+        mine = number[thing.id]
+        size = [int(counts[mine]) if mine < len(counts) else 0 for _, counts in nodes]
+        best = int(np.argmax(size))
+        if size[best] and (rgb := _crop(world, thing, mine, nodes[best][0])) is not None:
+            crops.append(Crop(world.name, thing.id, thing.object_class, rgb))
+    return crops
+
+
+def _crop(world: World, thing: Placement, mine: int, eye: np.ndarray) -> np.ndarray | None:
+    """What stands in a square around an object, seen from `eye`; None if it is too small or hidden there."""
+    base = _elevation(world.house, thing)
+    middle = np.array([*thing.position[:2], base + thing.position[2] + thing.size[2] / 2]) - eye
+    apart = float(np.linalg.norm(middle))
+    yaw, pitch = math.atan2(middle[1], middle[0]), math.asin(middle[2] / max(apart, 1e-6))
+    radius = float(np.linalg.norm(thing.size)) / 2
+    vfov = float(np.clip(2.6 * math.atan2(radius, apart), math.radians(8), math.radians(80)))
+    view = world.renderer.view(eye, yaw, pitch, vfov, (DRAWN, DRAWN))
+    rows, columns = np.nonzero(view.ids == mine)
+    if len(rows) < LEAST * LEAST / 8 or max(np.ptp(rows), np.ptp(columns)) < LEAST:
+        return None
+    side = int(min(max(np.ptp(rows), np.ptp(columns)) * MARGIN, DRAWN))
+    top, left = (int(np.clip((a.min() + a.max() - side) / 2, 0, DRAWN - side)) for a in (rows, columns))
+    return cv2.resize(view.rgb[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+
+
+def _elevation(house: House, thing: Placement) -> float:
+    return house.storey_of(house.room_by_id[thing.room]).elevation
+
+
+def _of(crops: Sequence[Crop], name: str) -> list[int]:
+    return [i for i, c in enumerate(crops) if c.object_class == name]
+
+
+def table(facts: dict) -> str:
+    """The shares in words, and the worst classes."""
+    if facts["objects"] is None:
+        return "no object was large enough to be shown"
+    worst = (f"{n} {facts['by_class'][n]['recognised']}/{facts['by_class'][n]['shown']}" for n in facts["worst"])
+    return (
+        f"{facts['objects']:.0%} of {facts['crops']} objects and {facts['classes']:.0%} on average over "
+        f"{len(facts['by_class'])} classes are among the judge's first five ({facts['quality']}, {facts['look']}, "
+        f"houses {facts['houses']})\nworst: " + ", ".join(worst)
+    )
+
+
+def sheet(crops: Sequence[Crop], across: int = 6) -> np.ndarray:
+    """(h, w, 3) uint8: crops with their classes."""
+    cells = []
+    for crop in crops:
+        cell = crop.rgb.copy()
+        cell[:20] = 255
+        place = (4, 14)
+        cv2.putText(cell, crop.object_class, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+        cells.append(cell)
+    cells += [np.full_like(cells[0], 255)] * (-len(cells) % across)
+    return np.concatenate([np.concatenate(cells[k : k + across], axis=1) for k in range(0, len(cells), across)])
