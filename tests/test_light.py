@@ -146,7 +146,7 @@ def test_a_glint_that_reaches_no_site_adds_nothing():
 
 
 def test_a_sunlit_floor_has_as_many_small_lights_whatever_the_luxels_are():
-    """With four lights in place of forty, a wardrobe beside a sunlit floor was 18 of 255 levels too bright."""
+    """Counted by luxels they were too few for coarse ones: a wardrobe beside a sunlit floor came out too bright."""
     found = []
     for per_metre in (20, 40):
         n = per_metre * 3 // 2
