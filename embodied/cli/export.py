@@ -137,16 +137,22 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args)
-    for name in names_of(data):
-        place = data.place(name)
-        pictures = pictures_of(data, name, args.quality)
-        file = feature_path(data.folder / "features", encoder.digest, name, pictures)
-        features, _ = load_features(file, encoder=encoder.digest, source=place.house.digest, pictures=pictures)
+    drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
+    files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
+
+    def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
+        place, pictures = data.place(name), drawn[name]
+        features, _ = load_features(files[name], encoder=encoder.digest, source=place.house.digest, pictures=pictures)
         if features.shape[2] > args.pad:
-            raise ValueError(f"{file} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it")
+            raise ValueError(
+                f"{files[name]} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it"
+            )
         wide = np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - features.shape[2])))
-        for key, rows in zip(place.graph.ids, wide, strict=True):
-            yield name, key, rows
+        return place.graph.ids, wide
+
+    for name in [n for n, file in files.items() if not file.exists()][:1] or list(files)[:1]:
+        read(name)
+    return ((name, key, rows) for name in files for key, rows in zip(*read(name), strict=True))
 
 
 def run_parquet(args: argparse.Namespace) -> int:

@@ -95,7 +95,8 @@ def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRo
             f"build one with `embodied dataset {about.kind} --out DIR`"
         )
     folder = Path(folder)
-    files = [*_graphs(data, folder / about.data / "connectivity"), *about.write(data, folder)]
+    made = about.write(data, folder)
+    files = [*_graphs(data, folder / about.data / "connectivity"), *made]
     if features is not None:
         files.append(folder / about.data / FEATURES)
         write_features(files[-1], features)
@@ -373,16 +374,13 @@ def split_sentence(text: str) -> list[str]:
 
 def _matterport(data: Dataset, root: Path) -> list[Path]:
     """Skyboxes of the panoramas that the data set holds, and the rooms of viewpoints."""
-    from embodied.datasets.skyboxes import write_skyboxes  # late: decodes pictures
+    from embodied.datasets.skyboxes import drawn, write_skyboxes  # late: decodes pictures
 
     files = []
-    for name in names_of(data):
+    panoramas = {name: drawn(data.folder / "houses" / name / "panoramas.pano") for name in names_of(data)}
+    for name, file in panoramas.items():
         scan = root / "data/v1/scans" / scan_name(name)
-        files += write_skyboxes(
-            data.folder / "houses" / name / "panoramas.pano",
-            data.place(name).graph.ids,
-            scan / "matterport_skybox_images",
-        )
+        files += write_skyboxes(file, data.place(name).graph.ids, scan / "matterport_skybox_images")
         files.append(_text(scan / "house_segmentations/panorama_to_region.txt", panorama_to_region(data.place(name))))
     return files
 

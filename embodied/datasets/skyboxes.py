@@ -21,6 +21,20 @@ QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.I
 """About 47 dB for our pictures."""
 
 
+def drawn(panoramas: Path) -> Path:
+    """The panorama file of a house, which has to be there.
+
+    Raises:
+      ValueError: there are no panoramas.
+    """
+    if not Path(panoramas).exists():
+        raise ValueError(
+            f"{panoramas} does not exist; draw the panoramas first: run the command that built the data set "
+            "once more, with --panoramas fast"
+        )
+    return Path(panoramas)
+
+
 def write_skyboxes(panoramas: Path, ids: Sequence[str], folder: Path) -> list[Path]:
     """Write the skyboxes of a house; returns their files.
 
@@ -31,12 +45,7 @@ def write_skyboxes(panoramas: Path, ids: Sequence[str], folder: Path) -> list[Pa
     Raises:
       ValueError: there are no panoramas.
     """
-    if not Path(panoramas).exists():
-        raise ValueError(
-            f"{panoramas} does not exist; draw the panoramas first: run the command that built the data set "
-            "once more, with --panoramas normal"
-        )
-    with PanoramaFile(panoramas) as file:
+    with PanoramaFile(drawn(panoramas)) as file:
         return [path for node, key in enumerate(ids) for path in write_skybox(file.read(node), key, folder)]
 
 
