@@ -3,7 +3,7 @@
     embodied iliad --request "drop every vowel" --word banana
     embodied iliad --shared SHARED
     embodied iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
-    embodied iliad --world nav --data DATA --rrd walk.rrd
+    embodied iliad STUDY/students/grammar/seed_0/adel_0.5/best.safetensors --world nav --data DATA --rrd walk.rrd
 
 The student is the shipped one, or one of `embodied train iliad` or `embodied study iliad`, whose
 data and teacher are in the folder `shared` beside it. The shipped one's are made there if they are missing.
@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         type=any_path,
         nargs="?",
         metavar="FILE",
-        help="a trained student, best.safetensors (default: shipped)",
+        help="a trained student, best.safetensors (default: the one that ships, REGEX)",
     )
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="words, or houses (default: regex)")
     parser.add_argument("--shared", type=any_folder, metavar="DIR", help="folder with data and teacher of its study")
@@ -46,21 +46,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--request", metavar="TEXT", help="a request of your own; nobody describes what is done")
     parser.add_argument("--word", default="banana", help="the word it is about (default: %(default)s)")
     add_nav_data(parser, required=False)
-    parser.add_argument(
-        "--teacher",
-        choices=("learned", "grammar"),
-        help="NAV: who describes (default: who taught it; grammar for the shipped one)",
-    )
+    parser.add_argument("--teacher", choices=("learned", "grammar"), help="NAV: who describes (default: who taught it)")
     parser.add_argument("--rrd", type=file_to_write, metavar="FILE", help="NAV: record the first episode, for Rerun")
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.shipped import SHIPPED_NAV, SHIPPED_STUDENT
+    from agents.shipped import SHIPPED_STUDENT
 
-    args.student = args.student or (SHIPPED_NAV if args.world == "nav" else SHIPPED_STUDENT)
     if args.world == "nav":
         return walks(args)
+    args.student = args.student or SHIPPED_STUDENT
     for name in ("data", "teacher", "rrd"):
         if getattr(args, name) is not None:
             raise ValueError(f"--{name} belongs to --world nav; leave it out, or add --world nav")
@@ -109,15 +105,17 @@ def walks(args: argparse.Namespace) -> int:
     from agents.iliad.nav.run import NavSource, prepare
     from agents.iliad.nav.showing import lines_of, tell
     from agents.iliad.nav.stages import config_of, load_follower
-    from agents.shipped import SHIPPED_NAV
     from agents.vision.run import encoder_of
     from embodied.seeds import stream
 
-    if args.data is None:
-        raise ValueError("--world nav wants --data, a folder that `embodied dataset vln` built, with features")
+    if args.data is None or args.student is None:
+        raise ValueError(
+            "--world nav wants FILE, a student of `embodied train iliad nav`, and --data, a folder that `embodied "
+            "dataset vln` built, with features"
+        )
     source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
     config: NavConfig = config_of(args.student)
-    teacher = args.teacher or ("grammar" if args.student == SHIPPED_NAV else config.teacher)
+    teacher = args.teacher or config.teacher
     if teacher == "learned" and args.shared is None:
         raise ValueError("--shared should be the folder of the describer and its executor; or give --teacher grammar")
     shared = args.shared or args.data  # the grammar needs no folder
