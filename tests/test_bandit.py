@@ -145,6 +145,7 @@ def test_a_loss_that_is_no_number_changes_no_weight():
     assert weight.tolist() == [1.0, 1.0]
 
 
+@pytest.mark.slow
 def test_actor_critic_finds_the_better_of_two_arms_from_coarse_ratings():
     """A bandit with scores 0.3 and 0.8, rated 0 or 1: the shared learner must prefer the second."""
     logits, value = torch.nn.Parameter(torch.zeros(2)), torch.nn.Parameter(torch.zeros(1))

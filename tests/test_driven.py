@@ -55,6 +55,7 @@ def test_a_wall_in_the_way_is_bumped_into_and_not_passed(place, catalogue):
     assert any("wall" in owner for owner in drive.bumps)
 
 
+@pytest.mark.slow
 def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
     graph, name = place.graph, place.house.name
     far = int(np.argmax(graph.distance[0]))

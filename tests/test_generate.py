@@ -360,6 +360,7 @@ def test_every_kind_of_room_that_is_drawn_stands_in_the_table_of_kinds():
     assert set(KINDS) == set(ROOM_KINDS) - {"stairwell"}  # houses of several storeys are not drawn yet
 
 
+@pytest.mark.slow
 def test_a_wardrobe_in_the_doorway_is_cleared_away_with_what_lies_on_it():
     house = house_of(1)
     door = next(o for o in house.openings if o.kind == "door" and house.room_by_id[o.rooms[0]].kind in BEDROOMS)

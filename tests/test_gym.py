@@ -97,6 +97,7 @@ def test_vector_environments_agree_with_single_ones(vector, tmp):
     envs.close()
 
 
+@pytest.mark.slow
 def test_the_same_seed_plays_the_same_episode(tmp):
     rewards = []
     for _ in range(2):

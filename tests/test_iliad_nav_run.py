@@ -27,6 +27,8 @@ from embodied.cli import main
 from embodied.interface import Stop
 from embodied.seeds import stream
 
+pytestmark = pytest.mark.slow
+
 SMALL = NavConfig(hidden_size=16, heads=2, candidates=2, executor_iterations=2, describer_iterations=2, teacher_batch=4)
 QUICK = LearnerConfig(iterations=4, batch=4, validate_every=2, checkpoint_minutes=1e-9, threshold=0.3)
 silent = lambda line: None
@@ -113,7 +115,6 @@ def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
     assert NavWorld(eyes.places).success(trip, walk)
 
 
-@pytest.mark.slow
 def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
     setting = IliadStudySetting(tmp_path, NavSubject(SMALL, source), QUICK, seeds=2)
     text = run_study(setting, ["3.5"], note=silent)["3.5"].read_text()
@@ -123,7 +124,6 @@ def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
         run_study(setting, ["describer"], note=silent)
 
 
-@pytest.mark.slow
 def test_commands_train_and_show(source, tmp_path, capsys):
     sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics")]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--network", "random"]

@@ -435,6 +435,7 @@ def test_a_narrow_marginal_knows_half_of_the_shapes_and_a_wide_one_more_than_are
     assert 0.1 < sum(parse(r) is not None for r in found["wide"]) / 1500 < 0.5, "most are never asked for"
 
 
+@pytest.mark.slow
 def test_who_is_left_out_makes_no_request_and_describes_nothing():
     everybody = templates_by_manner(seed=0)
     for part, of in everybody.items():

@@ -14,6 +14,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monkeypatch):
     house = furnished(two_rooms())

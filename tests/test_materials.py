@@ -123,6 +123,7 @@ def test_another_process_makes_the_same_maps():
     assert other == [mine, fingerprint("linen/3")]
 
 
+@pytest.mark.slow
 def test_fingerprints_differ_and_unknown_keys_say_what_exists(tmp_path):
     prints = [fingerprint(k) for k in MATERIALS]
     assert len(set(prints)) == len(prints)

@@ -362,6 +362,7 @@ def test_a_catalogue_that_no_parser_takes_is_refused(tmp_path, text, match):
         load_catalogue(tmp_path / "cache", own=[tmp_path])
 
 
+@pytest.mark.slow
 def test_a_symbolic_link_to_itself_is_refused(tmp_path):
     own = write_own(tmp_path / "own", {"box": {"file": "a.obj", **MUG}})
     (own / "a.obj").symlink_to("a.obj")

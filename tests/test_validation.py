@@ -83,6 +83,7 @@ def test_a_slip_of_the_pen_gets_a_suggestion():
         check_known(painted(floor_finish=key.replace("_", "-", 1) + "x"), catalogue())
 
 
+@pytest.mark.slow
 def test_a_file_is_named_with_what_is_wrong_in_it(tmp_path):
     path = tmp_path / "house.json"
     flat().save(path)

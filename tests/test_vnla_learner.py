@@ -99,6 +99,7 @@ def test_no_gradient_leaves_the_asking_head():
     assert touched == {"asking"}
 
 
+@pytest.mark.slow
 def test_the_asking_head_knows_how_many_requests_are_left_and_counts_no_further_than_the_table():
     agent, *_ = lesson()
     network = agent.network.eval()
