@@ -77,7 +77,7 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
         cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
     assert cut == expected and len(expected) == 2
     (one,), (other,) = ((tmp_path / k).rglob("checkpoint.pt") for k in ("whole", "cut"))
-    a, b = (torch.load(p, weights_only=False)["modules"]["student"] for p in (one, other))
+    a, b = (torch.load(p, weights_only=True)["modules"]["student"] for p in (one, other))
     assert all(torch.equal(a[k], b[k]) for k in a)
     (best,) = (tmp_path / "whole").rglob("best.safetensors")
     student, loaded = load_follower(best, grounds.data.eyes)
