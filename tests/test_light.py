@@ -22,6 +22,7 @@ from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, check, compose, radiosity, scalar, settings_of, solve
 from embodied.light.atlas import atlas_of, things_of
 from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, variant_of
+from embodied.light.baking import brightest
 from embodied.light.colours import ColourMaps
 from embodied.light.cover import rasterise
 from embodied.light.denoise import cap_sparks, neighbours, smooth_sites
@@ -363,3 +364,15 @@ def test_windows_are_portals_that_look_into_their_room():
         [0, -1, 0]
     )
     assert portals["window_1"].area == pytest.approx(2.0 * 1.2)
+
+
+def test_exposure_does_not_hang_on_which_side_of_a_leap_a_percentile_falls() -> None:
+    """One luxel in a hundred more or fewer in the sun: the 97th percentile is 2 or 10, what is exposed for changes little."""
+    rng = np.random.default_rng(0)
+    room = lambda lit: (
+        np.where(np.arange(10_000) < 10_000 * lit, 10.0, rng.uniform(0.5, 2.0, 10_000))[:, None] * np.ones(3)
+    )
+    fewer, more = room(0.026), room(0.036)
+    assert np.percentile(more, 97) / np.percentile(fewer, 97) > 4
+    assert brightest(more).mean() / brightest(fewer).mean() < 1.4
+    assert np.allclose(brightest(np.full((100, 3), 0.7)), 0.7)

@@ -329,7 +329,7 @@ class _Clock:
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
     """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far
-    brighter than that."""
+    brighter than that (`brightest`)."""
     e = light.soft
     room_of_owner = np.array(
         [[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms]
@@ -338,9 +338,20 @@ def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -
     out = {}
     for i, r in enumerate(house.rooms):
         mine = (room == i) & lux.shell & light.good
-        full, brightest = np.percentile(e[mine], (85, 97), axis=0) if mine.any() else np.zeros((2, 3))
-        out[r.id] = full * np.clip(0.45 * brightest.mean() / max(full.mean(), 1e-9), 1.0, 1.35)
+        full = np.percentile(e[mine], 85, axis=0) if mine.any() else np.zeros(3)
+        most = brightest(e[mine]).mean() if mine.any() else 0.0
+        out[r.id] = full * np.clip(0.45 * most / max(full.mean(), 1e-9), 1.0, 1.35)
     return out
+
+
+def brightest(e: np.ndarray) -> np.ndarray:
+    """(3,) geometric mean of the 93rd to the 99th percentile of light (n, 3).
+
+    The light of a room with a sunlit sill or a lamp near a wall leaps somewhere in its brightest tenth, from 2 to 14
+    times its middle; one percentile falls before or after the leap by chance, and exposure followed it by a fifth.
+    """
+    tail = np.percentile(e, np.linspace(93, 99, 25), axis=0)
+    return np.exp(np.log(np.maximum(tail, 1e-9)).mean(axis=0))
 
 
 def _levels(s: Solved) -> list[float]:
