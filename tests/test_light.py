@@ -367,7 +367,7 @@ def test_windows_are_portals_that_look_into_their_room():
 
 
 def test_exposure_does_not_hang_on_which_side_of_a_leap_a_percentile_falls() -> None:
-    """One luxel in a hundred more or fewer in the sun: the 97th percentile is 2 or 10, what is exposed for changes little."""
+    """One luxel in a hundred more in the sun: the 97th percentile goes from 2 to 10, what is exposed for hardly."""
     rng = np.random.default_rng(0)
     room = lambda lit: (
         np.where(np.arange(10_000) < 10_000 * lit, 10.0, rng.uniform(0.5, 2.0, 10_000))[:, None] * np.ones(3)
