@@ -18,8 +18,9 @@ from agents.vision.features import encode_panoramas
 from agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
-from embodied.gym.env import HelpGymEnv, refuse_too_many
-from embodied.gym.eyes import FAR, AllEyes, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
+from embodied.gym.env import HelpGymEnv
+from embodied.gym.eyes import FAR, AllEyes, Closed, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
+from embodied.gym.in_step import InStep, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
 from embodied.navigation.graph import graph_of
@@ -102,19 +103,41 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
     assert env.step(number(Stop(), SpaceLayout()))[0]["features"].any(), "what is handed out is a copy"
 
 
-def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world):
+@pytest.mark.parametrize("threads", [1, 3])
+def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world, threads):
     store = PanoramaStore({world.name: world})
     eyes = PictureEyes(store, ("rgb",), ViewSettings(height=16, width=16))
-    envs = gym.vector.SyncVectorEnv([lambda: env_of(world, eyes)] * 12)
+    envs = InStep(lambda: env_of(world, Closed()), 12, eyes, threads=threads)
     o, _ = envs.reset(seed=5)
     for _ in range(6):
         o, *_ = envs.step(np.zeros(12, dtype=np.int64))
     assert len(store._kept) == 3
     assert len({bytes(row) for row in o["instruction"]}) > 1
     for i, env in enumerate(envs.envs):
-        assert (o["rgb"][i] == env._eyes.look(env._o)["rgb"]).all()
+        assert (o["rgb"][i] == eyes.look(env.observed)()["rgb"]).all()
         assert bytes(o["instruction"][i]).rstrip(b"\0").decode() == env._env.instruction
     envs.close()
+
+
+def test_a_batch_gives_what_gymnasium_would_batch(world):
+    eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16))
+    ours = InStep(lambda: env_of(world, Closed()), 5, eyes, threads=2)
+    theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, eyes)] * 5)
+    assert ours.observation_space == theirs.observation_space
+    assert ours.single_observation_space == theirs.single_observation_space
+    a, b = ours.reset(seed=3), theirs.reset(seed=3)
+    for k in range(40):
+        assert a[0].keys() == b[0].keys()
+        assert all(np.array_equal(a[0][name], b[0][name]) and a[0][name].dtype == b[0][name].dtype for name in b[0])
+        assert all(np.array_equal(x, y) for x, y in zip(a[1:4], b[1:4], strict=False) if isinstance(x, np.ndarray))
+        moves = np.where(a[0]["action_mask"][:, k % 3], k % 3, SpaceLayout().candidates)
+        earlier, kept = a[0]["rgb"], a[0]["rgb"].copy()
+        a, b = ours.step(moves), theirs.step(moves)
+        assert (earlier == kept).all(), "what was handed out stays"
+    assert ours.get_attr("render_mode") == (None,) * 5
+    with pytest.raises(ValueError, match="threads should be at least 1"):
+        InStep(lambda: env_of(world, Closed()), 2, eyes, threads=0)
+    ours.close(), theirs.close()
 
 
 def test_the_store_keeps_to_its_budget_and_gives_the_same_pictures(world):
@@ -149,7 +172,7 @@ def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monk
     space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
     monkeypatch.setattr("psutil.virtual_memory", lambda: type("Memory", (), {"available": 2**30})())
     refuse_too_many(8, space)
-    with pytest.raises(ValueError, match=r"1000 environments hold about 8\.8 GiB .* 1\.0 GiB are free"):
+    with pytest.raises(ValueError, match=r"1000 environments hold about 5\.9 GiB .* 1\.0 GiB are free"):
         refuse_too_many(1000, space)
 
 

@@ -70,10 +70,11 @@ def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | N
     return Measure(name, float(middle), unit, float(low), float(high), len(values), aim)
 
 
-def ratio(name: str, slow: Measure, fast: Measure) -> Measure:
+def ratio(name: str, slow: Measure, fast: Measure, *, aim: float | None = None) -> Measure:
     """How many times `fast` is faster than `slow`, both from one run."""
     value = slow.value / fast.value
-    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, min(slow.repeats, fast.repeats))
+    repeats = min(slow.repeats, fast.repeats)
+    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, repeats, aim)
 
 
 def machine() -> dict[str, object]:

@@ -17,8 +17,6 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import psutil
-from gymnasium.vector import SyncVectorEnv
 from PIL import Image, ImageDraw
 
 from assets.cache import default_cache
@@ -29,6 +27,7 @@ from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
     AllEyes,
+    Closed,
     Eyes,
     FeatureEyes,
     PanoramaStore,
@@ -37,6 +36,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
+from embodied.gym.in_step import InStep, refuse_too_many
 from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
@@ -140,6 +140,11 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
             return None
         return picture(self._env, self._o)
 
+    @property
+    def observed(self) -> Observation:
+        """What was handed out last, before it became numbers."""
+        return self._o
+
     def _encoded(self, o: Observation) -> dict[str, Any]:
         return encode(o, self._eyes, self._layout)
 
@@ -217,10 +222,11 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
 
 
-def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SyncVectorEnv:
+def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> InStep:
     """So many environments that share one stage: houses, pages and decoded panoramas are held once.
 
-    Each has its own task, target, instruction and generator; options as of `make`.
+    Each has its own task, target, instruction and generator; options as of `make`, and `threads` that look
+    (default: one per core).
 
     Raises:
       ValueError: fewer than one, or more than memory has room for.
@@ -228,33 +234,14 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
     if num_envs < 1:
         raise ValueError(f"num_envs should be at least 1, got {num_envs}")
     own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
+    threads = options.pop("threads", None)
     stage = set_stage(kind, **options)
 
     def one() -> HelpGymEnv:
-        return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
+        return HelpGymEnv(stage.make_env, stage.tasks, Closed(), layout=stage.layout, render_mode=render_mode, **own)
 
     refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
-    return in_step(one, num_envs)
-
-
-def in_step(make_one: Callable[[], HelpGymEnv], num_envs: int) -> SyncVectorEnv:
-    """Environments that take their steps together, in one process."""
-    return SyncVectorEnv([make_one] * num_envs)
-
-
-COPIES = 3
-"""Of an observation that a vector environment holds per slot: its own, the batch's, and what is handed out."""
-
-
-def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
-    """Raises ValueError where the observations of a batch do not fit into memory."""
-    each = sum(int(np.prod(s.shape)) * np.dtype(s.dtype).itemsize for s in space.values() if s.shape is not None)
-    wanted, free = COPIES * num_envs * each, psutil.virtual_memory().available
-    if wanted > 0.8 * free:
-        raise ValueError(
-            f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB "
-            "are free; use fewer, or smaller views"
-        )
+    return InStep(one, num_envs, stage.eyes, threads=threads)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import functools
 import importlib.metadata
 import math
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -39,6 +39,9 @@ ENCODERS = "embodied.encoders"
 """Group of entry points under which encoders of pictures are found; 'default' is the one that ships."""
 
 
+Arrays = dict[str, np.ndarray]
+
+
 class Eyes(Protocol):
     """Turns the sights of an observation into arrays."""
 
@@ -46,9 +49,20 @@ class Eyes(Protocol):
         """The space of each array."""
         ...
 
-    def look(self, o: Observation) -> dict[str, np.ndarray]:
-        """The arrays, one for each space."""
+    def look(self, o: Observation) -> Callable[[], Arrays]:
+        """What is seen, in two halves: now, in this thread, places are drawn or read where nobody has them; what is
+        returned makes the arrays, one for each space, and may be called in any thread."""
         ...
+
+
+class Closed:
+    """Eyes that see nothing."""
+
+    def spaces(self) -> dict[str, spaces.Space]:
+        return {}
+
+    def look(self, o: Observation) -> Callable[[], Arrays]:
+        return dict
 
 
 @dataclass(frozen=True)
@@ -180,19 +194,22 @@ class PictureEyes:
             found["target_rgb"] = spaces.Box(0, 255, (self.TARGET, 2 * self.TARGET, 3), np.uint8)
         return found
 
-    def look(self, o: Observation) -> dict[str, np.ndarray]:
-        panorama = self._store.at(o.sight)
+    def look(self, o: Observation) -> Callable[[], Arrays]:
+        target = self._store.at(o.target) if o.target is not None and "rgb" in self._channels else None
+        return functools.partial(self._arrays, o, self._store.at(o.sight), target)
+
+    def _arrays(self, o: Observation, panorama: Panorama, target: Panorama | None) -> Arrays:
         place, yaw, pitch = (o.sight._world, o.sight._node), o.turn * STEP, o.tilt * STEP
         found = {name: framed(panorama, self._view, name, yaw, pitch, place=place) for name in self._channels}
         if "rgb" in self._channels:
-            found["target_rgb"] = self._target(o.target)
+            found["target_rgb"] = self._target(o.target, target)
         return found
 
-    def _target(self, sight: Sight | None) -> np.ndarray:
-        if sight is None:
+    def _target(self, sight: Sight | None, panorama: Panorama | None) -> np.ndarray:
+        if sight is None or panorama is None:
             return np.zeros((self.TARGET, 2 * self.TARGET, 3), np.uint8)
         camera = _camera(self._view.camera, self._view.device)
-        return camera.photographed(self._store.at(sight).equirect(self.TARGET), None, sight._world, sight._node)
+        return camera.photographed(panorama.equirect(self.TARGET), None, sight._world, sight._node)
 
 
 class FeatureEyes:
@@ -209,8 +226,9 @@ class FeatureEyes:
         box = spaces.Box(-LARGE, LARGE, (VIEWS, self._source.size), np.float32)
         return {self._name: box, f"target_{self._name}": box}
 
-    def look(self, o: Observation) -> dict[str, np.ndarray]:
-        return {self._name: self._of(o.sight), f"target_{self._name}": self._of(o.target)}
+    def look(self, o: Observation) -> Callable[[], Arrays]:
+        found = {self._name: self._of(o.sight), f"target_{self._name}": self._of(o.target)}
+        return lambda: found
 
     def _of(self, sight: Sight | None) -> np.ndarray:
         if sight is None:
@@ -227,8 +245,9 @@ class AllEyes:
     def spaces(self) -> dict[str, spaces.Space]:
         return {name: space for eyes in self._eyes for name, space in eyes.spaces().items()}
 
-    def look(self, o: Observation) -> dict[str, np.ndarray]:
-        return {name: array for eyes in self._eyes for name, array in eyes.look(o).items()}
+    def look(self, o: Observation) -> Callable[[], Arrays]:
+        looks = [eyes.look(o) for eyes in self._eyes]
+        return lambda: {name: array for look in looks for name, array in look().items()}
 
 
 @functools.cache

@@ -93,7 +93,7 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     views[:n] = c.view + 1
     left = LARGE if o.requests_left is None else o.requests_left
     whole: dict[str, Any] = {
-        **eyes.look(o),
+        **eyes.look(o)(),
         "has_target": np.int64(o.target is not None),
         "instruction": codes_of(o.instruction, layout.text),
         "candidates": candidates,
