@@ -211,7 +211,7 @@ class Driving:
             found["goal"] = self.direction
         else:
             found["object"] = np.array([word_number(self._wanted)], np.float32)
-            found["instruction"] = codes_of(self.request, TEXT)
+            found["instruction"] = codes_of(self.request, TEXT).copy()
         return found
 
     def camera(self) -> Camera:

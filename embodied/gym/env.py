@@ -109,7 +109,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         return self._encoded(self._o), {"task": self._tasks[chosen].id}
 
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        before = self._potential()
+        before = self._potential() if self._shaping else 0.0
         try:
             o = self._env.step(decode(int(action), self._layout))
         except ActionError as e:

@@ -88,14 +88,15 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
         )
     candidates = np.zeros((layout.candidates, 4), dtype=np.float32)
     c = o.candidates
-    candidates[:n] = np.stack([np.sin(c.bearing), np.cos(c.bearing), np.sin(c.slope), np.cos(c.slope)], axis=1)
+    for k, (wave, angle) in enumerate(((np.sin, c.bearing), (np.cos, c.bearing), (np.sin, c.slope), (np.cos, c.slope))):
+        wave(angle, out=candidates[:n, k])
     views = np.zeros(layout.candidates, dtype=np.int64)
     views[:n] = c.view + 1
     left = LARGE if o.requests_left is None else o.requests_left
     whole: dict[str, Any] = {
         **eyes.look(o)(),
         "has_target": np.int64(o.target is not None),
-        "instruction": codes_of(o.instruction, layout.text),
+        "instruction": codes_of(o.instruction, layout.text).copy(),
         "candidates": candidates,
         "candidate_views": views,
         "action_mask": action_mask(o, layout),
@@ -112,14 +113,17 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     return whole
 
 
+@functools.lru_cache(maxsize=4096)
 def codes_of(text: str, length: int) -> np.ndarray:
-    """(length,) uint8: the text as ASCII codes, cut or padded with zeros.
+    """(length,) uint8, not to be written to: the text as ASCII codes, cut or padded with zeros.
 
     Not a gymnasium Text space, because AsyncVectorEnv (Gymnasium 1.4) does not refresh texts that
     lie in shared memory.
     """
     codes = np.frombuffer(text.encode("ascii", "replace")[:length], dtype=np.uint8)
-    return np.concatenate([codes, np.zeros(length - len(codes), dtype=np.uint8)])
+    padded = np.concatenate([codes, np.zeros(length - len(codes), dtype=np.uint8)])
+    padded.flags.writeable = False
+    return padded
 
 
 def text_of(codes: np.ndarray) -> str:
