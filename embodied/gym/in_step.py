@@ -2,8 +2,8 @@
 
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
-Play itself is Python and takes its turn; what is seen, most of a step's work, is resampled by threads that share
-the decoded panoramas and write straight into the batch.
+Play itself is Python and takes its turn, some 60 % of a step with 128 x 128 rgb; what is seen is resampled by threads
+that share the decoded panoramas and write straight into the batch.
 """
 
 from __future__ import annotations
