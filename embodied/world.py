@@ -317,6 +317,7 @@ def shine_of(bake: Bake, rooms: Sequence[str]) -> Shine:
     Args:
       rooms: ids of the house's rooms, in their order.
     """
+    from embodied.light.colours import linear  # late: loads the path tracer
     from embodied.render.gloss import Shine
 
     own, lit = bake.manifest["own_pages"], bake.lit
@@ -338,8 +339,7 @@ def shine_of(bake: Bake, rooms: Sequence[str]) -> Shine:
         h, w = picture.shape[:2]
         at = mesh.uv[mesh.faces].mean(1)
         x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-        v = picture[y, x] / 255.0
-        tint.append(np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4).astype(np.float32))
+        tint.append(linear(picture[y, x] / 255.0))
     exposure, middle = bake.exposure, np.median(bake.exposure.gains, axis=0)
     gain_of_room = dict(zip(rooms, exposure.gains, strict=True))
     gains = [exposure.outdoors if m.kind == "outdoor" else gain_of_room.get(m.room, middle) for m in lit.meshes]
