@@ -14,7 +14,7 @@ from handmade import HandCatalogue, furnished
 
 from embodied import gl
 from embodied.render import visibility
-from embodied.render.camera import camera_at
+from embodied.render.camera import camera_at, face_cameras
 from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.render.pictures import QUALITIES, PictureSettings
@@ -146,8 +146,25 @@ def test_hidden_rooms_are_left_out(renderer, house):
     seen = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5))
     width = sum(high - low for low, high in seen["bedroom_1"])
     assert width < 0.3, "only a sliver through the door"
-    everything, some = renderer._is_visual.sum(), renderer._seen_around((4.8, 3.7, 1.5)).sum()
-    assert some < everything - 5
+    faces = [renderer._in_view(camera, (64, 64)) for camera in face_cameras((4.8, 3.7, 1.5))]
+    assert np.logical_or.reduce(faces).sum() < renderer._is_visual.sum() - 5
+    aside = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5), (2.0, 3.0))
+    assert "bedroom_1" in seen and "bedroom_1" not in aside, "one looks away from the door"
+
+
+def test_a_field_of_view_lies_within_its_compass_directions():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        yaw, pitch, vfov = rng.uniform(-math.pi, math.pi), rng.uniform(-1.5, 1.5), rng.uniform(0.3, 1.6)
+        camera = camera_at((0, 0, 0), yaw, pitch, vfov)
+        forward, up = np.array(camera.forward), np.array(camera.up)
+        right, tall, wide = np.cross(forward, up), math.tan(vfov / 2), 1.5 * math.tan(vfov / 2)
+        low, high = visibility.sector_of(forward, right, up, wide, tall)
+        rays = forward + rng.uniform(-1, 1, (300, 1)) * wide * right + rng.uniform(-1, 1, (300, 1)) * tall * up
+        off = (np.arctan2(rays[:, 1], rays[:, 0]) - low) % (2 * math.pi)
+        assert (off <= high - low).all()
+        upright = abs(pitch) + vfov / 2 > math.pi / 2
+        assert ((low, high) == visibility.FULL) == upright, (yaw, pitch, vfov)
 
 
 def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():

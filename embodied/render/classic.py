@@ -114,7 +114,6 @@ class Renderer:
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, self.scene)
         self._middles, self._reaches = world_boxes(model, self._data)
-        self._seen_from: tuple[tuple[float, float, float], np.ndarray] | None = None
 
     def view(
         self,
@@ -195,7 +194,7 @@ class Renderer:
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
         mask = self._is_visual
         if cull:
-            mask = self._seen_around(camera.position) & self._in_frustum(camera, size)
+            mask = self._in_view(camera, size)
         model = self.scene.model
         model.geom_group[:] = np.where(mask, VISUAL, HIDDEN)
         mujoco.mjv_updateScene(
@@ -205,31 +204,26 @@ class Renderer:
         _aim(self._drawn, camera, size)
         return np.flatnonzero(mask)
 
-    def _seen_around(self, position: tuple[float, float, float]) -> np.ndarray:
-        """(ngeom,) bool: what may be seen from `position` in any direction; remembered for the last one."""
-        if self._seen_from is None or self._seen_from[0] != position:
-            mask, data, model = np.zeros_like(self._is_visual), self._data, self.scene.model
-            rooms = visibility.visible_rooms(self.house, self._portals, position)
-            if rooms is None:
-                mask = self._is_visual
-            else:
-                for room, sectors in rooms.items():
-                    g = self._geoms_of_room.get(room, np.zeros(0, int))
-                    mask[g] |= visibility.within(
-                        sectors, np.array(position[:2]), data.geom_xpos[g, :2], model.geom_rbound[g]
-                    )
-            self._seen_from = (position, mask)
-        return self._seen_from[1]
-
-    def _in_frustum(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        """(ngeom,) bool: whose bounding box reaches into the field of view."""
+    def _in_view(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        """(ngeom,) bool: what may be seen: through doors and windows, with its box in the field of view."""
         forward, up = np.array(camera.forward), np.array(camera.up)
         right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
         wide = tall * size[1] / size[0]
         planes = np.stack([forward * wide - right, forward * wide + right, forward * tall - up, forward * tall + up])
         planes /= np.linalg.norm(planes, axis=1, keepdims=True)
         apart = self._middles - np.array(camera.position)
-        return np.all(apart @ planes.T >= -self._reaches @ np.abs(planes.T) - 1e-3, axis=1)
+        framed = np.all(apart @ planes.T >= -self._reaches @ np.abs(planes.T) - 1e-3, axis=1)
+        towards = visibility.sector_of(forward, right, up, wide, tall)
+        rooms = visibility.visible_rooms(self.house, self._portals, camera.position, towards)
+        if rooms is None:
+            return framed & self._is_visual
+        mask, eye = np.zeros_like(framed), np.array(camera.position[:2])
+        for room, sectors in rooms.items():
+            g = self._geoms_of_room.get(room, np.zeros(0, int))
+            g = g[framed[g]]
+            spheres = self._data.geom_xpos[g, :2], self.scene.model.geom_rbound[g]
+            mask[g] |= visibility.within(sectors, eye, *spheres)
+        return mask
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""

@@ -20,6 +20,8 @@ OUTDOORS = ""
 FULL = (-math.pi, math.pi)
 NEAR = 0.25
 """Closer than this to an opening, in metres, one sees all around through it."""
+MARGIN = 1e-3
+"""Added to both ends of a field of view, radians: pixels at the edge."""
 DEEPEST = 16
 """Openings looked through one behind another before the search calls everything behind visible."""
 
@@ -71,9 +73,12 @@ def portals_of(house: House) -> Portals:
 
 
 def visible_rooms(
-    house: House, portals: Portals, position: Sequence[float] | np.ndarray
+    house: House, portals: Portals, position: Sequence[float] | np.ndarray, sector: Sector = FULL
 ) -> dict[str, list[Sector]] | None:
     """Rooms that may be seen from `position`, each with the directions in which it may be seen.
+
+    Args:
+      sector: where one looks.
 
     Returns:
       Room id (OUTDOORS for the outside) to sectors; None when the point is in no room: see all.
@@ -82,7 +87,7 @@ def visible_rooms(
     if start is None:
         return None
     seen: dict[str, list[Sector]] = {}
-    complete = _look(portals, (float(position[0]), float(position[1])), start, FULL, (), seen)
+    complete = _look(portals, (float(position[0]), float(position[1])), start, sector, (), seen)
     return seen if complete else None
 
 
@@ -120,6 +125,21 @@ def _through(eye: Point, portal: Passage, sector: Sector) -> list[Sector]:
     if width > math.pi:
         low, width = second, TWO_PI - width
     return overlap(sector, (low, low + width))
+
+
+def sector_of(forward: np.ndarray, right: np.ndarray, up: np.ndarray, wide: float, tall: float) -> Sector:
+    """The compass directions of everything in a field of view; all where straight up or down is in it.
+
+    Args:
+      forward, right, up: (3,) the axes of who looks, of length 1.
+      wide, tall: tangents of half the horizontal and half the vertical field of view.
+    """
+    if abs(forward[2]) > 0 and abs(right[2]) <= wide * abs(forward[2]) and abs(up[2]) <= tall * abs(forward[2]):
+        return FULL
+    corners = [forward + i * wide * right + j * tall * up for i in (-1, 1) for j in (-1, 1)]
+    middle = math.atan2(forward[1], forward[0])
+    off = [(math.atan2(c[1], c[0]) - middle + math.pi) % TWO_PI - math.pi for c in corners]
+    return (middle + min(off) - MARGIN, middle + max(off) + MARGIN)
 
 
 def overlap(one: Sector, other: Sector) -> list[Sector]:
