@@ -14,12 +14,13 @@ from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import Closed, Eyes, PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.in_step import InStep
+from embodied.gym.env import HelpGymEnv, make, make_vec
+from embodied.gym.eyes import Eyes, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
+from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import World, open_world
@@ -36,6 +37,8 @@ LINES = (
     ("rgb, the 36 views at 128 x 128", ("rgb",), ViewSettings("views36"), 60.0),
 )
 """What is seen, and how many steps per second the project promises with it."""
+WORKERS = 2
+"""Processes of the second vectorised line."""
 TOGETHER = 1.6
 """Times as many steps that a batch is to make on two cores as one environment on one."""
 
@@ -47,6 +50,7 @@ def seen(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator
     try:
         with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality) as world:
             yield from _measures(world, seed)
+        yield from _batches(seed, cache, quality)
     finally:
         cv2.setNumThreads(threads)
 
@@ -60,17 +64,32 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
         steps = 40 if view.frame == "views36" else STEPS
         walk = functools.partial(_walk, env, steps, seed)
         yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
-    eyes = PictureEyes(store, ("rgb",), ViewSettings())
-    plain, envs = _env(world, tasks, eyes), InStep(lambda: _env(world, tasks, Closed()), BATCH, eyes)
+    plain = _env(world, tasks, PictureEyes(store, ("rgb",), ViewSettings()))
     resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
-    together = measure(
-        f"steps of {BATCH} environments, rgb, 128 x 128", lambda: _walk_together(envs), "1/s", per=10 * BATCH
-    )
-    yield together
-    yield ratio("together against one by one", together, resampled, aim=TOGETHER)
     naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
     yield naive
     yield ratio("resampled against drawn", resampled, naive)
+
+
+def _batches(seed: int, cache: Path, quality: str) -> Iterator[Measure]:
+    """One environment against batches of them, all in the flat that `make` generates from `seed`."""
+    asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": PictureSettings(quality=quality)}
+    for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
+        assert isinstance(world, World), "generated, so it can be drawn"
+        with world:
+            world.render_all()
+    one = make("find", **asked)
+    alone = measure("steps of one environment, rgb, 128 x 128", lambda: _walk_alone(one), "1/s", per=STEPS)
+    yield alone
+    for workers in (1, WORKERS):
+        envs = make_vec("find", BATCH, workers=workers, **asked)
+        for _ in range(5):  # every process decodes its panoramas
+            _walk_together(envs)
+        name = f"steps of {BATCH} environments in {workers} process{'es' if workers > 1 else ''}"
+        together = measure(name, functools.partial(_walk_together, envs), "1/s", per=10 * BATCH)
+        envs.close()
+        yield together
+        yield ratio(f"{name} against one", together, alone, aim=TOGETHER if workers > 1 else None)
 
 
 def _env(world: World, tasks: list[Task], eyes: Eyes) -> HelpGymEnv:
@@ -88,7 +107,17 @@ def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
             o, _ = env.reset()
 
 
+def _walk_alone(env: HelpGymEnv) -> None:
+    """The first move there is, again and again."""
+    o, _ = env.reset(seed=0)
+    for _ in range(STEPS):
+        o, _, terminated, truncated, _ = env.step(int(o["action_mask"].argmax()))
+        if terminated or truncated:
+            o, _ = env.reset()
+
+
 def _walk_together(envs: Any) -> None:
+    """The same in every slot."""
     o, _ = envs.reset(seed=0)
     for _ in range(10):
         o, *_ = envs.step(o["action_mask"].argmax(1))

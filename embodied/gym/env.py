@@ -1,7 +1,7 @@
 """Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0, registered by `import embodied`.
 
     env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", sees=("rgb", "depth"))
-    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
+    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR", workers=2)
 
 Without `data` a small furnished flat is generated and lit, which takes a minute or two once. What an
 agent sees is chosen by `sees` (embodied.gym.eyes): by default a perspective view and the features
@@ -10,6 +10,7 @@ that the shipped encoder finds in the same pictures. An oracle is called an orac
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
+from embodied.gym.in_parts import InParts
 from embodied.gym.in_step import InStep, refuse_too_many
 from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
@@ -222,17 +224,27 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
 
 
-def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> InStep:
+def make_vec(
+    kind: str, num_envs: int = 1, *, render_mode: str | None = None, workers: int = 1, **options: Any
+) -> InStep | InParts:
     """So many environments that share one stage: houses, pages and decoded panoramas are held once.
 
-    Each has its own task, target, instruction and generator; options as of `make`, and `threads` that look
-    (default: one per core).
+    Each has its own task, target, instruction and generator, whatever the number of processes.
+
+    Args:
+      workers: processes that the slots are split among; each holds a stage of its own (embodied.gym.in_parts).
+      options: as of `make`, and `threads` that look (default: one per core); those for several processes must be
+        picklable.
 
     Raises:
       ValueError: fewer than one, or more than memory has room for.
     """
     if num_envs < 1:
         raise ValueError(f"num_envs should be at least 1, got {num_envs}")
+    if workers != 1:
+        if "threads" in options:
+            raise ValueError("threads is for one process; with workers each has its share of the cores")
+        return InParts(functools.partial(_part, kind, render_mode, options), num_envs, workers)
     own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
     threads = options.pop("threads", None)
     stage = set_stage(kind, **options)
@@ -242,6 +254,12 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
 
     refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
     return InStep(one, num_envs, stage.eyes, threads=threads)
+
+
+def _part(kind: str, render_mode: str | None, options: Mapping[str, Any], num_envs: int, threads: int) -> InStep:
+    part = make_vec(kind, num_envs, render_mode=render_mode, threads=threads, **options)
+    assert isinstance(part, InStep), "one process"
+    return part
 
 
 @dataclass(frozen=True, eq=False)
