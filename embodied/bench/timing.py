@@ -19,7 +19,7 @@ class Measure:
     value: float
     """Median over the repeats."""
     unit: str
-    """'ms', 's', '1/s', 'MiB' or 'x' (a ratio)."""
+    """'ms', 's', '1/s', 'MiB', 'x' (so many times as fast) or 'share' (of another time)."""
     low: float
     high: float
     """10th and 90th percentile."""

@@ -1,12 +1,12 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
 houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help, seen with pixels, drive a body on wheels with live pictures; light compares the ways of
-drawing with a path tracer, growth lights houses of 40 to 400 m² and fits how the cost grows (fast, or
---quality normal), codecs compares ways of storing what was drawn (choose --quality fast), look asks a
-network that has seen photographs only what the objects of three flats are (--quality, --look; optional
-packages). Close other programs first: the numbers are only as good as the quiet. freeze measures
-nothing: it makes houses, a lit flat, data sets, episodes, tables and features in OUT/freeze and writes
+with help, seen with pixels, drive a body on wheels with live pictures; bakes lights a flat again and
+again; light compares the ways of drawing with a path tracer, growth lights houses of 40 to 400 m² and
+fits how the cost grows (fast, or --quality normal), codecs compares ways of storing what was drawn
+(choose --quality fast), look asks a network that has seen photographs only what the objects of three
+flats are (--quality, --look; optional packages). Close other programs first: the numbers are only as
+good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features in OUT/freeze and writes
 their digests; with --against it says of every part whether it is the same as in a file of them (docs/freeze.json), or
 differs and why that is meant.
 """
@@ -34,6 +34,7 @@ PARTS = (
     "seen",
     "drive",
     "memory",
+    "bakes",
     "light",
     "growth",
     "codecs",
@@ -65,7 +66,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied import gl
-    from embodied.bench import drive, episodes, seen, timing, world
+    from embodied.bench import bakes, drive, episodes, seen, timing, world
 
     catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -87,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
         "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality),
+        "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
     measures = []

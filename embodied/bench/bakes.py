@@ -1,0 +1,55 @@
+"""Benchmarks of light: processor time of one flat in several qualities, and of further lightings of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from assets.catalogue import Catalogue
+from embodied.bench.timing import Measure, from_values
+from embodied.generate import HouseConfig, generate_house
+from embodied.house.house import House
+from embodied.light.baking import bake_all, forget, lightings_of
+from embodied.scene.house_meshes import house_parts
+
+FLAT = HouseConfig(area=(60.0, 70.0), hour=10.5, weather="clear")
+"""What is lit."""
+QUALITIES = ("fast", "normal")
+REPEATS = 3
+LIGHTINGS = 3
+FURTHER = 1 / 3
+"""Share of the first lighting's time that a further one is to take."""
+
+
+def bakes(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
+    """Light a flat again and again, its furniture imported and unwrapped before."""
+    house = generate_house(seed, FLAT, catalogue=catalogue)
+    house_parts(house, catalogue)  # imports the furniture
+    took: dict[str, list[float]] = {q: [] for q in QUALITIES}
+    for repeat in range(REPEATS + 1):
+        for quality in QUALITIES:
+            seconds = _seconds((house,), catalogue, cache, quality)
+            if repeat:  # the first compiles and unwraps
+                took[quality] += seconds
+    for quality, seconds in took.items():
+        yield from_values(f"bake, {quality}, processor time", seconds, "s")
+    yield from_values("bake, fast of normal", [a / b for a, b in zip(*took.values(), strict=True)], "share")
+    several = lightings_of(house, LIGHTINGS)
+    rounds = [_seconds(several, catalogue, cache, QUALITIES[0]) for _ in range(REPEATS)]
+    for k in range(1, LIGHTINGS):
+        shares = [one[k] / one[0] for one in rounds]
+        yield from_values(f"bake, fast, lighting {k + 1} of lighting 1", shares, "share", aim=FURTHER)
+
+
+def _seconds(lightings: Sequence[House], catalogue: Catalogue, cache: Path, quality: str) -> list[float]:
+    """Processor seconds of every lighting of one house, made anew, without unwrapping: that is the furniture's."""
+    for house in lightings:
+        forget(cache, house, catalogue, quality)
+    start = time.process_time()
+    made = bake_all(lightings, catalogue, cache, quality)
+    whole = time.process_time() - start
+    parts = [sum(b.manifest["seconds"].values()) for b in made]
+    parts[0] += whole - sum(parts)  # what comes before the first
+    parts[0] -= made[0].manifest["seconds"]["unwrap"]
+    return parts
