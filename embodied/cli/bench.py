@@ -6,9 +6,9 @@ again; light compares the ways of drawing with a path tracer, growth lights hous
 fits how the cost grows (fast, or --quality normal), codecs compares ways of storing what was drawn
 (choose --quality fast), look asks a network that has seen photographs only what the objects of three
 flats are (--quality, --look; optional packages). Close other programs first: the numbers are only as
-good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features in OUT/freeze and writes
-their digests; with --against it says of every part whether it is the same as in a file of them (docs/freeze.json), or
-differs and why that is meant.
+good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
+and features in OUT/freeze and writes their digests; with --against it says of every part whether it is
+the same as in a file of them (docs/freeze.json), or differs and why that is meant.
 """
 
 from __future__ import annotations
