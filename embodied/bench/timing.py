@@ -77,6 +77,12 @@ def ratio(name: str, slow: Measure, fast: Measure, *, aim: float | None = None) 
     return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, repeats, aim)
 
 
+def share(name: str, part: Measure, whole: Measure, *, aim: float | None = None) -> Measure:
+    """The time of `part` in that of `whole`, both from one run."""
+    repeats = min(part.repeats, whole.repeats)
+    return Measure(name, part.value / whole.value, "share", part.low / whole.high, part.high / whole.low, repeats, aim)
+
+
 def machine() -> dict[str, object]:
     """What the numbers were made on."""
     return {
