@@ -29,6 +29,10 @@ FLAT = HouseConfig(area=(70.0, 110.0))
 """Where the agent walks."""
 STEPS = 200
 """Of one timed call."""
+ROUND = 20
+"""Of one timed call of a batch."""
+ROUNDS = 40
+"""Untimed calls before, in which every process decodes the panoramas that it meets."""
 BATCH = 64
 """Environments of the vectorised line."""
 LINES = (
@@ -78,18 +82,40 @@ def _batches(seed: int, cache: Path, quality: str) -> Iterator[Measure]:
         assert isinstance(world, World), "generated, so it can be drawn"
         with world:
             world.render_all()
-    one = make("find", **asked)
-    alone = measure("steps of one environment, rgb, 128 x 128", lambda: _walk_alone(one), "1/s", per=STEPS)
+    walk = _Alone(make("find", **asked))
+    alone = measure("steps of one environment, rgb, 128 x 128", walk, "1/s", per=STEPS, warm=ROUNDS)
     yield alone
     for workers in (1, WORKERS):
         envs = make_vec("find", BATCH, workers=workers, **asked)
-        for _ in range(5):  # every process decodes its panoramas
-            _walk_together(envs)
         name = f"steps of {BATCH} environments in {workers} process{'es' if workers > 1 else ''}"
-        together = measure(name, functools.partial(_walk_together, envs), "1/s", per=10 * BATCH)
+        together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
         envs.close()
         yield together
         yield ratio(f"{name} against one", together, alone, aim=TOGETHER if workers > 1 else None)
+
+
+class _Alone:
+    """Goes STEPS steps on: the first move there is, again and again."""
+
+    def __init__(self, env: HelpGymEnv) -> None:
+        self._env, self._seen = env, env.reset(seed=0)[0]
+
+    def __call__(self) -> None:
+        for _ in range(STEPS):
+            self._seen, _, terminated, truncated, _ = self._env.step(int(self._seen["action_mask"].argmax()))
+            if terminated or truncated:
+                self._seen, _ = self._env.reset()
+
+
+class _Together:
+    """The same in every slot, ROUND steps on."""
+
+    def __init__(self, envs: Any) -> None:
+        self._envs, self._seen = envs, envs.reset(seed=0)[0]
+
+    def __call__(self) -> None:
+        for _ in range(ROUND):
+            self._seen, *_ = self._envs.step(self._seen["action_mask"].argmax(1))
 
 
 def _env(world: World, tasks: list[Task], eyes: Eyes) -> HelpGymEnv:
@@ -105,22 +131,6 @@ def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
         o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
         if terminated or truncated:
             o, _ = env.reset()
-
-
-def _walk_alone(env: HelpGymEnv) -> None:
-    """The first move there is, again and again."""
-    o, _ = env.reset(seed=0)
-    for _ in range(STEPS):
-        o, _, terminated, truncated, _ = env.step(int(o["action_mask"].argmax()))
-        if terminated or truncated:
-            o, _ = env.reset()
-
-
-def _walk_together(envs: Any) -> None:
-    """The same in every slot."""
-    o, _ = envs.reset(seed=0)
-    for _ in range(10):
-        o, *_ = envs.step(o["action_mask"].argmax(1))
 
 
 def _draw(env: HelpGymEnv, world: World, steps: int, seed: int) -> None:

@@ -25,7 +25,7 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from embodied.gym.eyes import Arrays
-from embodied.gym.in_step import InStep, refuse_too_many
+from embodied.gym.in_step import InStep, mask_of, refuse_too_many, seeds_of
 
 Maker = Callable[[int, int], InStep]
 """Makes so many environments, which so many threads look for; can be pickled."""
@@ -73,10 +73,8 @@ class InParts(VectorEnv[dict[str, Any], Any, np.ndarray]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        seeds, wanted = self._seeds(seed), dict(options or {})
-        mask = np.asarray(wanted.pop("reset_mask", np.ones(self.num_envs, bool)))
-        if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
-            raise ValueError(f"reset_mask should be {self.num_envs} booleans, some of them true, got {mask!r}")
+        seeds, wanted = seeds_of(seed, self.num_envs), dict(options or {})
+        mask = mask_of(wanted, self.num_envs)
         asked = [k for k, s in enumerate(self._slots) if mask[s].any()]
         for k in asked:
             own = self._slots[k]
@@ -126,14 +124,6 @@ class InParts(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self.single_action_space, self.action_space = action_space, batch_space(action_space, self.num_envs)
         self.single_observation_space, self.observation_space = space, batch_space(space, self.num_envs)
         return SharedArrays(space, self.num_envs)
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """One for each slot, as Gymnasium's batches have them."""
-        if seed is None or isinstance(seed, int):
-            return [None if seed is None else seed + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments; give one or as many")
-        return list(seed)
 
     def _seen(self) -> Arrays:
         return {name: array.copy() for name, array in self._shared.arrays.items()}
@@ -250,12 +240,10 @@ def _serve(line: Connection, make_part: Maker, num_envs: int, threads: int) -> N
             if name == "share":
                 block, space, whole, own = args
                 board = SharedArrays(space, whole, block)
+                envs.write_into({key: array[own] for key, array in board.arrays.items()})
                 _send(line)
             elif name in ("reset", "step"):
-                assert board is not None, "memory is shared before anybody looks"
-                seen, *rest = envs.reset(seed=args[0], options=args[1]) if name == "reset" else envs.step(*args)
-                for key, array in seen.items():
-                    board.arrays[key][own] = array
+                _, *rest = envs.reset(seed=args[0], options=args[1]) if name == "reset" else envs.step(*args)
                 _send(line, *rest)
             elif name == "render":
                 _send(line, envs.render())

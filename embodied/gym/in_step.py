@@ -2,21 +2,21 @@
 
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
-Play itself is Python and takes its turn, some 60 % of a step with 128 x 128 rgb; what is seen is resampled by threads
-that share the decoded panoramas and write straight into the batch.
+Play itself is Python and takes its turn; what is seen is resampled by threads that share the decoded panoramas and
+write straight into the batch. Several processes: embodied.gym.in_parts.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 import psutil
-from gymnasium.vector import SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from embodied.gym.eyes import Arrays, Eyes
@@ -47,62 +47,126 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
         """
         if threads is not None and threads < 1:
             raise ValueError(f"threads should be at least 1, got {threads}")
-        self._play, self._eyes, self._seen = SyncVectorEnv([make_one] * num_envs), eyes, eyes.spaces()
-        self.num_envs, self.metadata, self.render_mode = num_envs, self._play.metadata, self._play.render_mode
-        self.single_action_space, self.action_space = self._play.single_action_space, self._play.action_space
-        without = self._play.single_observation_space
-        assert isinstance(without, gym.spaces.Dict), "an environment shows several things"
-        self.single_observation_space = gym.spaces.Dict({**self._seen, **without.spaces})
+        self.envs = [make_one() for _ in range(num_envs)]
+        """The slots."""
+        first = self.envs[0]
+        self.num_envs, self.render_mode = num_envs, first.render_mode
+        self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self.single_action_space, self.action_space = first.action_space, batch_space(first.action_space, num_envs)
+        self._eyes, self._seen, told = eyes, eyes.spaces(), first.observation_space
+        assert isinstance(told, gym.spaces.Dict), "an environment shows several things"
+        self.single_observation_space = gym.spaces.Dict({**self._seen, **told.spaces})
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._told = _arrays_of(told.spaces, num_envs)
+        self._over = np.zeros(num_envs, bool)
         self._threads = min(threads or len(os.sched_getaffinity(0)), num_envs)
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
+        self._into: Arrays | None = None
 
-    @property
-    def envs(self) -> list[HelpGymEnv]:
-        """The slots."""
-        return self._play.envs  # type: ignore[return-value]  # made by make_one
+    def write_into(self, arrays: Arrays) -> None:
+        """From now on what is seen and told is written into these, and they are handed out, instead of new ones."""
+        self._into = arrays
+        self._told = {name: arrays[name] for name in self._told}
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        observations, info = self._play.reset(seed=seed, options=options)
-        return {**self._look(), **observations}, info
+        """All slots, or those of options["reset_mask"]."""
+        seeds, options = seeds_of(seed, self.num_envs), dict(options or {})
+        info: dict[str, Any] = {}
+        for k in map(int, np.flatnonzero(mask_of(options, self.num_envs))):
+            o, one = self.envs[k].reset(seed=seeds[k], options=options or None)
+            self._over[k] = False
+            self._note(k, o)
+            info = self._add_info(info, one, k)
+        return self._shown(), info
 
     def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        observations, rewards, terminated, truncated, info = self._play.step(actions)
-        return {**self._look(), **observations}, rewards, terminated, truncated, info
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros((2, self.num_envs), bool)
+        info: dict[str, Any] = {}
+        for k, (env, action) in enumerate(zip(self.envs, actions, strict=True)):
+            if self._over[k]:
+                o, one = env.reset()
+            else:
+                o, rewards[k], terminated[k], truncated[k], one = env.step(action)
+            self._note(k, o)
+            info = self._add_info(info, one, k)
+        self._over = terminated | truncated
+        return self._shown(), rewards, terminated, truncated, info
 
     def render(self) -> tuple[Any, ...] | None:
-        return self._play.render()
+        return tuple(env.render() for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What a method of every slot returns, or an attribute of each."""
-        return self._play.call(name, *args, **kwargs)
+        found = [getattr(env, name) for env in self.envs]
+        return tuple(f(*args, **kwargs) if callable(f) else f for f in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every slot."""
-        return self._play.get_attr(name)
+        return self.call(name)
 
     def close_extras(self, **kwargs: Any) -> None:
         if self._pool is not None:
             self._pool.shutdown()
-        self._play.close(**kwargs)
+        for env in self.envs:
+            env.close()
 
-    def _look(self) -> Arrays:
+    def _note(self, k: int, told: dict[str, Any]) -> None:
+        for name, value in told.items():
+            self._told[name][k] = value
+
+    def _shown(self) -> Arrays:
+        if self._into is not None:
+            self._look(self._into)
+            return self._into
+        found = _arrays_of(self._seen, self.num_envs)
+        self._look(found)
+        return {**found, **{name: array.copy() for name, array in self._told.items()}}
+
+    def _look(self, into: Arrays) -> None:
         """What all slots see: places by this thread, since only it may draw; pictures of them by all."""
         looks = [self._eyes.look(env.observed) for env in self.envs]
-        found = {name: np.empty((self.num_envs, *(s.shape or ())), s.dtype) for name, s in self._seen.items()}
 
         def fill(first: int) -> None:
             for k in range(first, self.num_envs, self._threads):
                 for name, array in looks[k]().items():
-                    found[name][k] = array
+                    into[name][k] = array
 
         if self._pool is None:
             fill(0)
         else:
             list(self._pool.map(fill, range(self._threads)))
-        return found
+
+
+def _arrays_of(kinds: Mapping[str, gym.Space[Any]], num_envs: int) -> Arrays:
+    return {name: np.empty((num_envs, *(s.shape or ())), s.dtype) for name, s in kinds.items()}
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """One for each slot, as Gymnasium's batches have them.
+
+    Raises:
+      ValueError: another number of seeds.
+    """
+    if seed is None or isinstance(seed, int):
+        return [None if seed is None else seed + i for i in range(num_envs)]
+    if len(seed) != num_envs:
+        raise ValueError(f"{len(seed)} seeds for {num_envs} environments; give one or as many")
+    return list(seed)
+
+
+def mask_of(options: dict[str, Any], num_envs: int) -> np.ndarray:
+    """(num_envs,) bool: which slots are reset; takes "reset_mask" out of `options`.
+
+    Raises:
+      ValueError: no such mask.
+    """
+    mask = np.asarray(options.pop("reset_mask", np.ones(num_envs, bool)))
+    if mask.shape != (num_envs,) or mask.dtype != bool or not mask.any():
+        raise ValueError(f"reset_mask should be {num_envs} booleans, some of them true, got {mask!r}")
+    return mask
 
 
 def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
