@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
@@ -225,6 +226,7 @@ class _Part:
 
 def _serve(line: Connection, make_part: Maker, num_envs: int, threads: int) -> None:
     """Makes a part and answers questions about it until it is told to close, or nobody is there any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever interrupts the batch closes it
     cv2.setNumThreads(threads)
     served = _questions(line)
     envs: InStep | None = None
@@ -261,7 +263,7 @@ def _questions(line: Connection) -> Iterator[tuple[str, tuple[Any, ...]]]:
     while True:
         try:
             name, args = line.recv()
-        except (EOFError, ConnectionError, KeyboardInterrupt):
+        except (EOFError, ConnectionError):
             return
         if name == "close":
             return
