@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, measure, ratio
+from embodied.bench.timing import Measure, measure, one_core, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv, make, make_vec
@@ -49,14 +48,10 @@ TOGETHER = 1.6
 
 def seen(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
     """Random walks through one flat whose panoramas are in memory: on one core, and a batch that looks on all."""
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
+    with one_core():
         with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality) as world:
             yield from _measures(world, seed)
         yield from _batches(seed, cache, quality)
-    finally:
-        cv2.setNumThreads(threads)
 
 
 def _measures(world: World, seed: int) -> Iterator[Measure]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 
@@ -62,6 +64,17 @@ def measure(
     scale = {"ms": 1e3, "s": 1.0}
     values = [1.0 / s for s in seconds] if unit == "1/s" else [s * scale[unit] for s in seconds]
     return from_values(name, values, unit, aim=aim)
+
+
+@contextlib.contextmanager
+def one_core() -> Iterator[None]:
+    """OpenCV keeps to one core inside."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
 
 
 def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | None = None) -> Measure:

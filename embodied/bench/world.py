@@ -7,13 +7,12 @@ import resource
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 import psutil
 from tqdm import tqdm
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, from_values, measure, ratio, share
+from embodied.bench.timing import Measure, from_values, measure, one_core, ratio, share
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
@@ -96,15 +95,14 @@ def _face(renderer: Renderer, cameras: Sequence[Camera], quality: str, aim: floa
 
 def _views(panorama: Panorama) -> Iterator[Measure]:
     """Perspective views of a panorama in memory, on one core: the 36 directions of the literature."""
-    directions, threads = list(zip(VIEW_YAWS, VIEW_PITCHES, strict=True)), cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    for (height, width), colours, everything in VIEW_AIMS:
-        size, name = (height, width), f"views of {width} x {height}"
-        rgb = lambda size=size: [panorama.view_rgb(yaw, pitch, size=size) for yaw, pitch in directions]
-        whole = lambda size=size: [panorama.view(yaw, pitch, size=size) for yaw, pitch in directions]
-        yield measure(f"{name}, rgb", rgb, "1/s", per=len(directions), aim=colours)
-        yield measure(f"{name}, rgb, depth and ids", whole, "1/s", per=len(directions), aim=everything)
-    cv2.setNumThreads(threads)
+    directions = list(zip(VIEW_YAWS, VIEW_PITCHES, strict=True))
+    with one_core():
+        for (height, width), colours, everything in VIEW_AIMS:
+            size, name = (height, width), f"views of {width} x {height}"
+            rgb = lambda size=size: [panorama.view_rgb(yaw, pitch, size=size) for yaw, pitch in directions]
+            whole = lambda size=size: [panorama.view(yaw, pitch, size=size) for yaw, pitch in directions]
+            yield measure(f"{name}, rgb", rgb, "1/s", per=len(directions), aim=colours)
+            yield measure(f"{name}, rgb, depth and ids", whole, "1/s", per=len(directions), aim=everything)
 
 
 def naive_view(house: House, catalogue: Catalogue, eye: np.ndarray) -> Callable[[], None]:

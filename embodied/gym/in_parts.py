@@ -137,11 +137,11 @@ class InParts(VectorEnv[dict[str, Any], Any, np.ndarray]):
     def _answers(self, parts: Sequence[_Part] | None = None) -> list[tuple[Any, ...]]:
         """One of each part, or of some; all are read before an error is raised: the next question finds silence."""
         found: list[tuple[Any, ...]] = []
-        errors: list[BaseException] = []
+        errors: list[Exception] = []
         for part in self._parts if parts is None else parts:
             try:
                 found.append(part.answer())
-            except BaseException as e:
+            except Exception as e:
                 errors.append(e)
         if errors:
             raise errors[0]
