@@ -54,7 +54,7 @@ TINY = dataclasses.replace(
     instruction_length=40,
     training_steps=6,
 )
-STARS = RatingConfig(updates=3, batch=6, learning_rate=3e-3, critic_updates=1)
+STARS = RatingConfig(updates=3, batch=6, steps=6, learning_rate=3e-3, critic_updates=1)
 silent = lambda line: None
 
 

@@ -150,8 +150,8 @@ def learn_from_stars(
 ) -> list[dict[str, float]]:
     """Fine-tune `agent` in place by ratings of episodes in the houses of `split`; resumable.
 
-    Writes checkpoint.pt, result.json and, at the end, agent.safetensors into `folder`. Episodes are as
-    long as in imitation; dropout is off, so that the policy that is rated is the one that learns.
+    Writes checkpoint.pt, result.json and, at the end, agent.safetensors into `folder`. Dropout is off,
+    so that the policy that is rated is the one that learns.
 
     Args:
       begun_with: fingerprint of the agent's first weights, so that a run is not continued with others.
@@ -198,7 +198,7 @@ def _learn_once(
 ) -> dict[str, float]:
     """Play, be rated, learn; returns means over the episodes."""
     tasks = tasks_of_update(split.tasks, update, config.batch, config.seed)
-    tasks = [dataclasses.replace(t, horizon=agent.config.training_steps) for t in tasks]
+    tasks = [dataclasses.replace(t, horizon=min(t.horizon, config.steps)) for t in tasks]
     watching = Watching(policy)
     episodes = play(split.make_env, watching, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
     scores = [score_of(e, split.worlds[e.task.world].graph, config.score) for e in episodes]

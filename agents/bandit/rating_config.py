@@ -18,6 +18,8 @@ class RatingConfig:
     """Updates of the weights."""
     batch: int = 32
     """Episodes per update, each rated once."""
+    steps: int = 50
+    """Actions of the longest episode that is rated, at most those of its task; imitation cuts episodes off after 20."""
     learning_rate: float = 1e-4
     """Adam's, of the agent; the dissertation's for translators."""
     critic_rate: float = 1e-3
@@ -33,5 +35,5 @@ class RatingConfig:
 
     def __post_init__(self) -> None:
         require_word(self, "score", SCORES)
-        require(self, AT_LEAST_ONE, "updates", "batch")
+        require(self, AT_LEAST_ONE, "updates", "batch", "steps")
         require(self, POSITIVE, "learning_rate", "critic_rate", "clip")
