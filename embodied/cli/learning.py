@@ -321,7 +321,7 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
     regex.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
     add_fields(regex, LearnerConfig, scales=LEARNER_SCALES)
     add_fields(regex, RegexConfig, scales=REGEX_SCALES)
-    nav = worlds.add_parser("nav", help="follow routes through houses, on a data set `vln` with features")
+    nav = worlds.add_parser("nav", help="follow routes through houses, on a data set `vln` or `hanna` with features")
     _add_iliad(nav)
     add_nav_data(nav, required=True)
     nav.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
@@ -350,7 +350,11 @@ def add_study_iliad(parser: argparse.ArgumentParser) -> None:
 def add_nav_data(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Where NAV's houses and what is seen of them come from."""
     parser.add_argument(
-        "--data", type=any_path, required=required, metavar="DIR", help="NAV: folder that `embodied dataset vln` built"
+        "--data",
+        type=any_path,
+        required=required,
+        metavar="DIR",
+        help="NAV: folder that `embodied dataset vln` or `hanna` built",
     )
     add_cache(parser)
     add_encoder(parser)

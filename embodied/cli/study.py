@@ -183,4 +183,6 @@ def refuse_regex_settings(args: argparse.Namespace) -> None:
     if given:
         raise ValueError(f"--{given[0].replace('_', '-')} belongs to --world regex; leave it out with --world nav")
     if args.data is None:
-        raise ValueError("--world nav wants --data, a folder that `embodied dataset vln` built, with features")
+        raise ValueError(
+            "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
+        )

@@ -272,14 +272,14 @@ class Dataset:
         return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
 
 
-def dataset_of(folder: Path, kind: str) -> Dataset:
-    """The data set in `folder`, for a learner of one kind of task.
+def dataset_of(folder: Path, kind: str, *others: str) -> Dataset:
+    """The data set in `folder`, for a learner of one kind of task, or of some others that hold what it needs.
 
     Raises:
       DatasetError: it is of another kind, or as Dataset.
     """
     data = Dataset(folder)
-    if data.kind != kind:
+    if data.kind not in (kind, *others):
         raise DatasetError(
             f"{folder} is a data set of {data.kind!r}, a learner of {kind!r} needs its own: "
             f"`embodied dataset {kind} --out DIR`"

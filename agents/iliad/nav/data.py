@@ -1,4 +1,4 @@
-"""The data of NAV: paths of a data set `vln` with their wordings (3.2.4.2, C.1.1; docs/sources.md, S142)."""
+"""The data of NAV: paths of a data set `vln` or `hanna` with their wordings (3.2.4.2, C.1.1; docs/sources.md, S142)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class NavData:
 
 
 def nav_data(source: Dataset, config: NavConfig, encoder: str, quality: str | None = None) -> NavData:
-    """A data set `vln` with features as the data of NAV.
+    """A data set `vln` or `hanna` with features as the data of NAV.
 
     Args:
       encoder: digest of the encoder that made the features.

@@ -30,7 +30,7 @@ class NavSource:
     """Where the houses and what is seen of them come from."""
 
     folder: Path
-    """A data set of `embodied dataset vln` with features."""
+    """A data set of `embodied dataset vln` (or hanna, whose assistants know such paths) with features."""
     encoder: str
     """Digest of the encoder that made them."""
     quality: str | None
@@ -42,7 +42,7 @@ class NavSource:
         Raises:
           FileNotFoundError, ValueError: a data set of another kind, or without such features.
         """
-        return nav_data(dataset_of(self.folder, "vln"), config, self.encoder, self.quality)
+        return nav_data(dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.quality)
 
 
 @dataclass(frozen=True, eq=False)
