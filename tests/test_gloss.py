@@ -12,7 +12,8 @@ from handmade import HandCatalogue, furnished
 
 from assets.records import Finish
 from embodied.render.camera import Camera
-from embodied.render.gloss import Gloss, Shine, film, light_of, schlick, shown_of
+from embodied.render.film import film, light_of, shown_of
+from embodied.render.gloss import Gloss, Shine, schlick
 from embodied.render.pictures import PictureSettings
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.world import open_world

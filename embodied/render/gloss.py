@@ -22,6 +22,8 @@ import numpy as np
 from embodied.errors import UnableError
 from embodied.geometry import r2
 from embodied.render.camera import Camera
+from embodied.render.film import light_of, shown_of
+from embodied.render.mirrored import TILE, Mirrored, evened
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 MATTE = 0.7
@@ -40,10 +42,6 @@ COARSER = 4
 """Texels of a page, in one direction, that are averaged for what rough surfaces mirror."""
 LIFT = 1e-3
 """Metres that a ray begins above its surface."""
-TILE = 4
-"""Pixels after which the directions in the lobe repeat."""
-CREASE = 0.9
-"""Cosine of two normals below which they belong to two surfaces."""
 ROOKS = ((-0.25, -0.25), (0.25, 0.25))
 """Where in a pixel smooth surfaces are looked at, from its centre: no two in a row or column."""
 WHITE = 5.0
@@ -115,7 +113,8 @@ class Gloss:
         h, w = rgb.shape[:2]
         out = np.array(rgb)
         seen = self._seen(camera, _directions(camera, (h, w), step=2))
-        grid = _Grid(((h + 1) // 2, (w + 1) // 2), seen, self._faces.owner[seen.face])
+        owner = self._faces.owner[seen.face]
+        grid = Mirrored(((h + 1) // 2, (w + 1) // 2), seen.pixel, owner, seen.normal, seen.dull)
         if seen.dull.any():
             self._rough(seen, camera, grid)
             values = self._enlarged(camera, grid, (h, w))
@@ -199,7 +198,7 @@ class Gloss:
             out[i] = light_of(upper * (1 - fy) + lower * fy)
         return out
 
-    def _rough(self, seen: _Seen, camera: Camera, grid: _Grid) -> None:
+    def _rough(self, seen: _Seen, camera: Camera, grid: Mirrored) -> None:
         """Fill `grid` with what rough surfaces lose and mirror, averaged over neighbours on the same surface."""
         row, column = np.divmod(seen.pixel, grid.shape[1])
         chosen, k = seen.of(seen.dull), ((row % TILE) * TILE + column % TILE)[seen.dull]
@@ -209,7 +208,7 @@ class Gloss:
         grid.weight.ravel()[chosen.pixel] = 1
         grid.smooth()
 
-    def _enlarged(self, camera: Camera, grid: _Grid, size: tuple[int, int]) -> np.ndarray:
+    def _enlarged(self, camera: Camera, grid: Mirrored, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 6) what is lost and mirrored, in full size: between surfaces every pixel asks whose it is."""
         h, w = size
         values = cv2.resize(grid.values, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_LINEAR)[:h, :w]
@@ -244,7 +243,7 @@ class Gloss:
         sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(a.shape[1])], axis=1) / len(ROOKS)
         mirrored, rough = sums(np.minimum(mirrored, WHITE)), sums((seen.rough >= SMOOTH)[:, None])[:, 0] > 0.5
         if rough.any():
-            mirrored[rough] = _evened(mirrored[rough], where[rough], rgb.shape[:2])
+            mirrored[rough] = evened(mirrored[rough], where[rough], rgb.shape[:2])
         own = light_of(out.reshape(-1, 3)[where])
         out.reshape(-1, 3)[where] = shown_of(own * (1 - sums(lost)) + mirrored)
 
@@ -274,136 +273,10 @@ class _Seen:
         return _Seen(*(getattr(self, name)[which] for name in names))
 
 
-class _Grid:
-    """A picture of half the size: whose surface each pixel shows, and what it loses and mirrors."""
-
-    def __init__(self, shape: tuple[int, int], seen: _Seen, owner: np.ndarray) -> None:
-        """`owner`: (n,) of what was seen."""
-        self.shape = shape
-        self.owner = np.full(shape, -1, np.int32)
-        self.owner.ravel()[seen.pixel] = np.where(seen.dull, owner, -2 - owner)
-        self.normal = np.zeros((*shape, 3), np.float32)
-        self.normal.reshape(-1, 3)[seen.pixel] = seen.normal
-        self.values = np.zeros((*shape, 6), np.float32)
-        self.weight = np.zeros((*shape, 1), np.float32)
-
-    def smooth(self) -> None:
-        """Average over TILE pixels along rows and then columns, on the same surface."""
-        for axis, step in ((1, 1), (0, 1), (1, 3), (0, 3)):
-            total, weight = self.values.copy(), self.weight.copy()
-            for k in range(1, TILE // 2 + 1):
-                share = np.float32(0.5 if k == TILE // 2 else 1.0)
-                near, far = _apart(axis, k * step)
-                same = (self._alike(near, far) * share)[..., None]
-                total[near] += self.values[far] * same
-                total[far] += self.values[near] * same
-                weight[near] += self.weight[far] * same
-                weight[far] += self.weight[near] * same
-            self.values, self.weight = total, weight
-        self.values /= np.maximum(self.weight, 1e-6)
-
-    def edges(self) -> np.ndarray:
-        """(h, w) uint8: pixels beside another surface of which one mirrors."""
-        edge = np.zeros(self.shape, np.uint8)
-        for axis in (0, 1):
-            near, far = _apart(axis, 1)
-            other = ~self._alike(near, far) & ((self.owner[near] >= 0) | (self.owner[far] >= 0))
-            edge[near] |= other
-            edge[far] |= other
-        return edge
-
-    def nearest(self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """(n, 6) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
-        total, found = self._around(row, column, owner, normal, (0, 1))
-        if len(left := np.flatnonzero(~found)):
-            total[left] = self._around(row[left], column[left], owner[left], normal[left], (-1, 0, 1, 2))[0]
-        return total
-
-    def _around(
-        self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray, steps: Sequence[int]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """`nearest` among so many neighbours each way, and for which pixels there was one; zeros for the others."""
-        h, w = self.shape
-        y0, x0 = (row - 1) >> 1, (column - 1) >> 1
-        y, x = (row - 0.5) / 2 - y0, (column - 0.5) / 2 - x0
-        owners, normals, values = self.owner.ravel(), self.normal.reshape(-1, 3), self.values.reshape(-1, 6)
-        total, weight = np.zeros((len(row), 6), np.float32), np.zeros(len(row), np.float32)
-        for dy in steps:
-            for dx in steps:
-                at = np.clip(y0 + dy, 0, h - 1) * w + np.clip(x0 + dx, 0, w - 1)
-                near = np.exp(-2 * ((y - dy) ** 2 + (x - dx) ** 2)).astype(np.float32)
-                near *= (owners[at] == owner) & (np.einsum("ij,ij->i", normals[at], normal) > CREASE)
-                total += values[at] * near[:, None]
-                weight += near
-        return total / np.maximum(weight, 1e-6)[:, None], weight > 0
-
-    def _alike(self, near: tuple[slice, slice], far: tuple[slice, slice]) -> np.ndarray:
-        """Whether pixels and their neighbours show the same surface."""
-        same = self.owner[near] == self.owner[far]
-        return same & (np.einsum("ijk,ijk->ij", self.normal[near], self.normal[far]) > CREASE)
-
-
-def _evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(n, 3) values of pixels, averaged over those of them around each that look along the other directions of the
-    lobe: TILE rows, two columns."""
-    sums = np.zeros((size[0] * size[1], 4), np.float32)
-    sums[pixels, :3], sums[pixels, 3] = values, 1
-    across, down = np.array([0.5, 1, 0.5]), np.array([0.5, 1, 1, 1, 0.5])
-    sums = cv2.sepFilter2D(sums.reshape(*size, 4), -1, across, down, borderType=cv2.BORDER_CONSTANT)
-    sums = sums.reshape(-1, 4)[pixels]
-    return sums[:, :3] / sums[:, 3:]
-
-
-def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Index of all pixels but the last k along `axis`, and of all but the first k."""
-    near, far = slice(None, -k), slice(k, None)
-    return ((near, slice(None)), (far, slice(None))) if axis == 0 else ((slice(None), near), (slice(None), far))
-
-
 def schlick(f0: np.ndarray, cos: np.ndarray, rough: np.ndarray) -> np.ndarray:
     """Share of the light that is mirrored: Schlick 1994, less at grazing angles on rough surfaces, as in the tracer."""
     grazing = np.square(np.square(1 - cos)) * (1 - cos)
     return f0 + (1 - f0) * grazing * (1 - 0.9 * np.square(rough))
-
-
-def light_of(rgb: np.ndarray) -> np.ndarray:
-    """Exposed light of shown values from 0 to 255, float32, between whole values too: the bake's film curve undone,
-    channel by channel, which is exact for greys and near enough for colours."""
-    if rgb.dtype == np.uint8:
-        return _light_of_values()[rgb]
-    return np.interp(rgb, np.arange(256), _light_of_values()).astype(np.float32)
-
-
-def shown_of(light: np.ndarray) -> np.ndarray:
-    """Exposed light as uint8: the inverse of `light_of`."""
-    codes = (light / (1 + light) * (CODES - 1) + 0.5).astype(np.int32)
-    return _values_of_light()[codes]
-
-
-CODES = 16384
-
-
-@functools.cache
-def _values_of_light() -> np.ndarray:
-    """(CODES,) uint8 of light x at x / (1 + x), evenly."""
-    t = np.arange(CODES) / CODES
-    return (np.clip(film(t / (1 - t)), 0, 1) * 255 + 0.5).astype(np.uint8)
-
-
-@functools.cache
-def _light_of_values() -> np.ndarray:
-    """(256,) float32."""
-    t = np.arange(CODES) / CODES
-    x = t / (1 - t)
-    return np.interp(np.arange(256) / 255, film(x)[x <= 5], x[x <= 5]).astype(np.float32)
-
-
-def film(x: np.ndarray) -> np.ndarray:
-    """Exposed light of a grey as sRGB in [0, 1]: the curve of embodied.light.tone, which this module may not import;
-    a test compares them."""
-    y = np.minimum(x * (1 + x / 25.0) / (1 + x), 1.0)
-    lifted = np.where(y <= 0.0031308, 12.92 * y, 1.055 * y ** (1 / 2.4) - 0.055) * 1.12
-    return lifted - np.square(np.maximum(lifted - 0.78, 0)) * (0.12 / 0.34**2)
 
 
 def _half_vectors(normal: np.ndarray, rough: np.ndarray, k: np.ndarray) -> np.ndarray:

@@ -1,0 +1,107 @@
+"""What a picture's surfaces mirror, in half its size: averaged over neighbours on the same surface, and enlarged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+TILE = 4
+"""Pixels after which the directions in the lobe repeat."""
+CREASE = 0.9
+"""Cosine of two normals below which they belong to two surfaces."""
+
+
+class Mirrored:
+    """A picture of half the size: whose surface each pixel shows, and what it loses and mirrors."""
+
+    def __init__(
+        self, shape: tuple[int, int], pixel: np.ndarray, owner: np.ndarray, normal: np.ndarray, dull: np.ndarray
+    ) -> None:
+        """
+        Args:
+          pixel: (n,) flat positions in the picture of what was seen.
+          owner: (n,) whose surface it is.
+          normal: (n, 3) of it, towards the camera.
+          dull: (n,) bool, whether it is looked at in this size.
+        """
+        self.shape = shape
+        self.owner = np.full(shape, -1, np.int32)
+        self.owner.ravel()[pixel] = np.where(dull, owner, -2 - owner)
+        self.normal = np.zeros((*shape, 3), np.float32)
+        self.normal.reshape(-1, 3)[pixel] = normal
+        self.values = np.zeros((*shape, 6), np.float32)
+        self.weight = np.zeros((*shape, 1), np.float32)
+
+    def smooth(self) -> None:
+        """Average over TILE pixels along rows and then columns, on the same surface."""
+        for axis, step in ((1, 1), (0, 1), (1, 3), (0, 3)):
+            total, weight = self.values.copy(), self.weight.copy()
+            for k in range(1, TILE // 2 + 1):
+                share = np.float32(0.5 if k == TILE // 2 else 1.0)
+                near, far = _apart(axis, k * step)
+                same = (self._alike(near, far) * share)[..., None]
+                total[near] += self.values[far] * same
+                total[far] += self.values[near] * same
+                weight[near] += self.weight[far] * same
+                weight[far] += self.weight[near] * same
+            self.values, self.weight = total, weight
+        self.values /= np.maximum(self.weight, 1e-6)
+
+    def edges(self) -> np.ndarray:
+        """(h, w) uint8: pixels beside another surface of which one mirrors."""
+        edge = np.zeros(self.shape, np.uint8)
+        for axis in (0, 1):
+            near, far = _apart(axis, 1)
+            other = ~self._alike(near, far) & ((self.owner[near] >= 0) | (self.owner[far] >= 0))
+            edge[near] |= other
+            edge[far] |= other
+        return edge
+
+    def nearest(self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """(n, 6) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
+        total, found = self._around(row, column, owner, normal, (0, 1))
+        if len(left := np.flatnonzero(~found)):
+            total[left] = self._around(row[left], column[left], owner[left], normal[left], (-1, 0, 1, 2))[0]
+        return total
+
+    def _around(
+        self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray, steps: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`nearest` among so many neighbours each way, and for which pixels there was one; zeros for the others."""
+        h, w = self.shape
+        y0, x0 = (row - 1) >> 1, (column - 1) >> 1
+        y, x = (row - 0.5) / 2 - y0, (column - 0.5) / 2 - x0
+        owners, normals, values = self.owner.ravel(), self.normal.reshape(-1, 3), self.values.reshape(-1, 6)
+        total, weight = np.zeros((len(row), 6), np.float32), np.zeros(len(row), np.float32)
+        for dy in steps:
+            for dx in steps:
+                at = np.clip(y0 + dy, 0, h - 1) * w + np.clip(x0 + dx, 0, w - 1)
+                near = np.exp(-2 * ((y - dy) ** 2 + (x - dx) ** 2)).astype(np.float32)
+                near *= (owners[at] == owner) & (np.einsum("ij,ij->i", normals[at], normal) > CREASE)
+                total += values[at] * near[:, None]
+                weight += near
+        return total / np.maximum(weight, 1e-6)[:, None], weight > 0
+
+    def _alike(self, near: tuple[slice, slice], far: tuple[slice, slice]) -> np.ndarray:
+        """Whether pixels and their neighbours show the same surface."""
+        same = self.owner[near] == self.owner[far]
+        return same & (np.einsum("ijk,ijk->ij", self.normal[near], self.normal[far]) > CREASE)
+
+
+def evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(n, 3) values of pixels, averaged over those of them around each that look along the other directions of the
+    lobe: TILE rows, two columns."""
+    sums = np.zeros((size[0] * size[1], 4), np.float32)
+    sums[pixels, :3], sums[pixels, 3] = values, 1
+    across, down = np.array([0.5, 1, 0.5]), np.array([0.5, 1, 1, 1, 0.5])
+    sums = cv2.sepFilter2D(sums.reshape(*size, 4), -1, across, down, borderType=cv2.BORDER_CONSTANT)
+    sums = sums.reshape(-1, 4)[pixels]
+    return sums[:, :3] / sums[:, 3:]
+
+
+def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Index of all pixels but the last k along `axis`, and of all but the first k."""
+    near, far = slice(None, -k), slice(k, None)
+    return ((near, slice(None)), (far, slice(None))) if axis == 0 else ((slice(None), near), (slice(None), far))
