@@ -12,6 +12,8 @@ from assets.cache import atomic_path
 from embodied.evaluation.tables import Estimate
 
 COLOURS = ("#2b6cb0", "#c05621", "#718096", "#2f855a")
+DASHES = ("-", "--", ":", "-")
+"""So that two learners who learn nothing are both seen."""
 LABELS = {"success": "validation success (%)", "training success": "cumulative training success (%)"}
 
 
@@ -23,15 +25,18 @@ def curves_figure(curves: Mapping[str, Mapping[str, Sequence[tuple[float, Estima
     """
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     for axes, (what, label) in zip(figure.subplots(1, 2), LABELS.items(), strict=True):
-        for colour, (name, both) in zip(COLOURS, curves.items(), strict=False):
+        highest = 0.0
+        for colour, dashes, (name, both) in zip(COLOURS, DASHES, curves.items(), strict=False):
             at = np.array([n / 1000 for n, _ in both[what]])
             mean = 100 * np.array([e.mean for _, e in both[what]])
             half = 100 * np.nan_to_num([e.half for _, e in both[what]])
-            axes.plot(at, mean, color=colour, label=name)
+            axes.plot(at, mean, dashes, color=colour, label=name)
             axes.fill_between(at, mean - half, mean + half, color=colour, alpha=0.2, linewidth=0)
+            highest = max(highest, *mean)
         axes.set_xlabel("training episodes (thousands)")
         axes.set_ylabel(label)
-        axes.set_ylim(0, 100)
+        top = 100.0 if highest > 50 else max(1.5 * highest, 1.0)
+        axes.set_ylim(-0.02 * top, top)
         axes.grid(alpha=0.3)
     figure.axes[0].legend(fontsize=8)
     _save(figure, path)
