@@ -113,6 +113,8 @@ def score_of(episode: Episode, graph: NavGraph, kind: str) -> float:
     """The true score of an episode in [0, 1], which only the rater sees."""
     if kind == "success":
         return metrics.success(episode, graph)
+    if kind == "SDTW" and not metrics.success(episode, graph):
+        return 0.0
     start = episode.task.start.node
     goal = min(episode.task.goal_nodes, key=lambda g: (graph.distance[start, g], g))
     return metrics.ndtw(metrics.without_repeats(episode.nodes), shortest_path(graph, start, goal), graph)

@@ -15,7 +15,10 @@ from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.hanna.agent import HannaAgent, load_agent
+from agents.hanna.asking import RULES
+from agents.hanna.policy import for_training
 from agents.imitation.lessons import Split, split_of
+from agents.imitation.studies import history_of
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import dataset_of
@@ -33,7 +36,8 @@ SWEEPS: Mapping[str, Sequence[float]] = {
     "skew": (0.25, 0.5, 2, 4),
 }
 """A granularity of 4 is one to five stars, of 9 one to ten."""
-COLUMNS = ("success", "nDTW", "requests")
+DECISIONS = ("drawn", "usual")
+COLUMNS = ("success", "SDTW", "requests")
 
 
 @dataclass(frozen=True)
@@ -51,11 +55,16 @@ class NavigationSetting:
     """One run of each rater per seed."""
     split: str = "test_unseen"
     """Whose houses are judged in; nobody rated an episode there."""
+    rated: str = "train"
+    """Whose houses and tasks are rated in."""
     tasks: int | None = None
     """Judge on at most so many tasks."""
     threads: int = 1
     judgings: int = 3
     """How often each task is judged, each time with another seed: agents draw what they do."""
+    decisions: str = "drawn"
+    """Judged with moves and questions 'drawn' from the networks, as they are while they are rated, or with the
+    'usual' ones of `embodied judge`, which asks where that is likelier than not."""
 
 
 def raters() -> dict[str, Rater]:
@@ -68,13 +77,20 @@ def run_navigation_study(setting: NavigationSetting, only: Sequence[str] | None 
     """Run and judge what is missing; write table and figure of all that is there; returns the table's path.
 
     Raises:
-      ValueError: an unknown rater, or a data set without the agent's features.
+      ValueError: an unknown rater, unknown decisions, houses that are rated and judged in, or a data set without
+        the agent's features.
     """
+    if setting.decisions not in DECISIONS:
+        raise ValueError(f"decisions must be one of {DECISIONS}, got {setting.decisions!r}")
     if unknown := [name for name in only or () if name not in raters()]:
         raise ValueError(f"unknown raters {unknown}; there are {list(raters())}")
     torch.set_num_threads(setting.threads)
     data = dataset_of(setting.data, "hanna")
-    rated, judged = split_of(data, "train", setting.encoder), split_of(data, setting.split, setting.encoder)
+    if both := set(data.names(setting.rated)) & set(data.names(setting.split)):
+        raise ValueError(
+            f"{len(both)} houses of {setting.split!r} are rated in, too ({setting.rated!r}); judge in others"
+        )
+    rated, judged = (split_of(data, name, setting.encoder) for name in (setting.rated, setting.split))
     return run_raters(setting, rated, judged, list(only or raters()), note=note)
 
 
@@ -108,6 +124,8 @@ def _judge(setting: NavigationSetting, split: Split, name: str | None, seed: int
         return
     agent: HannaAgent = load_agent(setting.agent if name is None else folder / "agent.safetensors")
     policy, tasks = agent.policy(split.bank), spread(split.tasks, setting.tasks)
+    if setting.decisions == "drawn":
+        policy = dataclasses.replace(for_training(policy, RULES[agent.config.ask_rule][0]), keep_moments=False)
     for k in missing:
         with torch.inference_mode():
             episodes = play(split.make_env, policy, tasks, seed=k, batch=32)
@@ -134,9 +152,23 @@ def values(episodes: Sequence[Episode], split: Split) -> dict[str, np.ndarray]:
     pairs = list(zip(episodes, graphs, strict=True))
     return {
         "success": np.array([100 * metrics.success(e, g) for e, g in pairs]),
-        "nDTW": np.array([100 * score_of(e, g, "nDTW") for e, g in pairs]),
+        "SDTW": np.array([100 * score_of(e, g, "SDTW") for e, g in pairs]),
         "requests": np.array([float(e.requests) for e in episodes]),
     }
+
+
+def rise(scores: Sequence[Sequence[float]], untaught: int) -> Estimate:
+    """How much the last quarter of the updates scores more than the first `untaught` ones, before anything is learned.
+
+    In points of 100; every update plays other tasks of the rated houses, so updates are what varies.
+
+    Args:
+      scores: per seed, the mean true score of each update's episodes.
+    """
+    first = np.concatenate([100 * np.array(one[: max(untaught, 1)]) for one in scores])
+    last = np.concatenate([100 * np.array(one[-max(len(one) // 4, 1) :]) for one in scores])
+    error = sum(a.var(ddof=1) / len(a) for a in (first, last)) if min(len(first), len(last)) > 1 else np.nan
+    return Estimate(float(last.mean() - first.mean()), float(1.96 * np.sqrt(error)), len(scores))
 
 
 def gain(after: Sequence[np.ndarray], before: np.ndarray, houses: Sequence[str]) -> Estimate:
@@ -154,6 +186,8 @@ def _write(setting: NavigationSetting, split: Split) -> Path:
         if all(judged):
             after = [values(episodes, split) for episodes in judged]
             found[name] = {c: gain([a[c] for a in after], before[c], houses) for c in COLUMNS}
+            histories = [history_of(_folder(setting, name, seed)) for seed in setting.seeds]
+            found[name]["rated"] = rise([[h["score"] for h in one] for one in histories], setting.config.critic_updates)
             each[name] = [float((a["success"] - before["success"]).mean()) for a in after]
     base = {c: estimate(before[c].tolist(), houses) for c in COLUMNS}
     write_json(
@@ -167,7 +201,7 @@ def _write(setting: NavigationSetting, split: Split) -> Path:
 
 
 def _figure(setting: NavigationSetting, found: Mapping[str, Mapping[str, Estimate]]) -> None:
-    columns = {"success": "success (points)", "nDTW": "nDTW (points)"}
+    columns = {"rated": f"{setting.config.score} where rated", "success": "success elsewhere", "SDTW": "SDTW elsewhere"}
     swept = {
         name: {
             v: {columns[c]: found[f"{name} {v:g}"][c] for c in columns} for v in strengths if f"{name} {v:g}" in found
@@ -191,22 +225,23 @@ def _markdown(
     lines = [
         "# Navigation from ratings: gain in houses that were not rated",
         "",
-        "| rater | Δ success (points) | of each seed | Δ nDTW (points) | Δ requests |",
-        "|---|---|---|---|---|",
+        f"| rater | Δ {setting.config.score} where rated | Δ success (points) | of each seed | Δ SDTW (points) "
+        "| Δ requests |",
+        "|---|---|---|---|---|---|",
     ]
     for name, row in found.items():
         seeds = ", ".join(f"{x:+.1f}" for x in each[name])
-        lines.append(
-            f"| {name} | {shown(row['success'])} | {seeds} | {shown(row['nDTW'])} | {shown(row['requests'])} |"
-        )
+        rated, success, sdtw, requests = (shown(row[c]) for c in ("rated", "success", "SDTW", "requests"))
+        lines.append(f"| {name} | {rated} | {success} | {seeds} | {sdtw} | {requests} |")
     missing = [name for name in raters() if name not in found]
     c = setting.config
     how = (
-        f"Before: success {shown(base['success'])} %, nDTW {shown(base['nDTW'])}, {shown(base['requests'])} requests, "
+        f"Before: success {shown(base['success'])} %, SDTW {shown(base['SDTW'])}, {shown(base['requests'])} requests, "
         f"on {base['success'].n // setting.judgings} tasks in {houses} houses ({setting.split}), each judged "
         f"{setting.judgings} times. {c.updates} updates of {c.batch} "
         f"episodes, each rated once by its {c.score}; learning rate {c.learning_rate:g}; seeds "
-        f"{', '.join(map(str, setting.seeds))}. Differences are task by task, averaged over seeds; intervals 95 %, "
-        "clustered by house."
+        f"{', '.join(map(str, setting.seeds))}; decisions {setting.decisions}. Where rated: last quarter of the "
+        f"updates less the first {c.critic_updates}, in which only the critic learns. Elsewhere: differences task by task, "
+        "averaged over seeds; intervals 95 %, clustered by house."
     )
     return "\n".join([*lines, "", how, *([f"Not run: {', '.join(missing)}."] if missing else []), ""])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, require, require_word
 
-SCORES = ("success", "nDTW")
+SCORES = ("success", "nDTW", "SDTW")
 """What a person's stars are simulated from."""
 
 
@@ -26,8 +26,9 @@ class RatingConfig:
     """Adam's, of the critic, which begins untaught."""
     critic_updates: int = 10
     """First updates, in which the critic learns alone."""
-    score: str = "nDTW"
-    """What a rating is made from: 'success', or 'nDTW' of the walk against the shortest one."""
+    score: str = "SDTW"
+    """What a rating is made from: 'success', 'nDTW' of the walk against the shortest one, which teaches to stand
+    still rather than to err (docs/results.md), or 'SDTW': nDTW where the goal was reached, else nothing."""
     clip: float = 5.0
     """Longest gradient."""
     seed: int = 0

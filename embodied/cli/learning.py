@@ -404,6 +404,14 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
         "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
+    parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")
+    parser.add_argument(
+        "--decisions",
+        choices=("drawn", "usual"),
+        default="drawn",
+        help="judge with moves and questions drawn, as they are while they are rated, or as `embodied judge` takes "
+        "them (default: %(default)s)",
+    )
     parser.add_argument(
         "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks, from all houses alike"
     )

@@ -141,10 +141,12 @@ def run_stars(args: argparse.Namespace) -> list[Path]:
         args.out,
         config,
         tuple(config.seed + k for k in range(args.seeds)),
-        args.split,
-        args.tasks,
-        args.threads,
-        args.judgings,
+        split=args.split,
+        rated=args.rated,
+        tasks=args.tasks,
+        threads=args.threads,
+        judgings=args.judgings,
+        decisions=args.decisions,
     )
     return [run_navigation_study(setting, args.only, note=note)]
 
