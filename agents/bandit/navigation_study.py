@@ -241,7 +241,7 @@ def _markdown(
         f"{setting.judgings} times. {c.updates} updates of {c.batch} "
         f"episodes, each rated once by its {c.score}; learning rate {c.learning_rate:g}; seeds "
         f"{', '.join(map(str, setting.seeds))}; decisions {setting.decisions}. Where rated: last quarter of the "
-        f"updates less the first {c.critic_updates}, in which only the critic learns. Elsewhere: differences task by task, "
-        "averaged over seeds; intervals 95 %, clustered by house."
+        f"updates less the first {c.critic_updates}, in which only the critic learns. Elsewhere: differences task by "
+        "task, averaged over seeds; intervals 95 %, clustered by house."
     )
     return "\n".join([*lines, "", how, *([f"Not run: {', '.join(missing)}."] if missing else []), ""])
