@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
 import shapely
+from scipy.spatial import ConvexHull
 
-from assets.built.primitives import Shape, ball, bar, box, extruded, flat, joined, part, sheet, tube
+from assets.built.primitives import Shape, bar, box, extruded, flat, joined, part, sheet, tube
 from assets.records import Finish
 from embodied.house.house import House
 from embodied.scene.part import Part
@@ -21,6 +23,9 @@ GARDEN = 11.0
 """From the house to the hedge, metres."""
 RAIL = Finish(color=(0.10, 0.10, 0.11, 1.0), roughness=0.5)
 BARK = Finish(color=(0.26, 0.21, 0.17, 1.0), roughness=0.95, specular=0.1)
+
+CLUMPS, BUNCHES = 13, 70
+"""Of a tree's crown, and of the leaves of a clump."""
 
 PIECES = ("facade", "roof", "ground", "terrace", "hedge", "trees")
 """Owners outside are 'outdoor/<piece>'."""
@@ -165,17 +170,38 @@ def _trees(
 
 
 def _tree(height: float, *, rng: np.random.Generator) -> tuple[Shape, Shape]:
-    trunk = [tube([(0, 0, -0.2), (0.05, 0.02, height * 0.3), (0.0, 0.05, height * 0.62)], [0.17, 0.13, 0.07], 8)]
-    crown = []
-    for i in range(9):
-        a, r = 2.4 * i, height * (0.07 + 0.13 * rng.random())
-        at = np.array([r * np.cos(a), r * np.sin(a), height * (0.52 + 0.38 * i / 9)])
-        size = height * rng.uniform(0.13, 0.20)
-        s = ball(1.0, 14, 9)
-        v = s.vertices * (1 + 0.10 * np.sin(5 * s.vertices[:, :1] + i) * np.cos(4 * s.vertices[:, 1:2] - i))
-        crown.append(Shape(v * size * [1.1, 1.1, 0.9] + at, s.faces, s.normals, s.uv * size * 1.2))
-        trunk.append(tube([(0, 0.03, height * 0.45), tuple(at)], [0.05, 0.02], 5))
+    """A trunk with branches, and a crown of leafy clumps with gaps between them."""
+    trunk = [tube([(0, 0, -0.2), (0.05, 0.02, height * 0.3), (0.0, 0.05, height * 0.62)], [0.17, 0.13, 0.06], 7)]
+    crown = [_clump(np.array([0.0, 0.05, height * 0.80]), height * 0.17, rng=rng)]
+    for i in range(CLUMPS):
+        yaw, level = 2.4 * i + rng.uniform(-0.4, 0.4), 0.46 + 0.34 * (i + rng.random()) / CLUMPS
+        out = height * (0.24 - 0.30 * (level - 0.46)) * rng.uniform(0.75, 1.15)
+        at = np.array([out * np.cos(yaw), out * np.sin(yaw), height * level])
+        crown.append(_clump(at, height * rng.uniform(0.09, 0.14), rng=rng))
+        trunk.append(tube([(0, 0.03, height * (level - 0.12)), tuple(at)], [0.05, 0.02], 4))
     return joined(*trunk), joined(*crown)
+
+
+def _clump(at: np.ndarray, radius: float, *, rng: np.random.Generator) -> Shape:
+    """Leaves on the end of a branch: a ball whose surface goes in and out by a third from one bunch to the next."""
+    k = np.arange(BUNCHES)
+    z = 1 - (2 * k + 1) / BUNCHES
+    yaw = k * math.pi * (3 - math.sqrt(5)) + rng.uniform(0, 2 * math.pi)
+    out = np.column_stack([np.sqrt(1 - z * z) * np.cos(yaw), np.sqrt(1 - z * z) * np.sin(yaw), z])
+    faces = ConvexHull(out).simplices
+    turned = (
+        np.einsum(
+            "ij,ij->i",
+            np.cross(out[faces[:, 1]] - out[faces[:, 0]], out[faces[:, 2]] - out[faces[:, 0]]),
+            out[faces[:, 0]],
+        )
+        < 0
+    )
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    reach = radius * rng.uniform(0.62, 1.38, BUNCHES)
+    vertices = out * reach[:, None] * [1.15, 1.15, 0.8] + at
+    uv = vertices[:, [0, 2]] + 0.6 * vertices[:, [1, 1]]  # no seam
+    return Shape(vertices, faces, out, uv)
 
 
 def _storey_shell(house: House, k: int) -> tuple[list[Shape], list[Shape]]:
