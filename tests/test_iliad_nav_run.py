@@ -24,7 +24,9 @@ from agents.imitation.checkpoint import CheckpointError
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features
 from embodied.cli import main
+from embodied.datasets.store import Dataset
 from embodied.interface import Stop
+from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
 
 pytestmark = pytest.mark.slow
@@ -66,6 +68,23 @@ def test_held_out_paths_and_houses_are_nobodys_to_learn_from(grounds, source):
     assert {r for part in ("train", "validation") for t in splits[part] for r in t.requests} == asked
     other = source.data(dataclasses.replace(SMALL, data_seed=1))
     assert other.splits["train"] != splits["train"] and other.digest != grounds.data.digest
+
+
+def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
+    """Said plainly here: houses made by hand hold nothing that people have words for."""
+    monkeypatch.setattr("agents.iliad.nav.data.load_catalogue", lambda cache: None)
+    monkeypatch.setattr("agents.iliad.nav.data.People", PlainLanguage)
+    monkeypatch.setattr(Dataset, "open_world", lambda self, name, catalogue, cache: self.place(name))
+    more = dataclasses.replace(SMALL, more_paths=7)
+    found, few = source.data(more).splits, grounds.data.splits
+    assert found["validation"] == few["validation"] and found["test"] == few["test"]
+    added = [t for t in found["train"] if t not in few["train"]]
+    assert len(added) == 7 * len({t.world for t in few["train"]}) and all(len(t.requests) == 3 for t in added)
+    known = {(t.world, t.path) for part in ("train", "validation") for t in few[part]}
+    assert not known & {(t.world, t.path) for t in added}
+    monkeypatch.delattr(Dataset, "open_world")
+    assert source.data(more).splits["train"] == found["train"]
+    assert len(list((source.cache / "nav_paths").iterdir())) == len({t.world for t in few["train"]})
 
 
 @pytest.mark.parametrize("learner", ["adel", "dagger", "binary"])

@@ -35,6 +35,9 @@ class NavConfig:
     """Adam's learning rate for the two."""
     held_out: float = 0.2
     """Share of the paths of houses to learn from that nobody learns, for validation."""
+    more_paths: int = 0
+    """Paths of each house to learn from besides those of the data set, each worded three times by the
+    same people: houses have ten times as many as a data set of Room-to-Room's density."""
     data_seed: int = 0
     """Of which paths are held out, and of the teacher, which all students share."""
 
@@ -48,9 +51,10 @@ class NavConfig:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} must be a multiple of heads {self.heads}")
-        if self.candidates < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
+        if self.candidates < 0 or self.more_paths < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
             raise ValueError(
-                f"candidates {self.candidates} must not be negative, teacher_rate {self.teacher_rate} above 0, "
+                f"candidates {self.candidates} and more_paths {self.more_paths} must not be negative, "
+                f"teacher_rate {self.teacher_rate} above 0, "
                 f"held_out {self.held_out} between 0 and 1"
             )
 

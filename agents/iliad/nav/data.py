@@ -14,7 +14,13 @@ from agents.vision.config import drawing
 from agents.vision.features import feature_path, load_bank
 from agents.vision.run import pictures_of
 from assets.cache import digest
+from assets.catalogue import load_catalogue
+from assets.closure import code_digest
+from embodied.assistants.route_system import RouteConfig, sampled_paths, worded
 from embodied.datasets.store import Dataset
+from embodied.interface import Route
+from embodied.language import People
+from embodied.records import load_lines, save_lines
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 
@@ -41,16 +47,21 @@ class NavData:
         return digest([self.source.digest, trips, self.eyes.bank.digest, self.pictures])
 
 
-def nav_data(source: Dataset, config: NavConfig, encoder: str, quality: str | None = None) -> NavData:
+def nav_data(
+    source: Dataset, config: NavConfig, encoder: str, quality: str | None = None, *, cache: Path | None = None
+) -> NavData:
     """A data set `vln` or `hanna` with features as the data of NAV.
 
     Args:
       encoder: digest of the encoder that made the features.
       quality: of the pictures, as in agents.vision.run.pictures_of.
+      cache: where catalogue, sightings and more paths are kept; only they need it.
 
     Raises:
       FileNotFoundError, ValueError: no features of this encoder, or others.
     """
+    if config.more_paths and cache is None:
+        raise ValueError("more_paths need the cache: the grammar names what can be seen in the houses")
     training, unseen = source.names("train"), source.names(UNSEEN)
     splits: dict[str, list[Trip]] = {"train": [], "validation": [], "test": []}
     for name in training:
@@ -59,6 +70,8 @@ def nav_data(source: Dataset, config: NavConfig, encoder: str, quality: str | No
         held = set(order[: round(config.held_out * len(trips))])
         splits["train"] += [t for i, t in enumerate(trips) if i not in held]
         splits["validation"] += [one for i in sorted(held) for one in each_wording(trips[i])]
+        if cache is not None and config.more_paths:
+            splits["train"] += more_trips(source, name, trips, config, cache)
     splits["test"] = [one for name in unseen for trip in house_trips(source, name) for one in each_wording(trip)]
     names = (*training, *unseen)
     places = {name: source.place(name) for name in names}
@@ -73,6 +86,23 @@ def nav_data(source: Dataset, config: NavConfig, encoder: str, quality: str | No
 def house_trips(source: Dataset, name: str) -> list[Trip]:
     """The paths of a house with all of their wordings."""
     return trips_of([vln_task(name, route) for route in source.routes(name)])
+
+
+def more_trips(source: Dataset, name: str, known: Sequence[Trip], config: NavConfig, cache: Path) -> list[Trip]:
+    """Other paths of a house, of the same lengths, worded three times by the same people; fewer where it has fewer."""
+    code = code_digest("embodied.language.voice", "embodied.assistants.route_system")
+    key = digest([source.digest, name, config.more_paths, config.data_seed, code])
+    path = cache / "nav_paths" / f"{key[:32]}.jsonl"
+    if path.exists():
+        return trips_of([vln_task(name, route) for route in load_lines(path, Route)])
+    world = source.open_world(name, load_catalogue(cache), cache)
+    taken = {trip.path for trip in known}
+    rng = stream(config.data_seed, "nav", "more", name)
+    every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng, config=RouteConfig())
+    paths = [p for p in every if p not in taken][: config.more_paths]
+    routes = worded(world, paths, ("train_seen",) * 3, seed=config.data_seed, language=People())
+    save_lines(path, routes)
+    return trips_of([vln_task(name, route) for route in routes])
 
 
 def each_wording(trip: Trip) -> list[Trip]:

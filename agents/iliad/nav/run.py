@@ -42,7 +42,7 @@ class NavSource:
         Raises:
           FileNotFoundError, ValueError: a data set of another kind, or without such features.
         """
-        return nav_data(dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.quality)
+        return nav_data(dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.quality, cache=self.cache)
 
 
 @dataclass(frozen=True, eq=False)
