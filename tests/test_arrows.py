@@ -112,9 +112,9 @@ agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teac
 agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
     embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file agents.vision
     embodied.render embodied.locks
-agents.iliad <- agents.imitation embodied.action_spaces embodied.assistants embodied.interface embodied.navigation embodied.teachers
-    assets.catalogue embodied.language embodied.tasks embodied.envs embodied.datasets embodied.evaluation embodied.records
-    agents.vision agents.hanna agents.tensor_file embodied.locks
+agents.iliad <- agents.imitation embodied.action_spaces embodied.assistants embodied.interface embodied.navigation
+    embodied.teachers assets.catalogue embodied.language embodied.tasks embodied.envs embodied.datasets
+    embodied.evaluation embodied.records agents.vision agents.hanna agents.tensor_file embodied.locks
 agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
 agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface
