@@ -9,3 +9,4 @@ SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "han
 SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
 SHIPPED_VNLA = WEIGHTS / "vnla_mini.safetensors"
 SHIPPED_STUDENT = WEIGHTS / "iliad_regex_tiny.safetensors"
+SHIPPED_WALKER = WEIGHTS / "iliad_nav_tiny.safetensors"

@@ -3,12 +3,12 @@
     embodied iliad --request "drop every vowel" --word banana
     embodied iliad --shared SHARED
     embodied iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
-    embodied iliad STUDY/students/grammar/seed_0/adel_0.5/best.safetensors --world nav --data DATA --rrd walk.rrd
+    embodied iliad --world nav --data DATA --rrd walk.rrd
 
-The student is the shipped one, or one of `embodied train iliad` or `embodied study iliad`, whose
+The student is the shipped one of its world, or one of `embodied train iliad` or `embodied study iliad`, whose
 data and teacher are in the folder `shared` beside it. The shipped one's are made there if they are missing.
-NAV's student walks through the houses of a data set (`embodied dataset vln`, `embodied features`); --teacher grammar
-lets whoever words routes here describe its walks instead of the trained describer.
+NAV's student walks through the houses of a data set (`embodied dataset vln` or `hanna`, `embodied features`); --teacher
+grammar lets whoever words routes here describe its walks instead of a trained describer.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         type=any_path,
         nargs="?",
         metavar="FILE",
-        help="a trained student, best.safetensors (default: the one that ships, REGEX)",
+        help="a trained student, best.safetensors (default: the one of its world that ships)",
     )
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="words, or houses (default: regex)")
     parser.add_argument("--shared", type=any_folder, metavar="DIR", help="folder with data and teacher of its study")
@@ -52,9 +52,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.shipped import SHIPPED_STUDENT
+    from agents.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
 
     if args.world == "nav":
+        args.student = args.student or SHIPPED_WALKER
         return walks(args)
     args.student = args.student or SHIPPED_STUDENT
     for name in ("data", "teacher", "rrd"):
@@ -108,10 +109,9 @@ def walks(args: argparse.Namespace) -> int:
     from agents.vision.run import encoder_of
     from embodied.seeds import stream
 
-    if args.data is None or args.student is None:
+    if args.data is None:
         raise ValueError(
-            "--world nav wants FILE, a student of `embodied train iliad nav`, and --data, a folder that `embodied "
-            "dataset vln` built, with features"
+            "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
         )
     source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
     config: NavConfig = config_of(args.student)
@@ -119,7 +119,8 @@ def walks(args: argparse.Namespace) -> int:
     if teacher == "learned" and args.shared is None:
         raise ValueError("--shared should be the folder of the describer and its executor; or give --teacher grammar")
     shared = args.shared or args.data  # the grammar needs no folder
-    grounds = prepare(dataclasses.replace(config, teacher=teacher), source, shared, note=note)
+    more = config.more_paths if teacher == "learned" else 0  # who was taught knows them; the grammar needs none
+    grounds = prepare(dataclasses.replace(config, teacher=teacher, more_paths=more), source, shared, note=note)
     student, _ = load_follower(args.student, grounds.data.eyes)
     trips = grounds.data.splits[args.split]
     order = stream(args.seed, "iliad", "shown").permutation(len(trips))[: args.episodes]
