@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from agents.bandit.navigation import (
     score_of,
     shortest_path,
 )
-from agents.bandit.navigation_study import NavigationSetting, gain, raters, rise, run_raters
+from agents.bandit.navigation_study import NavigationSetting, gain, raters, rise, run_navigation_study, run_raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
@@ -186,6 +187,9 @@ def test_raters_are_named_by_their_one_fault():
 def test_settings_are_checked():
     with pytest.raises(ValueError, match="score must be one of"):
         RatingConfig(score="stars")
+    setting = NavigationSetting(Path("data"), None, Path("agent"), Path("out"), STARS, (0,), decisions="best")
+    with pytest.raises(ValueError, match="decisions must be one of"):
+        run_navigation_study(setting)
     assert navigation.StateCritic(4)(torch.zeros(3, 2, 4)).shape == (3, 2)
 
 

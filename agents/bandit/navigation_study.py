@@ -119,7 +119,7 @@ def _learn(setting: NavigationSetting, split: Split, name: str, seed: int, note:
 def _judge(setting: NavigationSetting, split: Split, name: str | None, seed: int | None, note: Note) -> None:
     """Play the tasks to be judged on, as `embodied judge` does, and keep the episodes."""
     folder = _folder(setting, name, seed)
-    missing = [k for k in range(setting.judgings) if not _episodes_file(folder, k).exists()]
+    missing = [k for k in range(setting.judgings) if not _episodes_file(setting, folder, k).exists()]
     if not missing:
         return
     agent: HannaAgent = load_agent(setting.agent if name is None else folder / "agent.safetensors")
@@ -129,20 +129,20 @@ def _judge(setting: NavigationSetting, split: Split, name: str | None, seed: int
     for k in missing:
         with torch.inference_mode():
             episodes = play(split.make_env, policy, tasks, seed=k, batch=32)
-        save_lines(_episodes_file(folder, k), episodes)
+        save_lines(_episodes_file(setting, folder, k), episodes)
         success = np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes])
         note(
             f"{folder}: success {100 * success:.1f} % on {len(episodes)} tasks of {setting.split}, judged with seed {k}"
         )
 
 
-def _episodes_file(folder: Path, judging: int) -> Path:
-    return folder / f"episodes_{judging}.jsonl"
+def _episodes_file(setting: NavigationSetting, folder: Path, judging: int) -> Path:
+    return folder / f"episodes_{setting.decisions}_{judging}.jsonl"
 
 
 def _judged(setting: NavigationSetting, folder: Path) -> list[Episode]:
     """The episodes of all judgings, one after the other; none if one is missing."""
-    paths = [_episodes_file(folder, k) for k in range(setting.judgings)]
+    paths = [_episodes_file(setting, folder, k) for k in range(setting.judgings)]
     return [e for path in paths for e in load_lines(path, Episode)] if all(p.exists() for p in paths) else []
 
 
