@@ -273,7 +273,10 @@ def _write_held_out(setting: BanditStudySetting) -> Path:
     found = {seed: [_behaviour(setting, seed, job) for job in jobs] for seed in done(setting, *jobs)}
     seeds = [seed for seed, row in found.items() if all(row)]
     if not seeds:
-        raise ValueError(f"{setting.out}: no seed has the three learners after one pass; run it without --report")
+        raise ValueError(
+            f"{setting.out}: no seed has the three learners after one pass: either they were not run yet (leave "
+            "--report out) or 3.4 went on with them for more passes (take another --out, or ask for held-out first)"
+        )
     each = {job.learner: [found[seed][i] for seed in seeds] for i, job in enumerate(jobs)}
     base = each["reference"]
     rows = []
