@@ -12,7 +12,7 @@ import torch
 
 from agents.bandit.figures import gains_figure
 from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
-from agents.bandit.rating_config import RatingConfig
+from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.asking import RULES
@@ -36,7 +36,6 @@ SWEEPS: Mapping[str, Sequence[float]] = {
     "skew": (0.25, 0.5, 2, 4),
 }
 """A granularity of 4 is one to five stars, of 9 one to ten."""
-DECISIONS = ("drawn", "usual")
 COLUMNS = ("success", "SDTW", "requests")
 
 

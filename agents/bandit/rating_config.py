@@ -8,6 +8,8 @@ from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, require, require_w
 
 SCORES = ("success", "nDTW", "SDTW")
 """What a person's stars are simulated from."""
+DECISIONS = ("drawn", "usual")
+"""How agents decide while they are judged: as while they are rated, or as `embodied judge` has it."""
 
 
 @dataclass(frozen=True)

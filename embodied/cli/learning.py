@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
-from agents.bandit.rating_config import RatingConfig
+from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
@@ -407,7 +407,7 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")
     parser.add_argument(
         "--decisions",
-        choices=("drawn", "usual"),
+        choices=DECISIONS,
         default="drawn",
         help="judge with moves and questions drawn, as they are while they are rated, or as `embodied judge` takes "
         "them (default: %(default)s)",

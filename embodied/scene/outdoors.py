@@ -189,15 +189,9 @@ def _clump(at: np.ndarray, radius: float, *, rng: np.random.Generator) -> Shape:
     yaw = k * math.pi * (3 - math.sqrt(5)) + rng.uniform(0, 2 * math.pi)
     out = np.column_stack([np.sqrt(1 - z * z) * np.cos(yaw), np.sqrt(1 - z * z) * np.sin(yaw), z])
     faces = ConvexHull(out).simplices
-    turned = (
-        np.einsum(
-            "ij,ij->i",
-            np.cross(out[faces[:, 1]] - out[faces[:, 0]], out[faces[:, 2]] - out[faces[:, 0]]),
-            out[faces[:, 0]],
-        )
-        < 0
-    )
-    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    a, b, c = out[faces.T]
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces = np.where(inward[:, None], faces[:, ::-1], faces)
     reach = radius * rng.uniform(0.62, 1.38, BUNCHES)
     vertices = out * reach[:, None] * [1.15, 1.15, 0.8] + at
     uv = vertices[:, [0, 2]] + 0.6 * vertices[:, [1, 1]]  # no seam
