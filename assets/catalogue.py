@@ -71,6 +71,15 @@ class Catalogue:
         """The assets of one class in key order; empty for a class that has none."""
         return self._by_class.get(name, ())
 
+    def only(self, keys: Iterable[str]) -> Catalogue:
+        """A catalogue that has these assets and no others.
+
+        Raises:
+          CatalogueError: unknown key.
+        """
+        kept = {key: self._asset(key) for key in keys}
+        return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
+
     def mesh(
         self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
     ) -> tuple[MeshPart, ...]:

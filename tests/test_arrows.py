@@ -49,6 +49,7 @@ GROUND = {
     "embodied.distribution",
     "embodied.errors",
     "embodied.geometry",
+    "embodied.novelty",
     "embodied.seeds",
 }
 """Rooms that anybody above them may import; they are not named in ARROWS."""

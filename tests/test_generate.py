@@ -17,13 +17,13 @@ from assets.materials import MATERIALS
 from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.clearing import cleared
-from embodied.generate.finishes import TASTES
 from embodied.generate.footprint import draw_footprint
 from embodied.generate.furnish import groups_work as work
 from embodied.generate.furnish.programme import Programme, Wish
 from embodied.generate.furnish.rooms import PROGRAMMES, piece
 from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 from embodied.generate.stages import Draft
+from embodied.generate.tastes import TASTES
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
 from embodied.house.shapes import inward
 from embodied.house.validation import STYLES

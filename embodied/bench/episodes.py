@@ -13,6 +13,7 @@ from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import environment_maker
+from embodied.generate import HouseConfig
 from embodied.interface import Ask, Intention, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
@@ -26,7 +27,7 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     """Environment steps per second of every kind of task, with caches warm, no pixels."""
     language = PlainLanguage()
     for kind, aim in AIMS.items():
-        house, graph = make_dataset_house(seed, "bench", DatasetConfig(kind, "tiny", seed), catalogue)
+        house, graph = make_dataset_house(seed, "bench", HouseConfig(area=DatasetConfig(kind).area), catalogue)
         place = StoredPlace(house, graph)
         routes = build_routes(place, seed=seed, language=language, house_split="test") if kind == "hanna" else ()
         part = "main_unseen" if kind == "hari" else "main"

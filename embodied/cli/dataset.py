@@ -64,6 +64,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-rooms", action="store_true", help="requests name no room: any such thing in the house will do (VNLA)"
     )
+    parser.add_argument(
+        "--ood",
+        type=whole(0),
+        default=0,
+        metavar="N",
+        help="houses out of distribution besides (split 'test_ood'), with furniture, looks, speakers and words that "
+        "all other houses then lack (default: %(default)s)",
+    )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
     _add_drawing(parser)
     parser.add_argument(
@@ -117,6 +125,7 @@ def run(args: argparse.Namespace) -> int:
         not args.no_people,
         args.language,
         rooms=not args.no_rooms,
+        ood=args.ood,
     )
 
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:

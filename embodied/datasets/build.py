@@ -23,12 +23,14 @@ from embodied.assistants.route_system import WORDINGS, route_paths, spanning_pat
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, SplitPlan, quota, scale
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.novelty import furnishable
 from embodied.generate.people import add_people, meet
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.locks import LOCK, locked
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
+from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -37,9 +39,15 @@ from embodied.world import World, open_world
 W = TypeVar("W")
 VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
-VOICES: Mapping[str, Callable[[], Language]] = {"people": People, "plain": PlainLanguage}
+VOICES: Mapping[str, Callable[[str | None], Language]] = {
+    "people": lambda novelty: People(novelty=novelty),
+    "plain": lambda novelty: PlainLanguage(),
+}
+"""Name to a maker of voices, by the novelty of who speaks."""
 GROWTH = 3 * 2**30
 """Bytes by which a worker may grow before it is ended and another one begun."""
+LATER: Mapping[str, object] = {"rooms": True, "ood": 0}
+"""Settings that data sets have not always had, with their defaults."""
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
 
@@ -63,6 +71,9 @@ class DatasetConfig:
     """Who words the routes: 'people' with their habits and landmarks, or 'plain' turns and rooms."""
     rooms: bool = True
     """Whether requests name the room (VNLA); without, any thing of the class in the house will do."""
+    ood: int = 0
+    """Houses out of distribution, split 'test_ood': of models, looks, speakers and words that occur in no other split
+    (embodied.novelty). With any, all other houses are of familiar ones only, so they differ from those without."""
 
     def __post_init__(self) -> None:
         if self.routes not in ("sampled", "spanning"):
@@ -71,13 +82,22 @@ class DatasetConfig:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
         if not self.rooms and self.kind != "vnla":
             raise ValueError(f"tasks without rooms are VNLA's, these are of kind {self.kind!r}; leave rooms as it is")
-        scale(self.scale, self.kind)
+        scale(self.scale, self.kind, self.ood)
+
+    @property
+    def plan(self) -> Scale:
+        """Its houses and splits."""
+        return scale(self.scale, self.kind, self.ood)
+
+    def novelty_of(self, group: str) -> str | None:
+        """What houses of a group are made of, and who speaks in them: all there is, familiar or novel things."""
+        return (NOVEL if group == "ood" else FAMILIAR) if self.ood else None
 
     def facts(self) -> dict[str, object]:
         """The settings as they are written; what came later and is at its default is left out, so that data sets
         without it keep their digests."""
         facts = dataclasses.asdict(self)
-        return {k: v for k, v in facts.items() if k != "rooms" or not v}
+        return {k: v for k, v in facts.items() if k not in LATER or v != LATER[k]}
 
 
 @dataclass(frozen=True)
@@ -109,7 +129,7 @@ class UnitFacts:
 
 
 Watch = Callable[[Iterable[str], int], Iterable[str]]
-HouseMaker = Callable[[int, str, DatasetConfig, Catalogue], tuple[House, NavGraph]]
+HouseMaker = Callable[[int, str, HouseConfig, Catalogue], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
 
 
@@ -141,7 +161,7 @@ def build_dataset(
       LockedError: another process builds it.
     """
     folder = Path(folder)
-    work = units(scale(config.scale, config.kind))
+    work = units(config.plan)
     arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, packs)
     with locked(folder):
         _claim(folder, config)
@@ -181,7 +201,7 @@ def draw_panoramas(
       LockedError: another process writes into the folder.
     """
     arguments = (Path(folder).resolve(), Path(cache), pictures, packs)
-    work = units(scale(config.scale, config.kind))
+    work = units(config.plan)
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
         _sweep(Path(folder), work)
@@ -268,7 +288,7 @@ def build_unit(
     return unit.name
 
 
-def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: Catalogue) -> tuple[House, NavGraph]:
+def make_dataset_house(seed: int, name: str, config: HouseConfig, catalogue: Catalogue) -> tuple[House, NavGraph]:
     """The house `name` of a data set and its graph; a seed that gives no walkable house is passed over.
 
     Raises:
@@ -278,7 +298,7 @@ def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: C
     for attempt in range(SEEDS):
         house_seed = int(stream(seed, "data set house", name, attempt).integers(2**31))
         try:
-            house = generate_house(house_seed, HouseConfig(area=config.area), catalogue)
+            house = generate_house(house_seed, config, catalogue)
             house = dataclasses.replace(house, name=name)
             return house, build_graph(house)
         except HouseError as e:
@@ -289,13 +309,15 @@ def make_dataset_house(seed: int, name: str, config: DatasetConfig, catalogue: C
 def _write_unit(
     unit: Unit, config: DatasetConfig, home: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...]
 ) -> None:
-    catalogue, language = load_catalogue(cache, packs), VOICES[config.language]()
-    house, graph = make_house(config.seed, unit.name, config, catalogue)
-    house_split = "train" if unit.group in ("train", "extra") else unit.group
+    novelty = config.novelty_of(unit.group)
+    catalogue, language = load_catalogue(cache, packs), VOICES[config.language](novelty)
+    house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
+    house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     wording = WORDINGS[house_split]
     paths: list[tuple[int, ...]] = []
     if config.kind in ("hanna", "vln"):
-        met = meet(house, graph, catalogue, seed=config.seed) if config.kind == "hanna" and config.people else None
+        figures = furnishable(catalogue, novelty)
+        met = meet(house, graph, figures, seed=config.seed) if config.kind == "hanna" and config.people else None
         if config.routes == "spanning":
             paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
         else:
@@ -328,7 +350,7 @@ def _write_unit(
 
 def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
     """The splits that a house serves, with its even share of their tasks."""
-    wanted = scale(config.scale, config.kind)
+    wanted = config.plan
     served = []
     for split in wanted.splits:
         if unit.group not in split.all_groups:
@@ -340,7 +362,7 @@ def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
 
 def _part(split: SplitPlan, unit: Unit, kind: str) -> str:
     """Nothing is held out in unseen houses."""
-    return "main_unseen" if kind == "hari" and unit.group in ("val", "test") else split.part
+    return "main_unseen" if kind == "hari" and unit.group in ("val", "test", "ood") else split.part
 
 
 def _claim(folder: Path, config: DatasetConfig) -> None:
@@ -372,7 +394,7 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
     """dataset.json: the table of the splits and a digest of every file; its presence says that all is there."""
     table: dict[str, dict[str, int]] = {}
     files: dict[str, str] = {}
-    for unit in units(scale(config.scale, config.kind)):
+    for unit in units(config.plan):
         home = folder / "houses" / unit.name
         facts = load_json(home / "unit.json", UnitFacts)
         for name, n in facts.tasks.items():
@@ -382,7 +404,7 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
         for path in sorted(home.iterdir()):
             if path.suffix in (".json", ".jsonl"):
                 files[f"{unit.name}/{path.name}"] = digest(path.read_bytes())[:16]
-    order = [s.name for s in scale(config.scale, config.kind).splits]
+    order = [s.name for s in config.plan.splits]
     body = {
         "version": VERSION,
         "config": config.facts(),
@@ -397,6 +419,4 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
 
 def missing_units(config: DatasetConfig, folder: Path) -> Iterator[Unit]:
     """The houses that are not built yet."""
-    return (
-        u for u in units(scale(config.scale, config.kind)) if not (folder / "houses" / u.name / "unit.json").exists()
-    )
+    return (u for u in units(config.plan) if not (folder / "houses" / u.name / "unit.json").exists())

@@ -166,7 +166,8 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
     for name in names_of(data):
         routes[scan_name(name)] = [_route(r, data.place(name).graph) for r in data.routes(name)]
         words.update(w for r in data.routes(name) if r.split == "train_seen" for w in tokenised(r.instruction).split())
-    groups = {g: [scan_name(n) for n in names_of(data) if n.startswith(g)] for g in ("train", "val", "test")}
+    begin: dict[str, tuple[str, ...]] = {"train": ("train",), "val": ("val",), "test": ("test", "ood")}
+    groups = {g: [scan_name(n) for n in names_of(data) if n.startswith(b)] for g, b in begin.items()}
     objects = sorted({sought(t).object_class for s in data.splits for t in data.tasks(s)})
     return [
         *files,

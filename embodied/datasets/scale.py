@@ -15,7 +15,7 @@ class SplitPlan:
 
     name: str
     group: str
-    """The group of houses: 'train', 'extra', 'val' or 'test'. A 'seen' split shares 'train'."""
+    """The group of houses: 'train', 'extra', 'val', 'test' or 'ood'. A 'seen' split shares 'train'."""
     tasks: int
     part: str = "main"
     """Which part of each house's pool: 'main', 'val' or 'test' (held out), 'pretrain', 'pretrain_val',
@@ -108,6 +108,8 @@ SMALL: Mapping[str, tuple[tuple[int, int, int, int], int, int]] = {
 }
 """Houses to learn from, extra ones (HARI), to validate and to test in; training tasks; tasks in unseen houses."""
 SCALES = ("paper", *SMALL)
+OOD = "test_ood"
+"""The split of houses out of distribution: models, looks, speakers and words that occur in no other split."""
 OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)")
 
 
@@ -122,19 +124,21 @@ def own_size(houses: int, tasks: int) -> str:
     return f"{houses}x{tasks}"
 
 
-def scale(name: str, kind: str) -> Scale:
-    """The named scale of a kind of play.
+def scale(name: str, kind: str, ood: int = 0) -> Scale:
+    """The named scale of a kind of play, with `ood` more houses out of distribution to test in (split 'test_ood').
 
     'paper' has the sizes of the dissertation; 'mini' is built in minutes and holds 500 tasks in
     20 unseen houses to judge by; 'midi' has the same unseen houses and five times the houses to
     learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
     are those of the smaller; 'tiny' is for tests. '40x4000' has 40 houses and 4,000 tasks to learn
     from, a tenth as many houses to validate in, a fifth as many to test in and a fifth as many
-    tasks there.
+    tasks there. Houses out of distribution have as many tasks each as the others to test in.
 
     Raises:
-      ValueError: an unknown scale or kind.
+      ValueError: an unknown scale or kind, or a negative number of houses.
     """
+    if ood < 0:
+        raise ValueError(f"the number of houses out of distribution should not be negative, got {ood}")
     if kind not in KINDS:
         raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
     if own := OWN_SIZE.fullmatch(name):
@@ -146,6 +150,10 @@ def scale(name: str, kind: str) -> Scale:
         houses, splits = _small(kind, *SMALL[name])
     else:
         raise ValueError(f"unknown scale {name!r}; use one of {SCALES}, or a size such as '40x4000' (houses x tasks)")
+    if ood:
+        judged = next(s for s in splits if s.group == "test")
+        more = SplitPlan(OOD, "ood", round(judged.tasks / houses["test"] * ood))
+        houses, splits = {**houses, "ood": ood}, (*splits, more)
     return Scale(name, dict(houses), splits)
 
 

@@ -20,7 +20,7 @@ from embodied.datasets.checks import (
     read_config,
     read_index,
 )
-from embodied.datasets.scale import Scale, SplitPlan, scale
+from embodied.datasets.scale import Scale, SplitPlan
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
@@ -42,6 +42,7 @@ ANNA_SPLIT = {
     "test_seen": "train_unseen",
     "val_unseen": "val",
     "test_unseen": "test",
+    "test_ood": "test",
 }
 """Whose wordings are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
 
@@ -81,7 +82,7 @@ class Dataset:
         """
         self.folder = Path(folder)
         self.config = read_config(self.folder)
-        self.scale: Scale = scale(self.config.scale, self.config.kind)
+        self.scale: Scale = self.config.plan
         index = self.folder / "dataset.json"
         if not index.exists():
             missing = len(list(missing_units(self.config, self.folder)))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from embodied.generate.novelty import styles_of
 from embodied.house.house import HouseError
 from embodied.house.validation import STYLES
+from embodied.novelty import NOVELTIES
 
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 AREAS = (32.0, 700.0)
@@ -40,6 +42,9 @@ class HouseConfig:
     """Local solar time, hours in [0, 24)."""
     weather: str | None = None
     """Of the sky: it decides how light falls in."""
+    novelty: str | None = None
+    """'familiar' or 'novel': of what houses to learn from may hold when others are out of distribution, or of what
+    they never hold (embodied.generate.novelty); None is all there is."""
 
     def __post_init__(self) -> None:
         if self.area is not None:
@@ -58,6 +63,12 @@ class HouseConfig:
             raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
         if self.style is not None and self.style not in STYLES:
             raise HouseError(f"style should be one of {STYLES}, got {self.style!r}")
+        if self.novelty not in (None, *NOVELTIES):
+            raise HouseError(f"novelty should be one of {NOVELTIES}, got {self.novelty!r}")
+        if self.style is not None and self.style not in styles_of(self.novelty):
+            raise HouseError(
+                f"{self.novelty} houses have the styles {styles_of(self.novelty)}, got {self.style!r}; leave style out"
+            )
         if self.shape not in (None, *SHAPES):
             raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
         if self.storeys != 1:

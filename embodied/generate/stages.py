@@ -20,6 +20,7 @@ from embodied.generate.furnish import furnish
 from embodied.generate.lacking import lacking
 from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
+from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program
 from embodied.geometry import wrap
@@ -110,7 +111,8 @@ def rooms(draft: Draft) -> Draft:
 
 def openings(draft: Draft) -> Draft:
     """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
-    palette, begun = draw_palette(draft.config.style, rng=stream(draft.seed, "house", "palette")), draft.first
+    config, begun = draft.config, draft.first
+    palette = draw_palette(config.style, config.novelty, rng=stream(draft.seed, "house", "palette"))
     for attempt in range(2 * ATTEMPTS):
         rng = stream(draft.seed, "house", "openings", attempt)
         house = _bare_house(draft, palette, rng)
@@ -192,7 +194,8 @@ def draw_sky(config: HouseConfig, house: House, *, rng: np.random.Generator) -> 
 def furnishing(draft: Draft) -> Draft:
     """Furniture, wall and ceiling things, small things and lights."""
     catalogue = draft.catalogue if draft.catalogue is not None else load_catalogue()
-    house = furnish(_made(draft.house, "openings"), catalogue, seed=draft.seed)
+    stock = furnishable(catalogue, draft.config.novelty)
+    house = furnish(_made(draft.house, "openings"), stock, seed=draft.seed)
     return dataclasses.replace(draft, house=house)
 
 

@@ -19,8 +19,9 @@ from gymnasium import spaces
 
 from assets.cache import default_cache
 from assets.catalogue import load_catalogue
-from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
+from embodied.generate import HouseConfig
 from embodied.gym.driving import TEXT, DriveSettings, Driving
 from embodied.gym.eyes import FAR
 from embodied.gym.playground import AREA, pictures_of
@@ -139,6 +140,6 @@ def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings |
 def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
     """The flat that the other environments play in, too."""
     name, catalogue = f"flat_{seed}", load_catalogue(cache)
-    house, graph = make_dataset_house(seed, name, DatasetConfig("find", "tiny", seed, area=AREA), catalogue)
+    house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
     drawn = pictures or PictureSettings(quality="fast")
     return {name: open_world(house, catalogue, cache, graph=graph, pictures=drawn)}

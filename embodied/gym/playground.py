@@ -16,12 +16,13 @@ from assets.catalogue import load_catalogue
 from assets.closure import code_digest
 from assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
-from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.build import make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
+from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Language, Route, SeenPlace, Task
@@ -116,7 +117,7 @@ def flat_playground(
     paths = None
     if worlds is None:
         name = f"flat_{seed}"
-        house, graph = make_dataset_house(seed, name, DatasetConfig(kind, "tiny", seed, area=AREA), catalogue)
+        house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
         if kind == "hanna":
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)

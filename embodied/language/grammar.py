@@ -32,6 +32,7 @@ from embodied.language.clauses import (
     side_of,
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
+from embodied.language.speakers import NOVEL_HABIT
 from embodied.language.templates import (
     ARRIVED_LINKS,
     FILLERS,
@@ -46,6 +47,7 @@ from embodied.language.templates import (
     VERBS,
     Template,
 )
+from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from embodied.language.speakers import Speaker
@@ -88,6 +90,16 @@ _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
 }
 
 
+NOVEL_TEMPLATES = frozenset(
+    t
+    for same in _BY_KINDS.values()
+    for texts in [novel_among(t.text for t in same[1:] if not t.habit)]
+    for t in same
+    if t.text in texts or t.habit == NOVEL_HABIT
+)
+"""What people who are kept from learning say; the first template of a clause is everybody's."""
+NOVEL_WORDS = novel_among({*VERBS[1:], *SOON[1:], *(noun for nouns in ROOM_NOUNS.values() for noun in nouns[1:])})
+"""Verbs, adverbs and nouns for rooms that only they use."""
 PLAIN = 3.0
 """How much likelier than its other templates the first few of a clause are: what most people say."""
 
@@ -129,7 +141,8 @@ def _again(phrases: Sequence[Phrase]) -> list[str]:
 
 
 def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Generator) -> Template:
-    fitting = [t for t in templates if t.habit in ("", speaker.habit)]
+    spoken = [t for t in templates if t.habit in ("", speaker.habit)]
+    fitting = of_novelty(spoken, NOVEL_TEMPLATES, speaker.novelty)
     weights = np.array([3.0 if t.habit else PLAIN if i < 4 else 1.0 for i, t in enumerate(fitting)])
     return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
 
@@ -137,15 +150,16 @@ def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Genera
 def _fill(
     template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator
 ) -> str:
-    verbs = VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS
+    own = functools.partial(of_novelty, novel=NOVEL_WORDS, novelty=speaker.novelty)
+    verbs, soon = own(VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS), own(SOON)
     slots = {
         "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
-        "soon": SOON[int(rng.integers(len(SOON)))],
+        "soon": soon[int(rng.integers(len(soon)))],
     }
     rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := room_of(p.clause)) is not None]
     for name, (kind, before) in zip(("room", "other"), rooms):
-        nouns = ROOM_NOUNS[kind]
-        slots[name] = before + (nouns[0] if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))])
+        plain, nouns = ROOM_NOUNS[kind][0], own(ROOM_NOUNS[kind])
+        slots[name] = before + (plain if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))])
     for p in phrases:
         if isinstance(p.clause, Metres):
             n, many = p.clause.count, "s" * (p.clause.count != 1)

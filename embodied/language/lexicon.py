@@ -13,6 +13,7 @@ import numpy as np
 from embodied.language.clauses import Referent
 from embodied.language.nouns import MORE_NOUNS
 from embodied.language.templates import BODY_PRAISE, PRAISE, SEAT_PRAISE, SIZES
+from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -138,6 +139,8 @@ class Lexicon:
         self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
         self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
         self.adjectives = frozenset(adjectives - EMPTY)
+        self.novel_nouns = novel_among(set(self.classes_of) - set(self.nouns_of))
+        """Which only people who are kept from learning use; the names of classes are everybody's."""
 
     @staticmethod
     def _nouns(asset: Asset) -> tuple[str, ...]:
@@ -152,14 +155,24 @@ class Lexicon:
         """
         return Referent(self.classes_of[word.noun], tuple(sorted(w for w in word.adjectives if w not in EMPTY)))
 
-    def words_for(self, asset: Asset, rng: np.random.Generator, *, adjectives: int, ornament: float = 0.0) -> Word:
+    def words_for(
+        self,
+        asset: Asset,
+        rng: np.random.Generator,
+        *,
+        adjectives: int,
+        ornament: float = 0.0,
+        novelty: str | None = None,
+    ) -> Word:
         """A noun for an asset, with up to `adjectives` of its colour and material words.
 
         Args:
+          novelty: of who speaks.
           ornament: probability of one more adjective, of size or of praise, that tells nothing apart.
         """
         nouns = self.nouns_of[asset.object_class]
         own = [n for n in nouns if n in {s.lower() for s in self._nouns(asset)}] or list(nouns)
+        own = list(of_novelty(own, self.novel_nouns, novelty))
         noun = own[0] if len(own) == 1 or rng.random() < 0.5 else own[int(rng.integers(1, len(own)))]
         spare = [w.lower() for w in (*asset.colours[:1], *asset.materials[:1]) if w.lower() not in noun.split()]
         praise = praise_of(asset)

@@ -293,7 +293,9 @@ def _name(telling: _Telling, thing: SeenThing, view: Seen) -> Word | None:
     """
     lexicon, speaker = telling.lexicon, telling.speaker
     for adjectives in range(int(telling.chance(speaker.colours)), 3):
-        word = lexicon.words_for(thing.asset, telling.rng, adjectives=adjectives, ornament=speaker.ornament)
+        word = lexicon.words_for(
+            thing.asset, telling.rng, adjectives=adjectives, ornament=speaker.ornament, novelty=speaker.novelty
+        )
         if not says(thing.asset, meant := lexicon.thing(word)):
             continue
         others = [
@@ -322,8 +324,8 @@ def _remark(telling: _Telling, path: Sequence[int]) -> Phrase | None:
     if not things:
         return None
     asset = things[int(rng.integers(len(things)))].asset
-    ornament = telling.speaker.ornament
-    word = telling.lexicon.words_for(asset, rng, adjectives=int(rng.integers(2)), ornament=ornament)
+    speaker, few = telling.speaker, int(rng.integers(2))
+    word = telling.lexicon.words_for(asset, rng, adjectives=few, ornament=speaker.ornament, novelty=speaker.novelty)
     return Phrase(Notice(telling.lexicon.thing(word)), word)
 
 

@@ -1,10 +1,17 @@
-"""People have habits of speech: who names landmarks, who counts metres, who chats, who hedges."""
+"""People have habits of speech: who names landmarks, who counts metres, who chats, who hedges.
+
+Some people are kept from learning (embodied.novelty): who speaks formally, and templates and words that
+`novel_templates` and the lexicon choose.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+
+from embodied.novelty import FAMILIAR
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,8 @@ class Speaker:
     """Per word that can be misspelt."""
     plainness: float = 0.7
     """Using the plainest noun for a room."""
+    novelty: str | None = None
+    """'familiar' or 'novel': which templates and words it knows; None: all."""
 
 
 SPEAKERS: tuple[tuple[float, Speaker], ...] = (
@@ -85,7 +94,17 @@ SPEAKERS: tuple[tuple[float, Speaker], ...] = (
 """(share, speaker): everyday, terse, chatty, formal, landmark-minded, direction-minded."""
 
 
-def draw_speaker(rng: np.random.Generator) -> Speaker:
-    """One of the speakers by their shares."""
-    shares = np.array([share for share, _ in SPEAKERS])
-    return SPEAKERS[int(rng.choice(len(SPEAKERS), p=shares / shares.sum()))][1]
+NOVEL_HABIT = "formal"
+"""Who is never heard in learning where some people are kept from it; novel people are formal or without a habit."""
+
+
+def draw_speaker(rng: np.random.Generator, novelty: str | None = None) -> Speaker:
+    """One of the speakers of a novelty by their shares."""
+    known = [(share, s) for share, s in SPEAKERS if novelty is None or _is_one(s, novelty)]
+    shares = np.array([share for share, _ in known])
+    speaker = known[int(rng.choice(len(known), p=shares / shares.sum()))][1]
+    return dataclasses.replace(speaker, novelty=novelty)
+
+
+def _is_one(speaker: Speaker, novelty: str) -> bool:
+    return speaker.habit != NOVEL_HABIT if novelty == FAMILIAR else speaker.habit in ("", NOVEL_HABIT)

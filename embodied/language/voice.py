@@ -14,6 +14,7 @@ from embodied.language.plain import PlainLanguage
 from embodied.language.route_clauses import plan, shortened
 from embodied.language.seen import Lookout
 from embodied.language.speakers import draw_speaker
+from embodied.novelty import check_novelty
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
 """Clauses beyond the speaker's own wish, try by try, while an imagined listener gets lost: other words, then more."""
@@ -28,9 +29,14 @@ class People:
     would arrive (the rational speaker of ILIAD, dissertation 3.2.4), and says it otherwise if not.
     """
 
-    def __init__(self, tries: int = len(GROWTH)) -> None:
-        """`tries`: at most len(GROWTH); 1 says the first thing that comes to mind."""
-        self.tries = tries
+    def __init__(self, tries: int = len(GROWTH), novelty: str | None = None) -> None:
+        """
+        Args:
+          tries: at most len(GROWTH); 1 says the first thing that comes to mind.
+          novelty: 'familiar' for people to learn from, 'novel' for those who are kept from it; None for everybody.
+        """
+        check_novelty(novelty)
+        self.tries, self.novelty = tries, novelty
         self._plain = PlainLanguage()
 
     def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
@@ -44,7 +50,7 @@ class People:
           path: nodes to walk along.
           yaw: the walker's first direction, radians.
         """
-        speaker, lexicon, best, least = draw_speaker(rng), lexicon_of(world.catalogue), "", np.inf
+        speaker, lexicon, best, least = draw_speaker(rng, self.novelty), lexicon_of(world.catalogue), "", np.inf
         wanted = max(round(rng.normal(speaker.clauses - 1, 1.0)), 2)
         for more in GROWTH[: self.tries]:
             phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + more)

@@ -1,0 +1,81 @@
+"""Houses of familiar or of novel things: which models, and which look, houses to learn from never hold."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+
+from assets.catalogue import Catalogue
+from assets.records import Asset
+from embodied.generate.tastes import KIDS, KIDS_PAPERS, ROUGH, TASTES, Taste
+from embodied.house.validation import STYLES
+from embodied.novelty import FAMILIAR, NOVEL, novel_among
+
+NOVEL_STYLE = "colourful"
+"""The look that is kept from learning: nearly all of its floors, tiles and wallpapers are its own."""
+KITCHEN_LINE = "line_"
+"""Tags that begin so name kitchen units that go together; a line is familiar or novel as a whole."""
+
+
+def furnishable(catalogue: Catalogue, novelty: str | None) -> Catalogue:
+    """The catalogue that a house of this novelty is furnished from.
+
+    A quarter of the models of each object class, and a quarter of the kitchen lines, are novel. Classes of few models
+    have them in both: what is new is what things look like, not what there is.
+    """
+    if novelty is None:
+        return catalogue
+    new = _novel_models(catalogue)
+    if novelty == FAMILIAR:
+        return catalogue.only(a.key for a in catalogue.assets.values() if a.key not in new)
+    replaced = {_group(catalogue.assets[key]) for key in new}
+    return catalogue.only(a.key for a in catalogue.assets.values() if a.key in new or _group(a) not in replaced)
+
+
+def styles_of(novelty: str | None) -> tuple[str, ...]:
+    """The styles that a house of this novelty may have."""
+    if novelty is None:
+        return STYLES
+    return tuple(s for s in STYLES if (s == NOVEL_STYLE) == (novelty == NOVEL))
+
+
+def taste_of(style: str, novelty: str | None) -> Taste:
+    """What a style chooses from; in novel houses only what no other style has, where that is a choice.
+
+    Paints and carpets are everybody's, and so are the walls of children's rooms and the floors of garages.
+    """
+    taste = TASTES[style]
+    if novelty != NOVEL:
+        return taste
+    tastes = [keys for name, other in TASTES.items() if name != style for keys in _finishes(other).values()]
+    others = {key for keys in (*tastes, KIDS, KIDS_PAPERS, ROUGH) for key in keys}
+    own = {field: tuple(k for k in keys if k not in others) for field, keys in _finishes(taste).items()}
+    return dataclasses.replace(taste, **{field: keys for field, keys in own.items() if len(keys) > 1})
+
+
+def _finishes(taste: Taste) -> Mapping[str, tuple[str, ...]]:
+    return {f.name: getattr(taste, f.name) for f in dataclasses.fields(taste)}
+
+
+@functools.lru_cache(maxsize=4)
+def _novel_models(catalogue: Catalogue) -> frozenset[str]:
+    """Keys of the novel models."""
+    groups: dict[str, dict[str, list[str]]] = {}
+    for asset in catalogue.assets.values():
+        name = next(iter(_lines(asset)), asset.key)
+        groups.setdefault(_group(asset), {}).setdefault(name, []).append(asset.key)
+    return frozenset(
+        key for alternatives in groups.values() for name in novel_among(alternatives) for key in alternatives[name]
+    )
+
+
+def _group(asset: Asset) -> str:
+    """What an asset is an alternative in: its class, or the kitchen lines; what fits several lines is everybody's."""
+    lines = _lines(asset)
+    return asset.object_class if not lines else KITCHEN_LINE if len(lines) == 1 else asset.key
+
+
+def _lines(asset: Asset) -> list[str]:
+    """The kitchen lines that an asset belongs to."""
+    return [tag for tag in asset.tags if tag.startswith(KITCHEN_LINE)]

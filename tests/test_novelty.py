@@ -1,0 +1,166 @@
+"""What is kept from learning is kept: no model, look, speaker or word of `test_ood` occurs anywhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hand_data import build
+
+from assets.catalogue import CatalogueError, load_catalogue
+from embodied.datasets.build import DatasetConfig
+from embodied.generate import HouseConfig, generate_house
+from embodied.generate.novelty import NOVEL_STYLE, furnishable, taste_of
+from embodied.generate.tastes import TASTES
+from embodied.house.house import HouseError
+from embodied.language import People
+from embodied.language.clauses import Enter, Forward, StopBy, To, Turn
+from embodied.language.grammar import NOVEL_TEMPLATES, NOVEL_WORDS, Phrase, say
+from embodied.language.lexicon import lexicon_of
+from embodied.language.speakers import SPEAKERS, draw_speaker
+from embodied.language.templates import TEMPLATES
+from embodied.novelty import novel_among, of_novelty
+
+AREA = (60.0, 110.0)
+SEEDS = range(4)
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue()
+
+
+@pytest.fixture(scope="module")
+def houses(catalogue):
+    return {
+        novelty: [generate_house(s, HouseConfig(area=AREA, novelty=novelty), catalogue) for s in SEEDS]
+        for novelty in ("familiar", "novel")
+    }
+
+
+def test_novel_things_depend_on_the_names_alone():
+    names = [f"model {k}" for k in range(40)]
+    assert novel_among(names) == novel_among(reversed(names)) == novel_among([*names, *names])
+    assert len(novel_among(names)) == 10
+    assert not novel_among(names[:3])
+
+
+def test_who_knows_no_novel_thing_says_the_familiar_ones():
+    assert list(of_novelty("abc", {"b"}, "familiar")) == ["a", "c"]
+    assert list(of_novelty("abc", {"b"}, "novel")) == ["b"]
+    assert list(of_novelty("abc", {"z"}, "novel")) == list(of_novelty("abc", {"a"}, None)) == ["a", "b", "c"]
+
+
+def test_no_model_of_a_divided_class_is_in_houses_of_both_kinds(catalogue, houses):
+    familiar, novel = (set(furnishable(catalogue, n).assets) for n in ("familiar", "novel"))
+    assert familiar | novel == set(catalogue.assets)
+    divided = {catalogue.assets[k].object_class for k in set(catalogue.assets) - familiar}
+    seen = {n: {p.asset for h in houses[n] for p in h.placements} for n in houses}
+    assert seen["familiar"] <= familiar and seen["novel"] <= novel
+    both = {catalogue.assets[k].object_class for k in seen["familiar"] & seen["novel"]}
+    kitchen = {catalogue.assets[k].object_class for k in catalogue.assets if "line_" in str(catalogue.assets[k].tags)}
+    assert not (both & divided) - kitchen
+    new = seen["novel"] - familiar
+    assert len(new) > 0.4 * len(seen["novel"])
+
+
+def test_kitchen_units_of_one_line_stay_together(catalogue):
+    lines = {}
+    for asset in catalogue.assets.values():
+        mine = [tag for tag in asset.tags if tag.startswith("line_")]
+        if len(mine) == 1:
+            lines.setdefault(mine[0], set()).add(asset.key)
+    for novelty, some in (("familiar", 7), ("novel", 2)):
+        kept = set(furnishable(catalogue, novelty).assets)
+        assert all(units <= kept or not units & kept for units in lines.values())
+        assert sum(units <= kept for units in lines.values()) == some
+
+
+def test_looks_of_novel_houses_are_not_those_that_agents_learn_in(houses):
+    assert {h.style for h in houses["novel"]} == {NOVEL_STYLE}
+    assert NOVEL_STYLE not in {h.style for h in houses["familiar"]}
+    floors = {n: {r.floor_finish for h in houses[n] for r in h.rooms if r.kind != "garage"} for n in houses}
+    carpets = {k for taste in TASTES.values() for k in taste.carpets}
+    assert not (floors["novel"] & floors["familiar"]) - carpets
+
+
+def test_novel_tastes_leave_something_to_choose():
+    taste = taste_of(NOVEL_STYLE, "novel")
+    others = {k for name, t in TASTES.items() if name != NOVEL_STYLE for k in (*t.woods, *t.stones, *t.wet_walls)}
+    assert not {*taste.woods, *taste.stones, *taste.wet_walls} & others
+    assert min(map(len, (taste.woods, taste.stones, taste.wet_floors, taste.wet_walls, taste.papers))) > 1
+    assert taste_of("warm", "familiar") is TASTES["warm"]
+
+
+def test_a_house_refuses_novelties_that_cannot_be():
+    with pytest.raises(HouseError, match="novelty should be one of"):
+        HouseConfig(novelty="new")
+    with pytest.raises(HouseError, match="familiar houses have the styles"):
+        HouseConfig(novelty="familiar", style=NOVEL_STYLE)
+    with pytest.raises(ValueError, match="novelty should be None or one of"):
+        People(novelty="new")
+
+
+def test_a_part_of_a_catalogue_has_its_assets_alone(catalogue):
+    keys = sorted(catalogue.assets)[:5]
+    part = catalogue.only(keys)
+    assert list(part.assets) == keys
+    with pytest.raises(CatalogueError, match="no asset 'unicorn'"):
+        catalogue.only(["unicorn"])
+
+
+def test_people_to_learn_from_never_speak_as_the_others_do(catalogue):
+    lexicon = lexicon_of(catalogue)
+    sofa, plant = (catalogue.of_class(name)[0] for name in ("sofa", "potted plant"))
+    said = {"familiar": [], "novel": []}
+    for novelty, texts in said.items():
+        for seed in range(150):
+            rng = np.random.default_rng(seed)
+            speaker = draw_speaker(rng, novelty)
+            words = [lexicon.words_for(a, rng, adjectives=0, novelty=novelty) for a in (sofa, plant)]
+            clauses = (
+                Turn("left"),
+                Enter("living_room"),
+                Forward(),
+                To(lexicon.thing(words[0])),
+                StopBy(lexicon.thing(words[1])),
+            )
+            named = (None, None, None, *words)
+            text = say([Phrase(c, w) for c, w in zip(clauses, named, strict=True)], speaker, rng=rng)
+            texts.append((speaker, words, text.lower()))
+    assert all(s.habit != "formal" for s, _, _ in said["familiar"])
+    assert {s.habit for s, _, _ in said["novel"]} == {"", "formal"}
+    assert not any(w.noun in lexicon.novel_nouns for _, words, _ in said["familiar"] for w in words)
+    rooms = [w for w in NOVEL_WORDS if w in ("parlor", "lounge", "sitting room", "front room")]
+    assert rooms and not any(room in text for room in rooms for _, _, text in said["familiar"])
+    assert any(room in text for room in rooms for _, _, text in said["novel"])
+    for kind in ("turn", "forward"):
+        for t in (t for t in TEMPLATES if t.kinds == (kind,) and t in NOVEL_TEMPLATES and "{" not in t.text):
+            assert not any(
+                f" {t.text} " in f" {text.replace('.', ' ').replace(',', ' ')} " for _, _, text in said["familiar"]
+            ), t
+
+
+def test_every_clause_can_be_said_by_everybody():
+    for kinds in {t.kinds for t in TEMPLATES}:
+        same = [t for t in TEMPLATES if t.kinds == kinds and not t.habit]
+        assert any(t not in NOVEL_TEMPLATES for t in same), kinds
+    assert sum(share for share, s in SPEAKERS if s.habit == "formal") > 0
+
+
+def test_a_data_set_keeps_novel_houses_for_their_own_split(tmp_path):
+    data = build(tmp_path / "data", tmp_path / "cache", "hanna", ood=2)
+    assert data.splits[-1] == "test_ood"
+    assert data.names("test_ood") == ("ood_0000", "ood_0001")
+    assert len(data.tasks("test_ood")) == 2 * len(data.tasks("test_unseen"))
+    assert {r.split for r in data.routes("ood_0000")} == {"test"}
+    assert not set(data.names("test_ood")) & {n for s in data.splits[:-1] for n in data.names(s)}
+
+
+def test_data_sets_without_novel_houses_are_what_they_were():
+    assert "ood" not in DatasetConfig("hanna").facts()
+    assert DatasetConfig("hanna").novelty_of("train") is None
+    config = DatasetConfig("hanna", ood=3)
+    assert (config.novelty_of("train"), config.novelty_of("ood")) == ("familiar", "novel")
+    assert config.plan.houses["ood"] == 3
+    with pytest.raises(ValueError, match="should not be negative"):
+        DatasetConfig("hanna", ood=-1)
