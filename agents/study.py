@@ -362,6 +362,8 @@ class _Judge:
 
 def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Path:
     """One study's files; the figures go with the tables they belong to."""
+    if table.splits == TEST:
+        table = dataclasses.replace(table, splits=(*TEST, *judged.data.ood))
     rows = [
         dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
     ]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from embodied.evaluation.tables import Estimate, shown
 
 Printed = Mapping[str, Sequence[float | None]]
-"""Column to the numbers that were printed of a row, one per split; None where we cannot cite one."""
+"""Column to the numbers that were printed of a row, one per split, the first ones; None where we cannot cite one."""
 
 
 def side_by_side(
@@ -31,8 +31,8 @@ def side_by_side(
         cells = []
         for k, split in enumerate(splits):
             for column in columns:
-                cell, theirs = shown(column, value(label, split, column)), printed.get(column)
-                known = None if theirs is None else theirs[k]
+                cell, theirs = shown(column, value(label, split, column)), printed.get(column, ())
+                known = theirs[k] if k < len(theirs) else None
                 cells.append(cell if known is None else f"{cell} ({known:g})")
         text.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join([*text, "", how, ""])

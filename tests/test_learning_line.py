@@ -76,7 +76,7 @@ def parsed(add, *words):
 def data(tmp_path_factory):
     """A tiny data set on grids, with features of the untrained encoder that are not computed but drawn."""
     folder = tmp_path_factory.mktemp("line")
-    data = build(folder / "data", folder / "cache")
+    data = build(folder / "data", folder / "cache", ood=1)
     encoder = random_encoder(seed=0)
     rng = np.random.default_rng(0)
     for name in {n for s in data.splits for n in data.names(s)}:
@@ -186,10 +186,13 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     table = written["4.5"].read_text()
     rows = json.loads((study.out / "table_4.5.json").read_text())
     assert [(r["agent"], r["split"]) for r in rows] == [
-        (a, s) for s in ("test_seen", "test_unseen") for a in ("No ask", "Random ask", "Ask every 5", "Learned")
+        (a, s)
+        for s in ("test_seen", "test_unseen", "test_ood")
+        for a in ("No ask", "Random ask", "Ask every 5", "Learned")
     ]
     assert rows[0]["values"]["requests"]["mean"] == 0.0
     assert "(86.67)" in table and "(45.43)" in table and "3 episodes in 1 houses" in table
+    assert "success test_ood" in table
     assert (study.out / "figure_D.1.png").stat().st_size > 5_000 and (study.out / "figure_D.2.png").exists()
     once = {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in ("final", "lstm")}
     again = run_study(study, ["4.6"], note=lines.append)

@@ -8,6 +8,7 @@ from hand_data import build
 
 from assets.catalogue import CatalogueError, load_catalogue
 from embodied.datasets.build import DatasetConfig
+from embodied.datasets.scale import KINDS
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.novelty import NOVEL_STYLE, furnishable, taste_of
 from embodied.generate.tastes import TASTES
@@ -147,12 +148,16 @@ def test_every_clause_can_be_said_by_everybody():
     assert sum(share for share, s in SPEAKERS if s.habit == "formal") > 0
 
 
-def test_a_data_set_keeps_novel_houses_for_their_own_split(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", "hanna", ood=2)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_data_set_keeps_novel_houses_for_their_own_split(tmp_path, kind):
+    data = build(tmp_path / "data", tmp_path / "cache", kind, ood=2)
     assert data.splits[-1] == "test_ood"
     assert data.names("test_ood") == ("ood_0000", "ood_0001")
-    assert len(data.tasks("test_ood")) == 2 * len(data.tasks("test_unseen"))
-    assert {r.split for r in data.routes("ood_0000")} == {"test"}
+    assert data.ood == ("test_ood",)
+    unseen = "test_unseen_env" if kind == "hari" else "test_unseen"
+    assert len(data.tasks("test_ood")) == 2 * len(data.tasks(unseen))
+    assert {r.split for r in data.routes("ood_0000")} <= {"test"}
+    data.split("test_ood").make_env()
     assert not set(data.names("test_ood")) & {n for s in data.splits[:-1] for n in data.names(s)}
 
 

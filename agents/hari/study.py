@@ -124,7 +124,7 @@ def _run(setting: HariStudySetting, executor: Path, seed: int, variant: str, *, 
             save_lines(folder / "episodes" / f"{split}.jsonl", episodes)
 
     only = ("learned", *(RULE_ROWS if variant in BESIDE_RULES else ()))
-    rows = judge(data, agent, (*VALIDATION, *TEST), seed=seed, limit=setting.tasks, only=only, keep=keep)
+    rows = judge(data, agent, (*VALIDATION, *TEST, *data.ood), seed=seed, limit=setting.tasks, only=only, keep=keep)
     save(rows, folder, "table")
     write_bytes(folder / "rows.json", as_json(rows).encode())
     write_json(mark, {"of": of_what})
@@ -161,14 +161,15 @@ MOVES = [
 
 
 def _write_table(setting: HariStudySetting, name: str, rows: Sequence[TableLine], when: str) -> Path:
-    """Success per condition, and actions over all of them, beside what the dissertation prints."""
-    splits = [f"{when}_{c}" for c in CONDITIONS]
+    """Success per condition and, where there are such, in houses out of distribution; actions over the conditions,
+    beside what the dissertation prints."""
+    splits = [*(f"{when}_{c}" for c in CONDITIONS), *(hari_data(setting.data).ood if when == "test" else ())]
     heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
     lines = []
     for line in rows:
         number = lambda split, column, line=line: estimates(setting, line.variant, split, column, line.row)
         successes = [shown("success", number(s, "success")) for s in splits]
-        actions = [f"{np.mean([number(s, a).mean for s in splits]):.1f}" for a in heads[4:8]]
+        actions = [f"{np.mean([number(s, a).mean for s in splits[:3]]):.1f}" for a in ("CUR", "GOAL", "SUB", "DO")]
         lines.append([line.shown, *successes, *actions, line.printed])
     return write_markdown(setting.out / f"table_{name}.md", f"Table {name}", table(heads, lines), _seeds(setting))
 

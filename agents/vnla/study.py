@@ -213,7 +213,8 @@ def _run(
             save_lines(folder / "episodes" / episodes_file(split, line.key), episodes)
 
         lessons, limit = setting.lessons(line.rooms), setting.tasks
-        found = judge(lessons, agent, SPLITS, seeds=EVALUATION_SEEDS, limit=limit, only=[line.played], keep=keep)
+        splits = (*SPLITS, *lessons.data.ood)
+        found = judge(lessons, agent, splits, seeds=EVALUATION_SEEDS, limit=limit, only=[line.played], keep=keep)
         write_bytes(path, as_json(found).encode())
     return f"{variant}, seed {seed}: trained and judged"
 
@@ -245,7 +246,8 @@ def _write(setting: VnlaStudySetting, name: str) -> Path:
     by = {_labelled(line, counts): line for line in there}
     value = lambda label, split, column: estimate(setting, by[label], split, column)
     rows = [(label, line.printed) for label, line in by.items()]
-    text = side_by_side(title, SPLITS, COLUMNS, rows, value, _made_with(setting, there))
+    splits = (*SPLITS, *setting.lessons(rooms=True).data.ood)
+    text = side_by_side(title, splits, COLUMNS, rows, value, _made_with(setting, there))
     if missing := [label for label, n in counts.items() if not n]:
         text += f"\nNot run yet: {', '.join(missing)}.\n"
     path = setting.out / f"table_{name}.md"

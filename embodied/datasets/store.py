@@ -20,7 +20,7 @@ from embodied.datasets.checks import (
     read_config,
     read_index,
 )
-from embodied.datasets.scale import Scale, SplitPlan
+from embodied.datasets.scale import OOD, Scale, SplitPlan
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
@@ -104,6 +104,11 @@ class Dataset:
     @property
     def splits(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.scale.splits)
+
+    @property
+    def ood(self) -> tuple[str, ...]:
+        """The split of houses out of distribution, where there are such: tables of test splits have it last."""
+        return tuple(s for s in self.splits if s == OOD)
 
     def names(self, split: str) -> tuple[str, ...]:
         """Names of the houses of a split."""
