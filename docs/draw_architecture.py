@@ -79,6 +79,7 @@ FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
             ("geometry", "angles"),
             ("errors", ""),
             ("distribution", "our name"),
+            ("novelty", "what is held out"),
             ("gl", "EGL"),
             ("locks", "one writer"),
         ),

@@ -37,8 +37,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from assets.cache import default_cache
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
-from embodied.datasets.build import DatasetConfig, make_dataset_house
+from embodied.datasets.build import make_dataset_house
 from embodied.envs.base import HelpEnv
+from embodied.generate import HouseConfig
 from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import PanoramaStore, PictureEyes, ViewSettings
@@ -160,8 +161,7 @@ def arena(args: argparse.Namespace, numbers: Sequence[int], goals: Sequence[str]
     """The flats of these numbers, drawn where they are not yet; `goals`: only such requests."""
     catalogue, worlds, tasks = load_catalogue(default_cache()), {}, []
     for n in numbers:
-        config = DatasetConfig("find", "tiny", args.seed, area=AREA)
-        house, graph = make_dataset_house(args.seed, f"flat_{n}", config, catalogue)
+        house, graph = make_dataset_house(args.seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
         drawn = PictureSettings(128, args.quality)
         world = worlds[house.name] = open_world(house, catalogue, default_cache(), drawn, graph=graph)
         world.render_all()
