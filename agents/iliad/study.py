@@ -230,7 +230,7 @@ def _write(setting: IliadStudySetting, name: str) -> Path:
         describer_figure(wrong, setting.out / f"{stem}.png")
         lines += ["", f"![Success against the share of wrong descriptions]({stem}.png)"]
     return write_markdown(
-        setting.out / f"{stem}.md", f"{TITLES[name]}, {setting.subject.name}", lines, _how(setting), missing
+        setting.out / f"{stem}.md", f"{TITLES[name]}, {setting.subject.name}", lines, _how(setting, jobs[0]), missing
     )
 
 
@@ -261,7 +261,9 @@ def _write_speakers(setting: IliadStudySetting) -> Path:
         "the fourth (%)",
         "the fourth, had it been heard (%)",
     ]
-    return write_markdown(setting.out / "speakers.md", TITLES["speakers"], table(heads, rows), _how(setting), missing)
+    return write_markdown(
+        setting.out / "speakers.md", TITLES["speakers"], table(heads, rows), _how(setting, everybody), missing
+    )
 
 
 def _is_judged(setting: IliadStudySetting, job: IliadJob, seed: int) -> bool:
@@ -286,11 +288,12 @@ def _episodes(needed: Sequence[float]) -> str:
     return shown(across_seeds(needed), 1, 1e-3).replace(" ± ", "K ± ") + "K"
 
 
-def _how(setting: IliadStudySetting) -> str:
-    x = setting.learner
+def _how(setting: IliadStudySetting, job: IliadJob) -> str:
+    """What a table's students have in common; `job` is one of them, and names the teacher."""
+    x, told = setting.learner, setting.subject_of(job).told()
     theirs = {"REGEX": "people's requests, hidden size 512, 960,000 episodes", "NAV": "Room-to-Room, 800,000 episodes"}
     return (
-        f"{setting.subject.told()} {x.iterations:,} updates of {x.batch} episodes, learning rate {x.learning_rate:g} "
+        f"{told} {x.iterations:,} updates of {x.batch} episodes, learning rate {x.learning_rate:g} "
         f"(REINFORCE a tenth). Mean over seeds from {setting.repeats[0]} on, with Student's 95 % interval; in brackets "
         f"the dissertation's numbers ({theirs[setting.subject.name]}; ± is a standard deviation there): comparable in "
         "shape, not in level."
