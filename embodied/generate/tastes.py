@@ -209,6 +209,7 @@ TASTES: Mapping[str, Taste] = {
 }
 """Style name to taste; the names are those of embodied.house.validation.STYLES."""
 ROUGH = ("concrete/0", "concrete/1", "concrete/3")
+"""Floors of garages and workshops, whatever the style."""
 KIDS = (
     "paint_mint/0",
     "paint_pale_blue/0",
@@ -218,3 +219,4 @@ KIDS = (
     "paint_peach/0",
 )
 KIDS_PAPERS = (*_all("wallpaper_scallops", 3), "wallpaper_stripes/1", "wallpaper_stripes/2", "wallpaper_leaves/0")
+"""Walls of children's rooms and their accents, whatever the style."""
