@@ -279,7 +279,7 @@ def test_a_wrong_row_is_named_with_what_it_should_hold(row, match):
 
 def test_every_builder_and_every_rug_of_the_materials_is_in_the_table():
     built = {m.make.args[1] for m in MAKERS.values()}
-    helpers = {storage.shelf_surfaces, soft.layers, tableware.cup}
+    helpers = {storage.shelf_surfaces, storage.top_surface, soft.layers, tableware.cup}
     assert set(BUILDS.values()) - helpers == built
     rugs = {str(m.look["pattern"]) for m in MAKERS.values() if "pattern" in m.look}
     assert {key for key, m in MATERIALS.items() if m.family == "rug"} <= rugs

@@ -122,6 +122,27 @@ def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
     return joined(body, *sleeves, collar)
 
 
+def coat(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A coat on a hook."""
+    w, d, h = size
+    hook = tube([(0, d / 2, h - 0.02), (0, d / 2 - 0.04, h - 0.025), (0, d / 2 - 0.05, h)], 0.005, 8)
+    body = moved(_coat(w, d * 0.7, h - 0.02, rng=rng), 0, d / 2 - 0.01 - d * 0.42, 0)
+    return parts_of((metal(look, finish, "black"), hook), (material(look, "cloth", finish, "tweed/0"), body))
+
+
+def shoe_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Two slatted boards between two sides."""
+    w, d, h = size
+    board = 0.018
+    sides = [box([x0, -d / 2, 0], [x0 + board, d / 2, h], 0.002) for x0 in (-w / 2, w / 2 - board)]
+    slats = [
+        box([-w / 2 + board, y, z], [w / 2 - board, y + 0.05, z + 0.016], 0.002)
+        for z in (h * 0.22 - 0.016, h - 0.016)
+        for y in np.linspace(-d / 2 + 0.005, d / 2 - 0.055, 4)
+    ]
+    return parts_of((material(look, "wood", finish, "oak/0"), [*sides, *slats]))
+
+
 def umbrella_stand(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A tall pot with two umbrellas."""
     w, _, h = size

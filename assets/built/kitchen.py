@@ -24,7 +24,7 @@ from assets.built.maker import (
     parts_of,
     plain,
 )
-from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube
+from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube, turned
 from assets.records import Finish, MeshPart
 
 TOP = 0.038
@@ -244,6 +244,37 @@ def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
     return parts_of((material(look, "front", finish, "lacquer_white/0"), [*doors, side]), (metal(look, finish), grips))
+
+
+def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """Two doors over one another, with look['notes'] papers under magnets on the upper one."""
+    w, d, h = size
+    front_y, thick, split = -d / 2 + 0.03, 0.055, h * 0.36
+    body = box([-w / 2 + 0.004, front_y + thick + 0.006, 0.04], [w / 2 - 0.004, d / 2, h], 0.004)
+    foot = box([-w / 2 + 0.02, front_y + thick + 0.03, 0], [w / 2 - 0.02, d / 2 - 0.03, 0.04])
+    seal = box([-w / 2 + 0.012, front_y + thick, 0.05], [w / 2 - 0.012, front_y + thick + 0.006, h - 0.01])
+    doors = [
+        box([-w / 2, front_y, z0], [w / 2, front_y + thick, z1], 0.012)
+        for z0, z1 in ((0.05, split - 0.003), (split + 0.003, h))
+    ]
+    grips = [moved(handle(0, 0, 0, "bar", True, 0.3), -w / 2 + 0.045, front_y, z) for z in (split - 0.19, split + 0.26)]
+    papers: list[tuple[Finish, list[Shape] | Shape]] = []
+    magnets: list[Shape] = []
+    for k in range(int(look.get("notes", 0))):
+        x = (k % 3 - 1) * w * 0.24 + rng.normal(0, 0.015) + 0.03
+        z = h - 0.16 - 0.21 * (k // 3) - rng.uniform(0, 0.05)
+        pw, ph = rng.uniform(0.07, 0.12), rng.uniform(0.08, 0.16)
+        leaf = turned(box([-pw / 2, -0.0008, -ph], [pw / 2, 0, 0]), rng.normal(0, 0.05), "y")
+        tint = ((0.9, 0.885, 0.84), (0.9, 0.8, 0.4), (0.9, 0.885, 0.84), (0.75, 0.83, 0.88), (0.88, 0.62, 0.66))
+        papers.append((plain(tint[int(rng.integers(5))], 0.9), moved(leaf, x, front_y - 0.0004, z)))
+        magnets.append(moved(turned(cylinder(0.012, 0, 0.006, 0.002, 12), np.pi / 2, "x"), x, front_y, z - 0.015))
+    return parts_of(
+        (material(look, "front", finish, "lacquer_white/0"), [*doors, body]),
+        (BLACK, [foot, seal]),
+        (metal(look, finish, "steel"), grips),
+        *papers,
+        (plain((0.62, 0.16, 0.14), 0.4), magnets),
+    )
 
 
 def island(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

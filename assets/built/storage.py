@@ -71,6 +71,12 @@ def shelf_surfaces(size: Size, look: Look) -> tuple[SupportSurface, ...]:
     return (*inner, surface("top", h, w, d, 9.0 if h < 1.9 else 0.5))
 
 
+def top_surface(size: Size, look: Look) -> tuple[SupportSurface, ...]:
+    """The top of something tall and flat."""
+    w, d, h = size
+    return (surface("top", h, w, d, 9.0 if h < 1.9 else 0.5),)
+
+
 def wardrobe(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Hinged doors over a plinth, with long handles; one leaf a mirror where look['mirror'] is 1."""
     w, d, h = size

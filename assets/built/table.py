@@ -7,13 +7,26 @@ import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from assets.built import bath, decor, entry, fittings, kitchen, lamps, papers, plants, soft, storage, tableware
+from assets.built import (
+    bath,
+    decor,
+    entry,
+    everyday,
+    fittings,
+    kitchen,
+    lamps,
+    papers,
+    plants,
+    soft,
+    storage,
+    tableware,
+)
 from assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
 from assets.materials import MATERIALS
 from assets.records import SupportSurface
 from assets.rows import FIELDS, WORD, CatalogueError, Field, Row, asset_of, check_row, is_number, is_text, merged
 
-MODULES = (bath, decor, entry, fittings, kitchen, lamps, papers, plants, soft, storage, tableware)
+MODULES = (bath, decor, entry, everyday, fittings, kitchen, lamps, papers, plants, soft, storage, tableware)
 BUILDS: Mapping[str, Build] = MappingProxyType(
     {
         f"{module.__name__.rpartition('.')[2]}.{name}": build
@@ -24,7 +37,7 @@ BUILDS: Mapping[str, Build] = MappingProxyType(
 )
 """Every builder by '<module>.<function>'."""
 SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxyType(
-    {"shelves": storage.shelf_surfaces}
+    {"shelves": storage.shelf_surfaces, "top": storage.top_surface}
 )
 """Support surfaces that follow from size and look."""
 SURFACE_NUMBERS = {"z", "width", "depth", "headroom", "margin", "x", "y"}

@@ -2,7 +2,8 @@
 
 Room by room: groups of furniture claim their place in order of importance (rooms.py, the table of
 what each kind of room gets), then what hangs on ceilings and walls (ceilings.py, hanging.py,
-pictures.py), then small things on surfaces (smalls.py), then lights. docs/houses.md tells more.
+pictures.py), then small things on surfaces (smalls.py), then what the household leaves about (traces.py), then lights.
+docs/houses.md tells more.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
+from embodied.generate.furnish.traces import leave_traces
+from embodied.generate.household import Household, household_of
 from embodied.geometry import wrap
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.seeds import stream
@@ -38,19 +41,24 @@ def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
     """
     style = house_style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
     stock = Stock(catalogue, style)
-    kinds = tuple(sorted({r.kind for r in draft.rooms}))
-    rooms: list[tuple[str, list[Thing]]] = []
+    kinds, household = tuple(r.kind for r in draft.rooms), household_of(draft)
+    rooms: list[Context] = []
     for room in draft.rooms:
-        ctx = _arranged(draft, room, stock, kinds, seed)
+        ctx = _arranged(draft, room, stock, kinds, household, seed)
         hang_all(ctx)
         clutter(ctx)
-        rooms.append((room.id, ctx.things))
-    placements = _placements(rooms)
+        rooms.append(ctx)
+    for ctx in rooms:
+        ctx.rng = stream(seed, "furnish", ctx.space.room.id, "traces")
+        leave_traces(ctx)
+    placements = _placements([(ctx.space.room.id, ctx.things) for ctx in rooms])
     shining = lights(placements, style, rng=stream(seed, "furnish", "lights"))
     return dataclasses.replace(draft, placements=placements, lights=shining)
 
 
-def _arranged(draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], seed: int) -> Context:
+def _arranged(
+    draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], household: Household, seed: int
+) -> Context:
     """The room with its furniture: the first of a few attempts that lacks nothing, or the best of them."""
     best: tuple[int, Context, Counter[str]] | None = None
     before = stock.used.copy()
@@ -61,6 +69,7 @@ def _arranged(draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], se
             stock=stock,
             rng=stream(seed, "furnish", room.id, attempt),
             kinds=kinds,
+            household=household,
             attempt=attempt,
         )
         furnish_room(ctx)

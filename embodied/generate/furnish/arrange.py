@@ -51,6 +51,8 @@ class Item:
     surface: str | None = None
     passage: bool = False
     """Whether it may reach into keep-outs (rugs and curtains)."""
+    aside: bool = False
+    """Whether it may lie where one stands to use something else: shoes before the wardrobe."""
     role: str = ""
     """What the group calls it, so that later stages find it again."""
 
@@ -237,7 +239,7 @@ class _Trial:
             return _flat_fits(self.space, b)
         allowed = [q for i in item.under if (q := self.boxes[i]) is not None]
         return (
-            self.space.fits(b, ignore=allowed, passage=item.passage)
+            self.space.fits(b, ignore=allowed, passage=item.passage, aside=item.aside)
             and not any(overlap(b, q) and not any(q is a for a in allowed) for q in self.solids())
             and not any(overlap(b, z) for z in self.zones)
         )

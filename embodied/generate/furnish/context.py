@@ -13,6 +13,7 @@ from assets.records import Asset
 from embodied.generate.furnish.arrange import WALL_GAP, Item, ScoredPose, Thing, pack, wall_poses
 from embodied.generate.furnish.space import RoomSpace, Wall
 from embodied.generate.furnish.stock import AssetLimits, Stock
+from embodied.generate.household import Household
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,9 @@ class Context:
     stock: Stock
     rng: np.random.Generator
     kinds: tuple[str, ...]
-    """Room kinds of the whole house, so that a living room knows whether there is a dining room."""
+    """Those of all rooms of the house, so that a living room knows whether there is a dining room."""
+    household: Household
+    """Who lives in the house."""
     attempt: int = 0
     """How often this room has been tried before; later attempts ask for less."""
     things: list[Thing] = field(default_factory=list)

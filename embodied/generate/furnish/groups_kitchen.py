@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Item, ScoredPose, Thing, floor_poses
-from embodied.generate.furnish.context import Context, Liking
+from embodied.generate.furnish.arrange import Item, Params, ScoredPose, Thing, floor_poses, wall_poses
+from embodied.generate.furnish.context import Context, Liking, at_corner
+from embodied.generate.furnish.looks import SEEDS
 from embodied.generate.furnish.space import RoomSpace, Wall, box
 
 UPPER = 1.45
@@ -128,7 +129,7 @@ def _edge(space: RoomSpace, wall: Wall, s: float, sign: int, depth: float, heigh
 
 def kitchen_units(ctx: Context) -> None:
     """The line of units and the fridge; in some later attempts the fridge chooses its place first."""
-    first = ctx.attempt in (1, 2, 4)
+    first = ctx.attempt in (3, 5)
     if first:
         lone_fridge(ctx)
     kitchen_line(ctx, fridge=not first)
@@ -143,13 +144,13 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
       fridge: whether the kitchen still needs one.
     """
     kits = kitchen_sets(ctx)
-    for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
-        for with_fridge in (True, False) if fridge else (False,):
+    for with_fridge in (True, False) if fridge else (False,):
+        for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
             found = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
             if found is None:
                 continue
             kit, things = found
-            if fridge and not with_fridge:
+            if fridge and not with_fridge and not _tall_block(ctx, kit, things):
                 lone_fridge(ctx)
             _more_runs(ctx, kit, things)
             return things
@@ -180,15 +181,101 @@ def _best_runs(ctx: Context, kit: KitchenSet) -> list[tuple[Wall, float, float]]
     return [(wall, a, b) for _, a, b, wall in sorted(runs, key=lambda r: -r[0])]
 
 
+def _fridge(ctx: Context, widest: float) -> Asset | None:
+    """A fridge as tall as people are, if there is one; at most so wide, metres."""
+    return ctx.pick("fridge", most=(widest, 1.0, 2.1), least=(0.0, 0.0, 1.5), avoid=()) or ctx.pick(
+        "fridge", most=(widest, 1.0, 2.1), avoid=()
+    )
+
+
+def noted(ctx: Context, fridge: Asset) -> Params:
+    """What a household keeps under magnets on the door of a fridge that code builds: more with children."""
+    if not fridge.key.startswith("built/"):
+        return ()
+    notes = int(ctx.rng.poisson(0.7 + 1.3 * len(ctx.household.children)))
+    return (("notes", float(min(notes, 6))), ("seed", float(ctx.rng.integers(SEEDS)))) if notes else ()
+
+
+def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing] | None:
+    """The fridge between tall cabinets or beside base units, on another stretch of wall than the line."""
+    fridge = _fridge(ctx, 0.65)
+    if fridge is None:
+        return None
+    line = next((t for t in kit.sink.tags if t.startswith("line_")), "")
+    tall = [a for a in ctx.stock.of_role("tall cabinet") if line in a.tags] or list(ctx.stock.of_role("tall cabinet"))
+    low = [a for a in kit.base if kit.units(a) == 1]
+    blocks = [(tall[:1], tall[:1]), (tall[:1], []), (low[:1], []), ([], low[:1])] if tall else [(low[:1], [])]
+    for left, right in blocks:
+        row = [*left, fridge, *right]
+        width = sum(a.size[0] for a in row) + 0.004 * (len(row) - 1)
+        items, x = [], -width / 2
+        for asset in row:
+            role = "fridge" if asset is fridge else "counter" if asset in low else "tall cabinet"
+            items.append(
+                Item(
+                    asset,
+                    x + asset.size[0] / 2,
+                    -asset.size[1] / 2,
+                    params=noted(ctx, asset) if asset is fridge else (),
+                    clear=0.5,
+                    role=role,
+                )
+            )
+            x += asset.size[0] + 0.004
+
+        def near(wall: Wall, s: float, width: float = width) -> float:
+            return -min(_gap(wall.point(s), t) for t in done) + 1.5 * at_corner(wall, s, width)
+
+        poses = wall_poses(ctx.space, width, score=near, gap=0.005, step=0.1)
+        found = ctx.put(items, [p for p in poses if not _darkens(p, width)], "kitchen", tries=40)
+        if found:
+            return found
+    return None
+
+
+def _darkens(pose: ScoredPose, width: float) -> bool:
+    """Whether something tall and `width` wide would stand before a window there."""
+    wall = pose.wall
+    if wall is None:
+        return False
+    dx, dy = pose.x - wall.start[0], pose.y - wall.start[1]
+    s = dx * wall.along[0] + dy * wall.along[1]
+    return any(s - width / 2 < s1 and s0 < s + width / 2 for s0, s1, o in wall.openings if o.kind == "window")
+
+
 def lone_fridge(ctx: Context) -> list[Thing] | None:
-    """A fridge that found no place in the line."""
+    """A fridge that found no place in the line: at its end if it can be, else anywhere at a wall."""
+    slim = _fridge(ctx, 0.65)
+    for clear in (0.5, 0.35, 0.2):
+        if slim is None:
+            break
+        item = Item(slim, 0.0, -slim.size[1] / 2, params=noted(ctx, slim), clear=clear, role="fridge")
+        if found := ctx.put([item], _line_ends(ctx, slim.size[0]), "kitchen"):
+            return found
     for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.2)):
-        fridge = ctx.pick("fridge", most=(width, 1.0, 2.1), avoid=())
+        fridge = _fridge(ctx, width)
         liking = Liking(corner=0.8, window=-3.0)
         found = ctx.against_wall(fridge, "kitchen", liking=liking, clear=clear, role="fridge")
         if found:
             return found
     return None
+
+
+def _line_ends(ctx: Context, width: float) -> list[ScoredPose]:
+    """Poses of something tall and `width` wide beside each unit on the floor."""
+    poses = []
+    for unit in ctx.roles("kitchen sink", "cooker", "counter", "base cabinet"):
+        wall = unit.wall
+        if wall is None or not _on_floor(ctx, unit):
+            continue
+        s = (unit.x - wall.start[0]) * wall.along[0] + (unit.y - wall.start[1]) * wall.along[1]
+        for side in (-1, 1):
+            at = s + side * (unit.size[0] + width + 0.008) / 2
+            x, y = wall.point(at, 0.005)
+            pose = ScoredPose(ctx.rng.random(), x, y, wall.yaw, wall)
+            if width / 2 <= at <= wall.length - width / 2 and not _darkens(pose, width):
+                poses.append(pose)
+    return poses
 
 
 def _run(
@@ -201,7 +288,7 @@ def _run(
     """
     need = kit.units(kit.sink) + (1 if kit.hob else kit.units(kit.cooker)) + spare
     small = 0.95 if b - a > 3.2 and ctx.space.area > 8 else 0.65
-    fridge = ctx.pick("fridge", most=(small, 1.0, 2.1), avoid=()) if with_fridge else None
+    fridge = _fridge(ctx, small) if with_fridge else None
     room = b - a - (fridge.size[0] + 0.02 if fridge else 0.0)
     count = min(int(room / kit.unit + 0.15), int(4.0 / kit.unit))
     if count < need:
@@ -215,7 +302,10 @@ def _run(
         items = _run_items(ctx, line, _slots(ctx, line, count, start, view))
         if fridge is not None:
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
-            items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, clear=free - 0.05, role="fridge")))
+            clear = free - 0.05
+            items.append(
+                (s, Item(fridge, 0.0, -fridge.size[1] / 2, params=noted(ctx, fridge), clear=clear, role="fridge"))
+            )
         found = _put_line(ctx, wall, items)
         if found:
             return found

@@ -375,6 +375,7 @@ HALL = Programme(
         Wish(work.doormat),
         Wish(work.console, 0.85),
         Wish(work.hall_bench, 0.8),
+        Wish(piece("shoe rack", clear=0.3), 0.7),
         Wish(
             either(0.5, piece("wardrobe", most=(1.3, 0.65, 2.4)), piece("cupboard", most=(1.3, 0.65, 2.4))),
             0.6,
@@ -447,6 +448,7 @@ CLOSET = Programme(
         Wish(sleep.clothes, above=4),
         Wish(sleep.clothes, above=6),
         Wish(open_floor("bench", clear=0.3), 0.6, above=4),
+        Wish(piece("shoe rack", clear=0.3), 0.6),
         Wish(corner("shoes"), times=between(2, 4)),
         Wish(corner("suitcase"), 0.6),
         Wish(corner("laundry basket"), 0.4),

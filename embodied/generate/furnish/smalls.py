@@ -19,6 +19,8 @@ from embodied.generate.furnish.stock import Size
 
 EDGE, APART = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
+GRID = 0.03
+"""Between places that are looked at for a gap, metres."""
 SEATS = {
     "sofa": (0.16, 0.36),
     "corner sofa": (0.3, 0.3),
@@ -167,6 +169,51 @@ class Tops:
             return self._lay(asset, board, taken, yaw, own, (w, d, h))
         return None
 
+    def put_in_gap(self, asset: Asset, board: Board, spot: str, turn: float, size: Size | None = None) -> Thing | None:
+        """Rest `asset` on a board wherever there is a gap for it, near `spot` if it can be; None where there is none.
+
+        Args:
+          turn: how far it may be turned either way, radians; 3 or more for any way.
+        """
+        ctx, rng = self.ctx, self.ctx.rng
+        w, d, h = size or asset.size
+        if h > board.headroom - 0.01 or board.top + h > ctx.space.bottom + ctx.space.height:
+            return None
+        x0, x1, y0, y1 = board.area
+        for yaw in (float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi)), 0.0):
+            a, b = _reach((w, d, h), yaw)
+            gaps = self._gaps(board, (x0 + a, x1 - a, y0 + b, y1 - b), a, b)
+            if not len(gaps):
+                continue
+            rank = rng.random(len(gaps))
+            if spot in ("back", "front"):
+                rank += 3.0 * (gaps[:, 1] if spot == "front" else -gaps[:, 1]) / max(y1 - y0, 1e-6)
+            elif spot in ("side", "centre"):
+                off = np.abs(gaps[:, 0] - (x0 + x1) / 2) / max(x1 - x0, 1e-6)
+                rank += -3.0 * off if spot == "side" else 3.0 * off
+            for k in np.argsort(rank)[:3]:
+                u, v = (float(c) for c in gaps[k])
+                x, y = board.carrier.local(u, v)
+                own = box(x, y, w, d, board.carrier.yaw + yaw, board.top, board.top + h)
+                if ctx.space.inside(own) and not self._meets_others(own, board.carrier):
+                    self.alike[asset.object_class] += 1
+                    ctx.stock.note([asset])
+                    return self._lay(asset, board, (u - a, v - b, u + a, v + b), yaw, own, (w, d, h))
+        return None
+
+    def _gaps(self, board: Board, within: tuple[float, float, float, float], a: float, b: float) -> np.ndarray:
+        """(n, 2) middles, in the carrier's frame, at which something a, b metres half wide and deep would lie free."""
+        low_x, high_x, low_y, high_y = within
+        if low_x > high_x or low_y > high_y:
+            return np.zeros((0, 2))
+        us = np.linspace(low_x, high_x, max(1, min(24, int((high_x - low_x) / GRID) + 1)))
+        vs = np.linspace(low_y, high_y, max(1, min(24, int((high_y - low_y) / GRID) + 1)))
+        points = np.stack(np.meshgrid(us, vs), -1).reshape(-1, 2)
+        taken = np.array(self.taken.setdefault(board.key, [])).reshape(-1, 4)
+        clear_x = (points[:, :1] - a >= taken[:, 2] + APART) | (points[:, :1] + a <= taken[:, 0] - APART)
+        clear_y = (points[:, 1:] - b >= taken[:, 3] + APART) | (points[:, 1:] + b <= taken[:, 1] - APART)
+        return np.asarray(points[(clear_x | clear_y).all(axis=1)])
+
     def put_exactly(self, asset: Asset, board: Board, at: tuple[float, float], turn: float) -> None:
         """Rest `asset` at a point of a board, moved inwards where it would stick out, if the place is free."""
         x0, x1, y0, y1 = board.surface.x0, board.surface.x1, board.surface.y0, board.surface.y1
@@ -265,7 +312,7 @@ def clutter(ctx: Context) -> None:
                 if asset is None or not tops.allows(asset):
                     continue
                 places = [group[k]] if repeats > 1 else [group[int(i)] for i in ctx.rng.permutation(len(group))[:3]]
-                any(tops.put(asset, _main(thing), spot, turn) for thing in places)
+                any(tops.put(asset, main_board(thing), spot, turn) for thing in places)
     for thing in carriers:
         _shelves(tops, thing, density)
     for thing in carriers:
@@ -280,7 +327,7 @@ def _hollow(asset: Asset) -> bool:
     )
 
 
-def _main(thing: Thing) -> Board:
+def main_board(thing: Thing) -> Board:
     """The surface that one puts things on first: large and open to above."""
     surfaces = thing.asset.surfaces
     return Board(thing, max(surfaces, key=lambda s: (min(s.headroom, 0.6), (s.x1 - s.x0) * (s.y1 - s.y0))))
@@ -289,7 +336,7 @@ def _main(thing: Thing) -> Board:
 def _set_table(tops: Tops, table: Thing) -> None:
     """Something in the middle, and now and then places laid before the chairs."""
     ctx = tops.ctx
-    top = _main(table)
+    top = main_board(table)
     for role in ctx.rng.permutation(len(CENTREPIECES))[: 1 + int(ctx.chance(0.3))]:
         asset = ctx.pick(CENTREPIECES[int(role)], most=(0.5, 0.5, 0.6))
         if asset is not None and ctx.chance(0.85):
@@ -402,7 +449,7 @@ def _more(tops: Tops, thing: Thing, density: float) -> None:
     ctx = tops.ctx
     if thing.asset.object_class in SHELVES or thing.role in ("bed", "dining chair", "bedside table", "bench"):
         return
-    top = _main(thing)
+    top = main_board(thing)
     area = (top.surface.x1 - top.surface.x0) * (top.surface.y1 - top.surface.y0)
     count = int(ctx.rng.poisson(min(area * 1.6, 2.0) * density))
     if not count:

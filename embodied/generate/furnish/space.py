@@ -164,12 +164,13 @@ class RoomSpace:
             else None
         )
 
-    def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False) -> bool:
+    def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False, aside: bool = False) -> bool:
         """Whether a solid may be put at `b`.
 
         Args:
           ignore: solids it may overlap (the table a chair is pushed under).
           passage: whether it may reach into keep-outs and clearances (a curtain, a rug).
+          aside: whether it may reach into clearances (slippers).
         """
         if self._rectangle is not None:
             x0, y0, x1, y1 = self._rectangle
@@ -186,7 +187,7 @@ class RoomSpace:
         for other in self.solids:
             if overlap(b, other) and not any(other is i for i in ignore):
                 return False
-        return passage or not any(overlap(b, c) for c in self.clearances)
+        return passage or aside or not any(overlap(b, c) for c in self.clearances)
 
     def is_clear(self, b: Box) -> bool:
         """Whether no solid reaches into the clearance `b`."""
