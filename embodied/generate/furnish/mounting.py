@@ -14,6 +14,8 @@ from embodied.generate.furnish.looks import looks
 from embodied.generate.furnish.space import RoomSpace, Wall, box, overlap
 from embodied.generate.furnish.stock import Size
 
+DEEP = 0.12
+"""What comes farther out of the wall must leave room to walk past, metres."""
 Spot = tuple[Wall, float]
 """A wall and a position along it, metres."""
 Shares = Callable[[], Iterable[float]]
@@ -55,6 +57,9 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
     exact = box(x, y, w, d, wall.yaw, base, base + h)
     if not ctx.space.fits(exact, passage=hanging.passage) or any(overlap(wide, q) for q in ctx.space.solids):
         return None
+    plan = ctx.space.walkable([exact], ()) if d > DEEP and not hanging.passage else ctx.space.walk
+    if plan is None:
+        return None
     role = hanging.role or hanging.group
     thing = Thing(
         asset=asset,
@@ -68,7 +73,7 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
         role=role,
         wall=wall,
     )
-    ctx.space.add([exact])
+    ctx.space.add([exact], (), plan)
     ctx.things.append(thing)
     ctx.stock.note([asset])
     return thing

@@ -19,8 +19,8 @@ from embodied.generate.furnish.stock import Size
 
 EDGE, APART = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
-GRID = 0.03
-"""Between places that are looked at for a gap, metres."""
+GRID, MOST_STEPS = 0.03, 16
+"""Between places that are looked at for a gap, metres, and how many are along one side."""
 SEATS = {
     "sofa": (0.16, 0.36),
     "corner sofa": (0.3, 0.3),
@@ -180,7 +180,8 @@ class Tops:
         if h > board.headroom - 0.01 or board.top + h > ctx.space.bottom + ctx.space.height:
             return None
         x0, x1, y0, y1 = board.area
-        for yaw in (float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi)), 0.0):
+        drawn = float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi))
+        for yaw in (drawn, 0.0) if drawn else (0.0,):
             a, b = _reach((w, d, h), yaw)
             gaps = self._gaps(board, (x0 + a, x1 - a, y0 + b, y1 - b), a, b)
             if not len(gaps):
@@ -206,13 +207,12 @@ class Tops:
         low_x, high_x, low_y, high_y = within
         if low_x > high_x or low_y > high_y:
             return np.zeros((0, 2))
-        us = np.linspace(low_x, high_x, max(1, min(24, int((high_x - low_x) / GRID) + 1)))
-        vs = np.linspace(low_y, high_y, max(1, min(24, int((high_y - low_y) / GRID) + 1)))
-        points = np.stack(np.meshgrid(us, vs), -1).reshape(-1, 2)
+        us, vs = _steps(low_x, high_x), _steps(low_y, high_y)
         taken = np.array(self.taken.setdefault(board.key, [])).reshape(-1, 4)
-        clear_x = (points[:, :1] - a >= taken[:, 2] + APART) | (points[:, :1] + a <= taken[:, 0] - APART)
-        clear_y = (points[:, 1:] - b >= taken[:, 3] + APART) | (points[:, 1:] + b <= taken[:, 1] - APART)
-        return np.asarray(points[(clear_x | clear_y).all(axis=1)])
+        beside = (us[:, None] >= taken[:, 2] + a + APART) | (us[:, None] <= taken[:, 0] - a - APART)  # (columns, n)
+        before = (vs[:, None] >= taken[:, 3] + b + APART) | (vs[:, None] <= taken[:, 1] - b - APART)  # (rows, n)
+        columns, rows = np.nonzero(np.all(beside[:, None] | before[None], axis=2))
+        return np.stack([us[columns], vs[rows]], axis=1)
 
     def put_exactly(self, asset: Asset, board: Board, at: tuple[float, float], turn: float) -> None:
         """Rest `asset` at a point of a board, moved inwards where it would stick out, if the place is free."""
@@ -268,6 +268,12 @@ class Tops:
     def allows(self, asset: Asset, most: int = 2) -> bool:
         """Whether the room may hold one more of its class, of which `most` are few."""
         return self.alike[asset.object_class] < max(MOST_ALIKE.get(asset.object_class, 2), most)
+
+
+def _steps(low: float, high: float) -> np.ndarray:
+    """Places from `low` to `high`, about GRID apart, MOST_STEPS at most."""
+    count = max(1, min(MOST_STEPS, int((high - low) / GRID) + 1))
+    return low + (high - low) / max(count - 1, 1) * np.arange(count)
 
 
 def _reach(size: tuple[float, float, float], yaw: float) -> tuple[float, float]:

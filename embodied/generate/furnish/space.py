@@ -17,13 +17,12 @@ import numpy as np
 import shapely
 
 from embodied.house.house import DOORS, House, Opening, Room, Stair
+from embodied.navigation.free_space import LOW
 
 CELL = 0.05
 """Side of a cell of the walking plan, metres."""
 TOUCH = 1e-3
 """Boxes that overlap by less than this only touch, metres."""
-WALKABLE = 0.06
-"""Things lower than this (rugs, mats) can be walked over, metres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +200,7 @@ class RoomSpace:
         """
         plan = self.walk.copy()
         for b in added:
-            if b.bottom - self.bottom < 1.9 and b.top - self.bottom > WALKABLE:
+            if b.bottom - self.bottom < 1.9 and b.top - self.bottom > LOW:
                 cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius - 0.02)), 0)
         cells = [self._cell(p) for p in (*self.entries, *reach)]
         if not cells:
@@ -217,6 +216,12 @@ class RoomSpace:
         if stats[main, cv2.CC_STAT_AREA] < 0.88 * free:
             return None
         return plan
+
+    def taken(self, b: Box) -> float:
+        """How much of the floor that one can walk on `b` would take, square metres."""
+        plan = self.walk.copy()
+        cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius)), 0)
+        return float(int(self.walk.sum()) - int(plan.sum())) * CELL**2
 
     def add(self, solids: Iterable[Box], clearances: Iterable[Box] = (), plan: np.ndarray | None = None) -> None:
         """Put boxes into the room for good."""

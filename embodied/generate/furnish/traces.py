@@ -11,7 +11,7 @@ from embodied.generate.furnish.arrange import Item, ScoredPose, Thing, floor_pos
 from embodied.generate.furnish.context import Context, door_distance
 from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first, longest_first
 from embodied.generate.furnish.smalls import SHELVES, Board, Tops, main_board
-from embodied.generate.furnish.space import Wall
+from embodied.generate.furnish.space import CELL, Box, Wall, box
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Trace:
     """Of its class in one room."""
 
 
+LARGEST = 0.25
+"""Most of the floor that one can walk on which a thing left on it takes from it, square metres."""
 CUT_TO_FIT = ("storage box", "folded clothes", "towel", "row of folders", "cushion", "heap of clothes")
 """Object classes that come in many sizes."""
 COUNTERS = ("counter", "kitchen sink")
@@ -395,7 +397,7 @@ def _lay_on(ctx: Context, tops: Tops, trace: Trace, asset: Asset) -> None:
     carriers = [t for t in ctx.things if _is(t, trace.on) and t.asset.surfaces]
     if not carriers:
         return
-    carriers = [carriers[int(k)] for k in ctx.rng.permutation(len(carriers))]
+    carriers = [carriers[int(k)] for k in ctx.rng.permutation(len(carriers))[:6]] if not trace.near else carriers
     if anchors := [t for t in ctx.things if _is(t, trace.near)]:
         carriers.sort(key=lambda t: min(math.hypot(t.x - a.x, t.y - a.y) for a in anchors) + 0.5 * ctx.rng.random())
     for carrier in carriers[:3]:
@@ -466,7 +468,17 @@ def _put_down(ctx: Context, trace: Trace, asset: Asset) -> bool:
 
         poses = floor_poses(ctx.space, score=aside, yaws=(turn,), step=0.35)
         item = Item(asset, role=asset.object_class, aside=True)
-    return ctx.put([item], poses, "left", tries=40) is not None
+    free = ctx.space.walk.sum() * CELL**2
+    likely = sorted(poses, key=lambda p: -p.score)[:24]
+    chosen = [p for p in likely if ctx.space.taken(_where(item, p, ctx.space.bottom)) < min(LARGEST, 0.1 * free)]
+    return ctx.put([item], chosen, "left") is not None
+
+
+def _where(item: Item, pose: ScoredPose, z: float) -> Box:
+    """The box of an arrangement's only item at a pose."""
+    w, d, h = item.extent
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    return box(pose.x - s * item.y, pose.y + c * item.y, w, d, pose.yaw + item.yaw, z, z + h)
 
 
 def _to_furniture(ctx: Context, x: float, y: float) -> float:
