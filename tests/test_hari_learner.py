@@ -14,8 +14,16 @@ from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, policy_of
-from agents.hari.pretraining import Curriculum, _begin, guided_share, pretrain, pretraining_success, redirect
+from agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
+from agents.hari.pretraining import (
+    Curriculum,
+    _begin,
+    give_subgoal,
+    guided_share,
+    pretrain,
+    pretraining_success,
+    redirect,
+)
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, padded, percept
@@ -297,6 +305,39 @@ def test_a_walk_is_redirected_as_the_assistant_would_and_the_others_go_on():
         torch.testing.assert_close(after[i], before[1][i])
     wanted = executor.network.encode(torch.from_numpy(executor.words.rows(reply.description, "goal")[None])).alone()[0]
     torch.testing.assert_close(after[1], wanted)
+
+
+def test_a_walk_with_a_subgoal_from_the_beginning_goes_no_farther():
+    world, lessons = grid_lessons()
+    for longest in (1, 2, 3):
+        for task in lessons.training:
+            walk = _begin(lessons, task, np.random.default_rng(0))
+            far = int(world.graph.hops[task.start.node, task.goal_nodes[0]])
+            give_subgoal(walk, lessons.describer, longest)
+            (target,) = walk.task.goal_nodes
+            steps = min(longest, (far + 1) // 2)
+            assert world.graph.hops[task.start.node, target] == steps
+            if steps == 1:
+                assert walk.goal == lessons.describer.step(world, task.start.node, target)
+
+
+@pytest.mark.parametrize("afresh", [False, True])
+def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
+    world, lessons = grid_lessons()
+    executor = new_executor(dataclasses.replace(SMALL, afresh=afresh), words_of(world))
+    executor.network.eval()
+    env = HariEnv({"grid": world}, HariAssistant(lessons.describer), lessons.describer)
+    first = env.reset(lessons.training[1])
+    reader = Reader(executor)
+    considered, belief = consider(reader, [first], None)
+    belief = carry(considered, [Move(0)], belief)
+    torch.testing.assert_close(belief.carried[0], considered.belief[0])
+    same = consider(reader, [first], belief)[1]
+    torch.testing.assert_close(same.carried[0], considered.belief[0])
+    asked = env.step(Ask(Intention.SUB))
+    after = consider(reader, [asked], belief)[1]
+    expected = executor.network.begin(1)[0] if afresh else considered.belief[0]
+    torch.testing.assert_close(after.carried[0], expected)
 
 
 # Learning ---------------------------------------------------------------------------------------

@@ -43,6 +43,11 @@ class ExecutionConfig(ValidatedRunSettings):
     falls linearly from 1 to 0 over them (docs/sources.md, S81)."""
     redirected: float = 0.0
     """Share of the training episodes that are given a sub-goal on their way, as SUB does (docs/sources.md, S132)."""
+    subgoals: float = 0.0
+    """Share of the training episodes that have a sub-goal of one to three nodes from the beginning, worded as SUB's
+    answer is (docs/sources.md, S144)."""
+    afresh: bool = False
+    """Whether its belief begins anew when the goal on top of the stack is another one (docs/sources.md, S145)."""
     clip: float = 1.0
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
@@ -60,7 +65,7 @@ class ExecutionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_ALL, "dropout", "environment_dropout")
-        require(self, SHARE, "cooldown", "guided", "described", "redirected")
+        require(self, SHARE, "cooldown", "guided", "described", "redirected", "subgoals")
         require_word(self, "sees", SEES)
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")

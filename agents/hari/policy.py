@@ -64,6 +64,8 @@ class Belief:
 
     carried: Tensor
     """(B, h) b^s of the last move."""
+    depths: tuple[int, ...]
+    """Goals on each agent's stack when that was; 0 where none is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,10 @@ class Considered:
 def consider(reader: Reader, observations: Observations, memory: Belief | None) -> tuple[Considered, Belief]:
     """Run the execution policy, which learns no more, on every agent that has not ended."""
     network, words = reader.executor.network, reader.executor.words
-    memory = memory or Belief(network.begin(len(observations)).clone())
+    depths = tuple(len(o.goal_descriptions) if o is not None else 0 for o in observations)
+    memory = memory or Belief(network.begin(len(observations)).clone(), depths)
+    if reader.executor.config.afresh:
+        memory = _afresh(memory, depths, network.begin(1)[0])
     rows = [i for i, o in enumerate(observations) if o is not None]
     seen = [o for o in observations if o is not None]
     states = [reader("state", o.state_description) for o in seen]
@@ -111,13 +116,21 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     return Considered(rows, belief, log_moves), memory
 
 
+def _afresh(memory: Belief, depths: tuple[int, ...], first: Tensor) -> Belief:
+    """The beliefs, those of agents whose stack has grown or shrunk begun anew."""
+    changed = [i for i, (now, then) in enumerate(zip(depths, memory.depths, strict=True)) if now != then]
+    carried = memory.carried.clone()
+    carried[changed] = first
+    return Belief(carried, depths)
+
+
 def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
     """The beliefs after `actions`: those of agents that moved are the new ones."""
     carried = memory.carried.clone()
     for k, i in enumerate(considered.rows):
         if isinstance(actions[i], Move):
             carried[i] = considered.belief[k]
-    return Belief(carried)
+    return Belief(carried, memory.depths)
 
 
 def available(observation: Observation) -> np.ndarray:

@@ -32,7 +32,7 @@ from agents.imitation.loop import Note, Progress, Session, dropout_of, falling_r
 from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
-from embodied.assistants.hari import described_subgoal
+from embodied.assistants.hari import LONGEST, described_subgoal
 from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Sight, Task
 from embodied.locks import locked
 from embodied.seeds import stream
@@ -135,6 +135,10 @@ def learn_once(
         for walk in walks:
             walk.described = max(0.0, 1 - walk.rng.random() / config.described) if config.described else 0.0
             walk.channels = hidden_channels(executor.seeing.size, config.environment_dropout, walk.rng)
+    if config.subgoals:
+        for walk in walks:
+            if walk.rng.random() < config.subgoals:
+                give_subgoal(walk, lessons.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
     if config.redirected:
         for walk in walks:
             if walk.rng.random() < config.redirected:
@@ -174,7 +178,10 @@ def _play(
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
             break
-        goals = redirect(executor, lessons.describer, walks, [i for i in alive if walks[i].redirected_at == t], goals)
+        redirected = [i for i in alive if walks[i].redirected_at == t]
+        goals = redirect(executor, lessons.describer, walks, redirected, goals)
+        if executor.config.afresh and redirected:
+            beliefs = beliefs.index_put((torch.tensor(redirected),), executor.network.begin(len(redirected)))
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
         told = [_thinned(lessons.describer, walks[i]) for i in alive]
         batch = perceived(executor, [walks[i] for i in alive], told, [candidates for candidates, _ in reach])
@@ -200,18 +207,23 @@ def _begin(lessons: Curriculum, task: Task, rng: np.random.Generator) -> Walk:
     return Walk(task, place, task.start, described, rng)
 
 
+def give_subgoal(walk: Walk, describer: Describer, longest: int = LONGEST) -> None:
+    """Let the walk go no farther than to the sub-goal that the assistant would name where it is."""
+    way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0], longest)
+    walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
+
+
 def redirect(
     executor: Executor, describer: Describer, walks: Sequence[Walk], which: Sequence[int], goals: Encoded
 ) -> Encoded:
     """Give some walks the sub-goal that the assistant would name where they are; all walks' goals as encoded.
 
-    The belief is carried on, as when SUB is asked in the middle of an episode.
+    Beliefs are not touched: they are carried on, as when SUB is asked in the middle of an episode.
     """
     if not which:
         return goals
-    for walk in (walks[i] for i in which):
-        way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0])
-        walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
+    for i in which:
+        give_subgoal(walks[i], describer)
     rows = torch.from_numpy(padded([executor.words.rows(walks[i].goal, "goal") for i in which]))
     alone = dict(enumerate(goals.alone())) | dict(zip(which, executor.network.encode(rows).alone(), strict=True))
     return Encoded.together([alone[i] for i in range(len(walks))])
