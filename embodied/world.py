@@ -138,7 +138,7 @@ class World:
                 from embodied.render.gloss import Gloss  # late: loads Embree
 
                 bake = self._baked()
-                overlay = Gloss(bake.lit, shine_of(bake, [room.id for room in self.house.rooms]))
+                overlay = Gloss(bake.lit, shine_of(bake))
             if self.lit is not None and self.pictures.backend == "filament":
                 from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
@@ -311,12 +311,8 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_diff
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
-def shine_of(bake: Bake, rooms: Sequence[str]) -> Shine:
-    """What a bake knows of its house's gloss; colours of metal faces from the middle of each face.
-
-    Args:
-      rooms: ids of the house's rooms, in their order.
-    """
+def shine_of(bake: Bake) -> Shine:
+    """What a bake knows of its house's gloss; colours of metal faces from the middle of each face."""
     from embodied.light.colours import linear  # late: loads the path tracer
     from embodied.render.gloss import Shine
 
@@ -340,10 +336,9 @@ def shine_of(bake: Bake, rooms: Sequence[str]) -> Shine:
         at = mesh.uv[mesh.faces].mean(1)
         x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
         tint.append(linear(picture[y, x] / 255.0))
-    exposure, middle = bake.exposure, np.median(bake.exposure.gains, axis=0)
-    gain_of_room = dict(zip(rooms, exposure.gains, strict=True))
-    gains = [exposure.outdoors if m.kind == "outdoor" else gain_of_room.get(m.room, middle) for m in lit.meshes]
-    return Shine(gloss, tint, glow, [g.astype(np.float32) for g in gains], float(np.median(exposure.gains)))
+    exposure = bake.exposure
+    outdoors = exposure.outdoors.astype(np.float32)
+    return Shine(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)))
 
 
 def makers(pictures: PictureSettings) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes.util
 import functools
+import importlib.util
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -28,9 +29,11 @@ from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.render.filament import FilamentPainter
+from embodied.world import shine_of
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
+    from embodied.render.gloss import Gloss
 
 HOUSES, VIEWS = 4, 3
 """How many houses are compared, and rooms of each."""
@@ -42,11 +45,18 @@ AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
 BAKES = ("fast", "normal")
 """Light qualities that are compared; what is traced reads the last one."""
-DRAWN = ("unlit", *BAKES, *(("filament",) if ctypes.util.find_library("vulkan") else ()))
+DRAWN = (
+    *("unlit", *BAKES),
+    *(("gloss",) if importlib.util.find_spec("embreex") else ()),
+    *(("filament",) if ctypes.util.find_library("vulkan") else ()),
+)
+"""What a Renderer draws: 'gloss' and 'filament' over the last bake, where they are installed."""
 WAYS = (*DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
 VFOV = math.radians(65.0)
+SHOWN = 0.005
+"""Share of a view's pixels that mirrors and metals have to fill before they are judged by themselves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,14 +160,22 @@ def draw(
     for way in WAYS:
         if way in DRAWN:
             lit = None if way == "unlit" else baked.get(way, baked[BAKES[-1]]).lit
-            painter = FilamentPainter(house, catalogue, baked[BAKES[-1]].lit) if way == "filament" else None
-            with Renderer(house, catalogue, lit=lit, painter=painter) as r:
+            best = baked[BAKES[-1]]
+            painter = FilamentPainter(house, catalogue, best.lit) if way == "filament" else None
+            overlay = _gloss(best) if way == "gloss" else None
+            with Renderer(house, catalogue, lit=lit, painter=painter, overlay=overlay) as r:
                 hour = house.sky.hour
                 shots += [once(way, v[0], functools.partial(_drawn, r, way, v, hour, size)) for v in views]
         else:
             tracer = Tracer(baked[BAKES[-1]], house, quality=way, rays=16 if way == "glossy" else rays)
             shots += [once(way, v[0], functools.partial(_traced, tracer, way, v, house.sky.hour, size)) for v in views]
     return shots
+
+
+def _gloss(baked: Bake) -> Gloss:
+    from embodied.render.gloss import Gloss  # late: loads Embree
+
+    return Gloss(baked.lit, shine_of(baked))
 
 
 def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float, size: tuple[int, int]) -> Shot:
@@ -205,7 +223,8 @@ def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
     """Medians over all views per way, and what the bakes cost.
 
     Against the diffuse reference only diffuse surfaces count: a page cannot follow the eye as mirrors
-    and metals do. With them it is 'psnr_diffuse_all'; the full reference is always compared whole.
+    and metals do. With them it is 'psnr_diffuse_all'. The full reference is compared whole, and mirrors and metals
+    alone with it as 'psnr_shiny' (in the median over the views that show at least SHOWN of them).
     """
     by = {(s.room, s.hour, s.way): s for s in shots}
     views = sorted({(s.room, s.hour) for s in shots})
@@ -219,6 +238,9 @@ def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
             ]
             row[f"psnr_{name}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
             row[f"ssim_{name}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
+        shiny = [(v, ~plain) for v in views if (plain := by[*v, "diffuse"].plain) is not None]
+        alone = [psnr(by[*v, way].rgb, by[*v, "reference"].rgb, m) for v, m in shiny if m.mean() >= SHOWN]
+        row["psnr_shiny"] = None if way == "reference" or not alone else float(np.median(alone))
         rows.append(row)
     bakes = [b[BAKES[-1]] for b in baked]
     pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
@@ -253,15 +275,16 @@ def table(facts: dict) -> str:
     """The measures as Markdown."""
     number = lambda x, form: "" if x is None else format(x, form)
     lines = [
-        "| way | ms per 256 × 256 | PSNR / SSIM to reference | to diffuse reference "
+        "| way | ms per 256 × 256 | PSNR / SSIM to reference | mirrors and metal alone | to diffuse reference "
         "| the same with mirrors and metal |",
-        "|---|---|---|---|---|",
+        "|---|---|---|---|---|---|",
     ]
     for r in facts["rows"]:
         cells = [
             f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}"
             for t in ("reference", "diffuse", "diffuse_all")
         ]
+        cells.insert(1, number(r["psnr_shiny"], ".1f"))
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
     spent, last = facts["processor"], facts["processor"][BAKES[-1]]
     lines.append(

@@ -55,6 +55,17 @@ class Exposure:
             np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)
         ).astype(np.float32)
 
+    def near(self, position: np.ndarray) -> np.ndarray:
+        """(n, 3) float32 gains of the grid's points that are nearest to points (n, 3): `at` for many of them."""
+        gains, low = self._near
+        k = np.rint((np.asarray(position, np.float32) - low) / CELL.astype(np.float32)).astype(np.int64)
+        return gains[tuple(np.clip(k, 0, np.array(gains.shape[:3]) - 1).T)]
+
+    @functools.cached_property
+    def _near(self) -> tuple[np.ndarray, np.ndarray]:
+        grid, low = self._grid
+        return np.ascontiguousarray(np.exp(np.moveaxis(grid, 0, -1)), np.float32), low.astype(np.float32)
+
     @functools.cached_property
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:
         """Log gains (3, nx, ny, nz) on a grid of `CELL` over the house, and its lowest corner."""

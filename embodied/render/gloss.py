@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -23,7 +23,7 @@ from embodied.errors import UnableError
 from embodied.geometry import r2
 from embodied.render.camera import Camera
 from embodied.render.film import light_of, shown_of
-from embodied.render.mirrored import TILE, Mirrored, evened
+from embodied.render.mirrored import FINE_TILE, TILE, Mirrored, evened
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 MATTE = 0.7
@@ -60,8 +60,10 @@ class Shine:
     """Per mesh (m, 3) float32 linear colour of each face; None where none is of metal."""
     glow: Sequence[np.ndarray | None]
     """Per page (h, w, 3) radiance of what glows; None where nothing does."""
-    gains: Sequence[np.ndarray]
-    """Per mesh (3,) what light is multiplied by in its room before it is shown; outdoors, what windows show."""
+    gain_at: Callable[[np.ndarray], np.ndarray]
+    """From points (n, 3) to what light is multiplied by there before it is shown, (n, 3)."""
+    outdoors: np.ndarray
+    """(3,) what light is multiplied by that windows show."""
     middle: float
     """What light is multiplied by in rooms, in the median."""
 
@@ -84,8 +86,8 @@ class _Faces:
     """(m, 3) float32 roughness, specular, metallic; zero where matte."""
     tint: np.ndarray
     """(m, 3) float32."""
-    gain: np.ndarray
-    """(m, 3) float32 what light is multiplied by before it is shown on the face."""
+    outer: np.ndarray
+    """(m,) bool, beyond the windows."""
 
 
 class Gloss:
@@ -99,8 +101,10 @@ class Gloss:
         self._faces = _faces_of(lit, shine)
         self._pages = lit.pages
         self._scene = _scene_of(self._faces.corners)
-        gain_of_page = {m.page: g for m, g in zip(lit.meshes, shine.gains, strict=True)}
-        small = [_coarse(p, g, gain_of_page.get(i)) for i, (p, g) in enumerate(zip(lit.pages, shine.glow, strict=True))]
+        self._gain_at, self._beyond = shine.gain_at, shine.outdoors / GLASS
+        some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
+        gains = [shine.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
+        small = [_coarse(*one) for one in zip(lit.pages, shine.glow, gains, strict=True)]
         self._width = np.array([s.shape[1] for s in small], np.int32)
         self._height = np.array([s.shape[0] for s in small], np.int32)
         texels = self._width.astype(np.int64) * self._height
@@ -159,9 +163,11 @@ class Gloss:
         onward = seen.ahead + 2 * c * half
         above = np.einsum("ij,ij->i", onward, seen.normal)[:, None] > 0
         start = np.asarray(camera.position, np.float32) + seen.ahead * seen.distance[:, None] + seen.normal * LIFT
-        face, _, u, v = _first(self._scene, start, onward)
-        light = self._light_at(face, u, v, sharp=sharp) / faces.gain[face]
-        light = np.minimum(light, BRIGHTEST / self._middle) * faces.gain[seen.face]
+        face, far, u, v = _first(self._scene, start, onward)
+        there = start + onward * np.where(face >= 0, far, 0)[:, None]
+        gain = np.where(faces.outer[face][:, None], self._beyond, self._gain_at(there))
+        light = self._light_at(face, u, v, sharp=sharp) / gain
+        light = np.minimum(light, BRIGHTEST / self._middle) * self._gain_at(start)
         gloss = faces.gloss[seen.face]
         rough, specular, metal = gloss[:, :1], gloss[:, 1:2], gloss[:, 2:]
         f0 = 0.08 * specular * (1 - metal) + faces.tint[seen.face] * metal
@@ -201,8 +207,8 @@ class Gloss:
     def _rough(self, seen: _Seen, camera: Camera, grid: Mirrored) -> None:
         """Fill `grid` with what rough surfaces lose and mirror, averaged over neighbours on the same surface."""
         row, column = np.divmod(seen.pixel, grid.shape[1])
-        chosen, k = seen.of(seen.dull), ((row % TILE) * TILE + column % TILE)[seen.dull]
-        half = _half_vectors(chosen.normal, chosen.rough, k)
+        chosen, k = seen.of(seen.dull), interleaved(TILE)[row % TILE, column % TILE][seen.dull]
+        half = _half_vectors(chosen.normal, chosen.rough, _lobe(TILE * TILE)[k])
         lost, mirrored = self._mirrored(camera, chosen, half, sharp=False)
         grid.values.reshape(-1, 6)[chosen.pixel] = np.concatenate([lost, mirrored], axis=1)
         grid.weight.ravel()[chosen.pixel] = 1
@@ -232,20 +238,22 @@ class Gloss:
         seen = self._seen(camera, _directions(camera, rgb.shape[:2], all_pixels, aside=aside), all_pixels)
         turn = np.repeat(np.arange(len(ROOKS)), len(pixels))
         row, column = np.divmod(all_pixels, rgb.shape[1])
-        k = (row % TILE * 2 + column % 2) * len(ROOKS) + turn
-        k = k[seen.which[seen.sharp]]
+        rows, columns = FINE_TILE
+        k = ((row % rows) * columns + column % columns) * len(ROOKS) + turn
+        u = _lobe(rows * columns * len(ROOKS))[k[seen.which[seen.sharp]]]
         seen = seen.of(seen.sharp)
         if not len(seen.pixel):
             return
-        half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, k))
+        half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, u))
         lost, mirrored = self._mirrored(camera, seen, half, sharp=True)
         where, which = np.unique(seen.pixel, return_inverse=True)
         sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(a.shape[1])], axis=1) / len(ROOKS)
-        mirrored, rough = sums(np.minimum(mirrored, WHITE)), sums((seen.rough >= SMOOTH)[:, None])[:, 0] > 0.5
+        values = sums(np.concatenate([lost, np.minimum(mirrored, WHITE)], axis=1))
+        rough = sums((seen.rough >= SMOOTH)[:, None])[:, 0] > 0.5
         if rough.any():
-            mirrored[rough] = evened(mirrored[rough], where[rough], rgb.shape[:2])
+            values[rough] = evened(values[rough], where[rough], rgb.shape[:2])
         own = light_of(out.reshape(-1, 3)[where])
-        out.reshape(-1, 3)[where] = shown_of(own * (1 - sums(lost)) + mirrored)
+        out.reshape(-1, 3)[where] = shown_of(own * (1 - values[:, :3]) + values[:, 3:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,12 +287,12 @@ def schlick(f0: np.ndarray, cos: np.ndarray, rough: np.ndarray) -> np.ndarray:
     return f0 + (1 - f0) * grazing * (1 - 0.9 * np.square(rough))
 
 
-def _half_vectors(normal: np.ndarray, rough: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """(n, 3) float32 directions in the lobes around `normal`, the k-th of TILE * TILE that repeat.
+def _half_vectors(normal: np.ndarray, rough: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """(n, 3) float32 directions in the lobes around `normal`, for numbers (n, 2) in [0, 1).
 
     Source: Walter et al. 2007 eq. 35 and 36 (GGX), the far tail left out as in the tracer; basis of Duff et al. 2017.
     """
-    u0, u1 = _lobe()[k].T
+    u0, u1 = u.T
     a2 = np.square(np.maximum(np.square(rough), 1e-3))
     cos = np.sqrt((1 - u0) / (1 + (a2 - 1) * u0))
     sin, phi = np.sqrt(np.maximum(1 - cos * cos, 0)), 2 * math.pi * u1
@@ -299,9 +307,17 @@ def _half_vectors(normal: np.ndarray, rough: np.ndarray, k: np.ndarray) -> np.nd
 
 
 @functools.cache
-def _lobe() -> np.ndarray:
-    """(TILE * TILE, 2) float32 evenly spread numbers in [0, 1): neighbours in the picture are far apart in the lobe."""
-    n = TILE * TILE
+def interleaved(n: int) -> np.ndarray:
+    """(n, n) int: numbers from 0 to n * n - 1, n a power of two, so that every aligned square of 4, 16, ... pixels has
+    consecutive ones (Morton 1966), which are spread over the whole lobe."""
+    bits = np.arange(n)
+    wide = np.sum([((bits >> b) & 1) << 2 * b for b in range(n.bit_length() - 1)], axis=0)
+    return 2 * wide[:, None] + wide[None, :]
+
+
+@functools.cache
+def _lobe(n: int) -> np.ndarray:
+    """(n, 2) float32 evenly spread numbers in [0, 1): neighbours in the picture are far apart in the lobe."""
     points = np.array([r2(k + 1) for k in range(n)]) % 1.0
     first = (np.argsort(np.argsort(points[:, 0])) + 0.5) / n * 0.98
     return np.stack([first, points[:, 1]], axis=1).astype(np.float32)
@@ -374,8 +390,6 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     outer = each(lambda i, m: m.kind == "outdoor")
-    gain = np.concatenate([np.tile(shine.gains[i], (len(m.faces), 1)) for i, m in solid]).astype(np.float32)
-    gain[outer] /= GLASS
     gloss = np.concatenate([_or_zeros(shine.gloss[i], m) for i, m in solid]).astype(np.float32) / 255
     gloss[outer] = 0
     return _Faces(
@@ -386,7 +400,7 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
         each(lambda i, m: i).astype(np.int32),
         gloss,
         np.concatenate([_or_zeros(shine.tint[i], m) for i, m in solid]).astype(np.float32),
-        gain,
+        outer,
     )
 
 

@@ -7,8 +7,13 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-TILE = 4
+TILE = 8
 """Pixels after which the directions in the lobe repeat."""
+FINE_TILE = (4, 2)
+"""The same for polished metal, looked at in full size: rows and columns."""
+GLINT = 1.5
+"""The most that rough surfaces mirror where a whole tile of rays was averaged; less where it was fewer, in
+proportion to what their mean is sure to: single rays from thin bars would be dots of light."""
 CREASE = 0.9
 """Cosine of two normals below which they belong to two surfaces."""
 
@@ -35,11 +40,12 @@ class Mirrored:
         self.weight = np.zeros((*shape, 1), np.float32)
 
     def smooth(self) -> None:
-        """Average over TILE pixels along rows and then columns, on the same surface."""
-        for axis, step in ((1, 1), (0, 1), (1, 3), (0, 3)):
+        """Average on the same surface so that every direction of a tile counts the same: over four pixels along rows
+        and columns, then over three of those sums, TILE / 2 apart."""
+        for axis, step, reach in ((1, 1, 2), (0, 1, 2), (1, TILE // 2, 1), (0, TILE // 2, 1)):
             total, weight = self.values.copy(), self.weight.copy()
-            for k in range(1, TILE // 2 + 1):
-                share = np.float32(0.5 if k == TILE // 2 else 1.0)
+            for k in range(1, reach + 1):
+                share = np.float32(0.5 if k == reach else 1.0)
                 near, far = _apart(axis, k * step)
                 same = (self._alike(near, far) * share)[..., None]
                 total[near] += self.values[far] * same
@@ -48,6 +54,8 @@ class Mirrored:
                 weight[far] += self.weight[near] * same
             self.values, self.weight = total, weight
         self.values /= np.maximum(self.weight, 1e-6)
+        most = GLINT * np.sqrt(self.weight / np.float32(TILE * TILE))
+        np.minimum(self.values[..., 3:], most, out=self.values[..., 3:])
 
     def edges(self) -> np.ndarray:
         """(h, w) uint8: pixels beside another surface of which one mirrors."""
@@ -91,14 +99,15 @@ class Mirrored:
 
 
 def evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(n, 3) values of pixels, averaged over those of them around each that look along the other directions of the
-    lobe: TILE rows, two columns."""
-    sums = np.zeros((size[0] * size[1], 4), np.float32)
-    sums[pixels, :3], sums[pixels, 3] = values, 1
+    """(n, k) values of pixels, averaged over those of them around each that look along the other directions of the
+    lobe: FINE_TILE."""
+    n = values.shape[1]
+    sums = np.zeros((size[0] * size[1], n + 1), np.float32)
+    sums[pixels, :n], sums[pixels, n] = values, 1
     across, down = np.array([0.5, 1, 0.5]), np.array([0.5, 1, 1, 1, 0.5])
-    sums = cv2.sepFilter2D(sums.reshape(*size, 4), -1, across, down, borderType=cv2.BORDER_CONSTANT)
-    sums = sums.reshape(-1, 4)[pixels]
-    return sums[:, :3] / sums[:, 3:]
+    planes = [cv2.sepFilter2D(p, -1, across, down, borderType=cv2.BORDER_CONSTANT) for p in sums.T.reshape(-1, *size)]
+    sums = np.stack([p.ravel()[pixels] for p in planes], axis=1)
+    return sums[:, :n] / sums[:, n:]
 
 
 def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
