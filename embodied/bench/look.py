@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,25 +11,20 @@ import cv2
 import numpy as np
 
 from assets.cache import write_bytes, write_json
+from embodied.bench.crops import Crop, kept_crops
 from embodied.generate import HouseConfig, generate_house
 from embodied.render.pictures import PictureSettings
-from embodied.world import World, open_world
+from embodied.world import open_world
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
-    from embodied.house.house import House, Placement
 
 HOUSES = 3
-"""How many are looked at."""
+"""How many are looked at unless told otherwise."""
 AREA = (35.0, 70.0)
 """Square metres of each, as in `bench light`."""
-LEAST, SIDE = 96, 224
-"""Pixels of the longer side of an object before it is shown, and of what is shown."""
-DRAWN = 448
-"""Pixels of the views that crops are cut from."""
-MARGIN = 1.25
-"""Side of a crop over the longer side of its object."""
-WORST = 30
+WORST, EACH, SMALL = 30, 4, 168
+"""Classes that are shown, crops of each of them, and their pixels."""
 
 _CHAIR = (423, 559, 765, 857)
 _LAMP = (619, 818, 846)
@@ -132,17 +126,6 @@ MAPPED: dict[str, tuple[int, ...]] = {
 ImageNet has no word for is not judged."""
 
 
-@dataclass(frozen=True, eq=False)
-class Crop:
-    """One object as it is shown to the judge."""
-
-    house: str
-    owner: str
-    object_class: str
-    rgb: np.ndarray
-    """(SIDE, SIDE, 3) uint8."""
-
-
 @dataclass(frozen=True)
 class LookReport:
     """What `embodied bench look` shows."""
@@ -159,19 +142,23 @@ def recognised(
     *,
     seed: int,
     pictures: PictureSettings,
+    houses: int = HOUSES,
     progress: Callable[[str], None] = lambda text: None,
 ) -> LookReport:
-    """Show every mapped object of HOUSES houses to a judge; write look.json and the worst crops to look_worst.jpg.
+    """Show every mapped object of some houses to a judge; write look.json and the worst crops to look_worst.jpg.
+
+    Crops that `out`/crops already holds, drawn by the same code, are not drawn again.
 
     Args:
       judge: from (n, SIDE, SIDE, 3) uint8 to (n, 5) classes of ImageNet, the likeliest first.
       seed: of the first house.
+      houses: how many, with consecutive seeds.
     """
     crops: list[Crop] = []
-    for k in range(HOUSES):
+    for k in range(houses):
         house = generate_house(seed + k, HouseConfig(area=AREA), catalogue=catalogue)
         with open_world(house, catalogue, cache, pictures) as world:
-            crops += crops_of(world)
+            crops += kept_crops(world, MAPPED, out / "crops")
         progress(f"house {seed + k}: {len(house.placements)} objects, {len(crops)} crops so far")
     five = judge(np.stack([c.rgb for c in crops])) if crops else np.zeros((0, 5), int)
     right = np.array([bool(set(MAPPED[c.object_class]) & set(map(int, f))) for c, f in zip(crops, five, strict=True)])
@@ -181,7 +168,7 @@ def recognised(
         by_class[name] = (right[mine].tolist(), mine)
     worst = sorted(by_class, key=lambda n: (np.mean(by_class[n][0]), -len(by_class[n][0])))[:WORST]
     facts = {
-        "houses": [seed + k for k in range(HOUSES)],
+        "houses": [seed + k for k in range(houses)],
         "quality": pictures.quality,
         "look": pictures.look,
         "crops": len(crops),
@@ -192,47 +179,11 @@ def recognised(
         "worst": worst,
     }
     write_json(out / "look.json", facts, indent=1)
-    shown = [crops[by_class[name][1][0]] for name in worst]
-    if shown:
-        picture = sheet(shown)[..., ::-1]
+    if worst:
+        rows = [sorted(by_class[name][1], key=lambda i: bool(right[i]))[:EACH] for name in worst]
+        picture = sheet([[crops[i] for i in row] for row in rows], right=[right[row] for row in rows])[..., ::-1]
         write_bytes(out / "look_worst.jpg", cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes())
     return LookReport(facts, table(facts))
-
-
-def crops_of(world: World) -> list[Crop]:
-    """Every mapped object of a house that is LEAST pixels large in the best view of it."""
-    wanted = [p for p in world.house.placements if p.object_class in MAPPED]
-    number = {owner: i + 1 for i, owner in enumerate(world.owners)}
-    nodes = [(at, np.bincount(world.renderer.seen(at)[1].ravel())) for at in world.graph.positions]
-    crops = []
-    for thing in wanted:
-        mine = number[thing.id]
-        size = [int(counts[mine]) if mine < len(counts) else 0 for _, counts in nodes]
-        best = int(np.argmax(size))
-        if size[best] and (rgb := _crop(world, thing, mine, nodes[best][0])) is not None:
-            crops.append(Crop(world.name, thing.id, thing.object_class, rgb))
-    return crops
-
-
-def _crop(world: World, thing: Placement, mine: int, eye: np.ndarray) -> np.ndarray | None:
-    """What stands in a square around an object, seen from `eye`; None if it is too small or hidden there."""
-    base = _elevation(world.house, thing)
-    middle = np.array([*thing.position[:2], base + thing.position[2] + thing.size[2] / 2]) - eye
-    apart = float(np.linalg.norm(middle))
-    yaw, pitch = math.atan2(middle[1], middle[0]), math.asin(middle[2] / max(apart, 1e-6))
-    radius = float(np.linalg.norm(thing.size)) / 2
-    vfov = float(np.clip(2.6 * math.atan2(radius, apart), math.radians(8), math.radians(80)))
-    view = world.renderer.view(eye, yaw, pitch, vfov, (DRAWN, DRAWN))
-    rows, columns = np.nonzero(view.ids == mine)
-    if len(rows) < LEAST * LEAST / 8 or max(np.ptp(rows), np.ptp(columns)) < LEAST:
-        return None
-    side = int(min(max(np.ptp(rows), np.ptp(columns)) * MARGIN, DRAWN))
-    top, left = (int(np.clip((a.min() + a.max() - side) / 2, 0, DRAWN - side)) for a in (rows, columns))
-    return cv2.resize(view.rgb[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_AREA)
-
-
-def _elevation(house: House, thing: Placement) -> float:
-    return house.storey_of(house.room_by_id[thing.room]).elevation
 
 
 def _of(crops: Sequence[Crop], name: str) -> list[int]:
@@ -251,14 +202,26 @@ def table(facts: dict) -> str:
     )
 
 
-def sheet(crops: Sequence[Crop], across: int = 6) -> np.ndarray:
-    """(h, w, 3) uint8: crops with their classes."""
-    cells = []
-    for crop in crops:
-        cell = crop.rgb.copy()
-        cell[:20] = 255
-        place = (4, 14)
-        cv2.putText(cell, crop.object_class, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
-        cells.append(cell)
-    cells += [np.full_like(cells[0], 255)] * (-len(cells) % across)
-    return np.concatenate([np.concatenate(cells[k : k + across], axis=1) for k in range(0, len(cells), across)])
+def sheet(rows: Sequence[Sequence[Crop]], right: Sequence[Sequence[bool]], across: int = 3) -> np.ndarray:
+    """(h, w, 3) uint8: a strip of up to EACH small crops per class, `across` strips side by side.
+
+    Args:
+      right: whether the judge has each; the others have a red rim.
+    """
+    strips = []
+    for crops, known in zip(rows, right, strict=True):
+        cells = [_small(crop, ok) for crop, ok in zip(crops, known, strict=True)]
+        cells += [np.full_like(cells[0], 255)] * (EACH - len(cells))
+        strip = np.concatenate([np.full((18, SMALL * EACH, 3), 255, np.uint8), np.concatenate(cells, axis=1)])
+        place = (4, 13)
+        cv2.putText(strip, crops[0].object_class, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+        strips.append(strip)
+    strips += [np.full_like(strips[0], 255)] * (-len(strips) % across)
+    return np.concatenate([np.concatenate(strips[k : k + across], axis=1) for k in range(0, len(strips), across)])
+
+
+def _small(crop: Crop, known: bool) -> np.ndarray:
+    cell = cv2.resize(crop.rgb, (SMALL, SMALL), interpolation=cv2.INTER_AREA)
+    if not known:
+        cv2.rectangle(cell, (0, 0), (SMALL - 1, SMALL - 1), (220, 30, 30), 2)
+    return cell

@@ -4,8 +4,8 @@ houses, pictures, steps and memory make the table of the main line; plays counts
 with help, seen with pixels, drive a body on wheels with live pictures; bakes lights a flat again and
 again; light compares the ways of drawing with a path tracer, growth lights houses of 40 to 400 m² and
 fits how the cost grows (fast, or --quality normal), codecs compares ways of storing what was drawn
-(choose --quality fast), look asks a network that has seen photographs only what the objects of three
-flats are (--quality, --look; optional packages). Close other programs first: the numbers are only as
+(choose --quality fast), look asks a network that has seen photographs only what the objects of --houses
+flats are (--quality, --look; optional packages; it goes on where it was stopped). Close other programs first: the numbers are only as
 good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
 and features in OUT/freeze and writes their digests; with --against it says of every part whether it is
 the same as in a file of them (docs/freeze.json), or differs and why that is meant.
@@ -51,10 +51,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
     parser.add_argument("--look", choices=LOOKS, default="matte", help="with what look shows crops (default: matte)")
     parser.add_argument(
-        "--houses", type=whole(), default=1000, help="houses that memory loads and drops (default: %(default)s)"
+        "--houses", type=whole(), help="that memory loads and drops (default: 1000), or whose things look shows (3)"
     )
     parser.add_argument(
-        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="where light and freeze write"
+        "--out",
+        type=folder_to_write,
+        default=Path("out/bench"),
+        metavar="DIR",
+        help="where light, growth, look and freeze write",
     )
     parser.add_argument(
         "--against", type=any_path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
@@ -89,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
         "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
-        "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
+        "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses or 1000),
     }
     measures = []
     for m in itertools.chain.from_iterable(lines[p]() for p in parts):
@@ -113,11 +117,18 @@ def light(args: argparse.Namespace, catalogue: Catalogue) -> int:
 def look(args: argparse.Namespace, catalogue: Catalogue) -> int:
     """How much of what is drawn a network knows that has seen photographs only."""
     from agents.vision.stranger import Stranger
-    from embodied.bench.look import recognised
+    from embodied.bench.look import HOUSES, recognised
 
-    pictures = PictureSettings(256, args.quality, look=args.look)
-    judge = Stranger().first_five
-    report = recognised(catalogue, args.cache, args.out, judge, seed=args.seed, pictures=pictures, progress=note)
+    report = recognised(
+        catalogue,
+        args.cache,
+        args.out,
+        Stranger().first_five,
+        seed=args.seed,
+        pictures=PictureSettings(256, args.quality, look=args.look),
+        houses=args.houses or HOUSES,
+        progress=note,
+    )
     show(args, report.facts, report.text)
     return 0
 

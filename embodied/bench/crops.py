@@ -1,0 +1,88 @@
+"""Crops of the objects of a house: each seen from the viewpoint that sees most of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from assets.cache import atomic_path, digest
+from assets.closure import code_digest
+
+if TYPE_CHECKING:
+    from embodied.house.house import House, Placement
+    from embodied.world import World
+
+LEAST, SIDE = 96, 224
+"""Pixels of the longer side of an object before it is shown, and of what is shown."""
+DRAWN = 448
+"""Pixels of the views that crops are cut from."""
+MARGIN = 1.25
+"""Side of a crop over the longer side of its object."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crop:
+    """One object as it is shown to the judge."""
+
+    house: str
+    owner: str
+    object_class: str
+    rgb: np.ndarray
+    """(SIDE, SIDE, 3) uint8."""
+
+
+def kept_crops(world: World, classes: Collection[str], folder: Path) -> list[Crop]:
+    """The crops of a house, from `folder` if the same code has put them there, else drawn and put there."""
+    made = digest(world.fingerprint, code_digest("embodied.bench.crops"), sorted(classes))
+    path = folder / f"{world.house.name}_{made[:16]}.npz"
+    if not path.exists():
+        crops = crops_of(world, classes)
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            rgb = np.stack([c.rgb for c in crops]) if crops else np.zeros((0, SIDE, SIDE, 3), np.uint8)
+            owners, names = [c.owner for c in crops], [c.object_class for c in crops]
+            np.savez_compressed(file, rgb=rgb, owners=np.array(owners, str), classes=np.array(names, str))
+    with np.load(path, allow_pickle=False) as held:
+        rows = zip(held["owners"].tolist(), held["classes"].tolist(), held["rgb"], strict=True)
+        return [Crop(world.name, owner, name, rgb) for owner, name, rgb in rows]
+
+
+def crops_of(world: World, classes: Collection[str]) -> list[Crop]:
+    """Every object of these classes of a house that is LEAST pixels large in the best view of it."""
+    wanted = [p for p in world.house.placements if p.object_class in classes]
+    number = {owner: i + 1 for i, owner in enumerate(world.owners)}
+    nodes = [(at, np.bincount(world.renderer.seen(at)[1].ravel())) for at in world.graph.positions]
+    crops = []
+    for thing in wanted:
+        mine = number[thing.id]
+        size = [int(counts[mine]) if mine < len(counts) else 0 for _, counts in nodes]
+        best = int(np.argmax(size))
+        if size[best] and (rgb := _crop(world, thing, mine, nodes[best][0])) is not None:
+            crops.append(Crop(world.name, thing.id, thing.object_class, rgb))
+    return crops
+
+
+def _crop(world: World, thing: Placement, mine: int, eye: np.ndarray) -> np.ndarray | None:
+    """What stands in a square around an object, seen from `eye`; None if it is too small or hidden there."""
+    base = _elevation(world.house, thing)
+    middle = np.array([*thing.position[:2], base + thing.position[2] + thing.size[2] / 2]) - eye
+    apart = float(np.linalg.norm(middle))
+    yaw, pitch = math.atan2(middle[1], middle[0]), math.asin(middle[2] / max(apart, 1e-6))
+    radius = float(np.linalg.norm(thing.size)) / 2
+    vfov = float(np.clip(2.6 * math.atan2(radius, apart), math.radians(8), math.radians(80)))
+    view = world.renderer.view(eye, yaw, pitch, vfov, (DRAWN, DRAWN))
+    rows, columns = np.nonzero(view.ids == mine)
+    if len(rows) < LEAST * LEAST / 8 or max(np.ptp(rows), np.ptp(columns)) < LEAST:
+        return None
+    side = int(min(max(np.ptp(rows), np.ptp(columns)) * MARGIN, DRAWN))
+    top, left = (int(np.clip((a.min() + a.max() - side) / 2, 0, DRAWN - side)) for a in (rows, columns))
+    return cv2.resize(view.rgb[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+
+
+def _elevation(house: House, thing: Placement) -> float:
+    return house.storey_of(house.room_by_id[thing.room]).elevation
