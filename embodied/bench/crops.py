@@ -1,9 +1,9 @@
-"""Crops of the objects of a house: each seen from the viewpoint that sees most of it."""
+"""Crops of the objects of a house: each seen from the viewpoint that sees most of it and stands far enough away."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,10 @@ LEAST, SIDE = 96, 224
 """Pixels of the longer side of an object before it is shown, and of what is shown."""
 DRAWN = 448
 """Pixels of the views that crops are cut from."""
+NARROWEST, WIDEST = math.radians(8), math.radians(80)
+"""Fields of view of such a view."""
+NEARER = 8
+"""A view that cannot hold the whole object is taken if it has this many times the pixels of those that can."""
 MARGIN = 1.25
 """Side of a crop over the longer side of its object."""
 
@@ -53,28 +57,31 @@ def kept_crops(world: World, classes: Collection[str], folder: Path) -> list[Cro
 
 
 def crops_of(world: World, classes: Collection[str]) -> list[Crop]:
-    """Every object of these classes of a house that is LEAST pixels large in the best view of it."""
-    wanted = [p for p in world.house.placements if p.object_class in classes]
+    """Every object of these classes of a house that is LEAST pixels large in the best view of it.
+
+    The best view has the most pixels of it among those that can hold all of it: a fridge at arm's length is a wall.
+    """
     number = {owner: i + 1 for i, owner in enumerate(world.owners)}
-    nodes = [(at, np.bincount(world.renderer.seen(at)[1].ravel())) for at in world.graph.positions]
+    nodes = [np.bincount(world.renderer.seen(at)[1].ravel(), minlength=len(number) + 1) for at in world.graph.positions]
     crops = []
-    for thing in wanted:
+    for thing in world.house.placements:
+        if thing.object_class not in classes:
+            continue
         mine = number[thing.id]
-        size = [int(counts[mine]) if mine < len(counts) else 0 for _, counts in nodes]
-        best = int(np.argmax(size))
-        if size[best] and (rgb := _crop(world, thing, mine, nodes[best][0])) is not None:
+        pixels = np.array([counts[mine] for counts in nodes])
+        wide = np.array([_vfov(*_towards(world, thing, at)) for at in world.graph.positions])
+        whole = pixels * (wide <= WIDEST)
+        best = int(np.argmax(whole if whole.max() * NEARER > pixels.max() else pixels))
+        if pixels[best] and (rgb := _crop(world, thing, mine, world.graph.positions[best])) is not None:
             crops.append(Crop(world.name, thing.id, thing.object_class, rgb))
     return crops
 
 
 def _crop(world: World, thing: Placement, mine: int, eye: np.ndarray) -> np.ndarray | None:
     """What stands in a square around an object, seen from `eye`; None if it is too small or hidden there."""
-    base = _elevation(world.house, thing)
-    middle = np.array([*thing.position[:2], base + thing.position[2] + thing.size[2] / 2]) - eye
-    apart = float(np.linalg.norm(middle))
-    yaw, pitch = math.atan2(middle[1], middle[0]), math.asin(middle[2] / max(apart, 1e-6))
-    radius = float(np.linalg.norm(thing.size)) / 2
-    vfov = float(np.clip(2.6 * math.atan2(radius, apart), math.radians(8), math.radians(80)))
+    middle, radius = _towards(world, thing, eye)
+    yaw, pitch = math.atan2(middle[1], middle[0]), math.asin(middle[2] / max(float(np.linalg.norm(middle)), 1e-6))
+    vfov = float(np.clip(_vfov(middle, radius), NARROWEST, WIDEST))
     view = world.renderer.view(eye, yaw, pitch, vfov, (DRAWN, DRAWN))
     rows, columns = np.nonzero(view.ids == mine)
     if len(rows) < LEAST * LEAST / 8 or max(np.ptp(rows), np.ptp(columns)) < LEAST:
@@ -82,6 +89,18 @@ def _crop(world: World, thing: Placement, mine: int, eye: np.ndarray) -> np.ndar
     side = int(min(max(np.ptp(rows), np.ptp(columns)) * MARGIN, DRAWN))
     top, left = (int(np.clip((a.min() + a.max() - side) / 2, 0, DRAWN - side)) for a in (rows, columns))
     return cv2.resize(view.rgb[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+
+
+def _towards(world: World, thing: Placement, eye: np.ndarray) -> tuple[np.ndarray, float]:
+    """From `eye` to the middle of an object, metres, and the radius of a ball around it."""
+    base = _elevation(world.house, thing)
+    middle = np.array([*thing.position[:2], base + thing.position[2] + thing.size[2] / 2]) - eye
+    return middle, float(np.linalg.norm(thing.size)) / 2
+
+
+def _vfov(middle: np.ndarray, radius: float) -> float:
+    """Field of view that holds a ball with some room around it, radians."""
+    return 2.6 * math.atan2(radius, float(np.linalg.norm(middle)))
 
 
 def _elevation(house: House, thing: Placement) -> float:

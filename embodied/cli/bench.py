@@ -1,14 +1,14 @@
 """Measure speed and memory here, as medians, and compare with what the project promises.
 
-houses, pictures, steps and memory make the table of the main line; plays counts environment steps
-with help, seen with pixels, drive a body on wheels with live pictures; bakes lights a flat again and
-again; light compares the ways of drawing with a path tracer, growth lights houses of 40 to 400 m² and
-fits how the cost grows (fast, or --quality normal), codecs compares ways of storing what was drawn
-(choose --quality fast), look asks a network that has seen photographs only what the objects of --houses
-flats are (--quality, --look; optional packages; it goes on where it was stopped). Close other programs first: the numbers are only as
-good as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables
-and features in OUT/freeze and writes their digests; with --against it says of every part whether it is
-the same as in a file of them (docs/freeze.json), or differs and why that is meant.
+houses, pictures, steps and memory make the table of the main line; plays counts environment steps with help,
+seen with pixels, drive a body on wheels with live pictures; bakes lights a flat again and again; light
+compares the ways of drawing with a path tracer, growth lights houses of 40 to 400 m² and fits how the cost
+grows (fast, or --quality normal), codecs compares ways of storing what was drawn (choose --quality fast),
+look asks a network that has seen photographs only what the objects of --houses flats are (--quality, --look;
+optional packages; it goes on where it was stopped). Close other programs first: the numbers are only as good
+as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features
+in OUT/freeze and writes their digests; with --against it says of every part whether it is the same as in a
+file of them (docs/freeze.json), or differs and why that is meant.
 """
 
 from __future__ import annotations
