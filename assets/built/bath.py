@@ -8,6 +8,7 @@ import shapely
 from assets.built.maker import (
     CHROME,
     GLASS,
+    PAPER,
     PORCELAIN,
     FinishOf,
     Look,
@@ -22,6 +23,7 @@ from assets.built.maker import (
 )
 from assets.built.primitives import (
     Shape,
+    ball,
     box,
     cylinder,
     extruded,
@@ -36,7 +38,7 @@ from assets.built.primitives import (
     turned,
 )
 from assets.built.soft import layers
-from assets.records import MeshPart
+from assets.records import Finish, MeshPart
 
 BATH = {"bathroom": 1.0, "toilet": 0.4}
 BASINS = ("bathroom vanity", "washbasin", "wall washbasin", "double vanity")
@@ -174,21 +176,28 @@ def towel_rail(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
 
 
 def hanging_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """A towel on a hook: gathered above, falling in folds."""
+    """A towel on a hook by the loop in the middle of its edge: the corners fall, folds run down from the hook."""
     w, d, h = size
-    rows, cols = 16, 30
-    x = np.linspace(-1, 1, cols + 1)[None]
-    t = np.linspace(0, 1, rows + 1)[:, None]
-    spread = 0.12 + 0.88 * np.sin(np.pi / 2 * np.clip((1 - t) * 1.6, 0, 1)) ** 0.8
-    fold = np.sin(3.2 * np.pi * x + 1.0 + 0.6 * t)
-    z = (h - 0.03) * t - 0.05 * h * (np.abs(x) * (1 - spread)) - 0.04 * np.abs(x) * (1 - t)
-    y = d * 0.05 - 0.22 * d * fold * (0.35 + 0.65 * (1 - t))
+    rows, cols = 22, 34
+    half, long = 0.42 * h, 0.94 * h
+    u, t = np.linspace(-1, 1, cols + 1)[None], np.linspace(1, 0, rows + 1)[:, None]
+    reach = np.hypot(u * half, t * long)
+    gather = np.clip(reach / long, 0, 1) ** 0.62
+    phase = 2.6 * np.pi * u + 0.5 * np.sin(3 * u + rng.uniform(0, 6)) + 0.5 * t
+    swing = np.sin(phase) + 0.35 * np.sin(2.1 * phase + rng.uniform(0, 6))
+    x = w / 2 * gather * (u + 0.05 * np.cos(phase) * t)
+    y = d * 0.05 - 0.20 * d * swing * gather - 0.10 * d * gather * (1 - u**2)
+    z = h - 0.04 - reach
+    cloth = np.stack(np.broadcast_arrays(x, y, z), -1)
     hook = joined(
         tube([(0, d / 2, h - 0.03), (0, -d * 0.1, h - 0.035), (0, -d * 0.25, h - 0.005)], 0.006, 8),
         moved(turned(cylinder(0.02, 0, 0.006, 0.002, 14), np.pi / 2, "x"), 0, d / 2, h - 0.03),
     )
-    cloth = sheet(np.stack(np.broadcast_arrays(x * spread * w / 2, y, z), -1), 0.006)
-    return parts_of((CHROME, hook), (material(look, "cloth", finish, "terry/0"), cloth))
+    terry, low, high = material(look, "cloth", finish, "terry/0"), 2, 4  # rows of the woven border
+    pile = [sheet(cloth[: low + 1], 0.006), sheet(cloth[high:], 0.006)]
+    red, green, blue = (0.45 + 0.5 * c for c in terry.color[:3])
+    border = plain((red, green, blue), 0.85, specular=0.1)
+    return parts_of((CHROME, hook), (terry, pile), (border, sheet(cloth[low : high + 1], 0.004)))
 
 
 def towels(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -291,21 +300,68 @@ def paper_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
 
 
 def bin_(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """A round bin: open waste basket, or pedal bin where look['lid'] is 1."""
+    """A round bin: waste basket with crumpled paper in it, or pedal bin where look['lid'] is 1."""
     w, d, h = size
     r = w / 2
-    top = h * 0.9 if look.get("lid") else h
-    low = 0.82 if not look.get("lid") else 0.97
-    wall = 0.004
-    shell = lathe([(0, 0), (r * low, 0), (r, top), (r - wall, top), (r * low - wall, 0.006), (0, 0.006)], 32)
-    shell = scaled(shell, 1, d / w, 1)
     main = material(look, "skin", finish, "brushed_steel/0") if "skin" in look else metal(look, finish, "white")
-    if not look.get("lid"):
-        return parts_of((main, shell))
-    t = np.linspace(0, np.pi / 2, 8)
-    lid = lathe([(0, top), (r, top), *np.stack([r * np.cos(t), top + (h - top) * np.sin(t)], 1)[1:]], 32, 0.6)
-    pedal = box([-0.04, -d / 2 - 0.02, 0.008], [0.04, -d / 2 + 0.02, 0.02], 0.003)
-    return parts_of((main, [shell, lid]), (plain((0.06, 0.06, 0.06), 0.5), pedal))
+    if look.get("lid"):
+        return parts_of(*_pedal_bin(w, d, h, main))
+    wall, low = 0.004, 0.82
+    shell = lathe(
+        [(0, 0), (r * low, 0), (r, h - 0.004), (r - wall, h - 0.004), (r * low - wall, 0.006), (0, 0.006)], 32
+    )
+    t = np.linspace(0, 2 * np.pi, 33)[:-1]
+    rim = tube(
+        np.stack([(r - 0.004) * np.cos(t), (r - 0.004) * np.sin(t), 0 * t + h - 0.004], 1), 0.004, 7, closed=True
+    )
+    paper = []
+    for k in range(5):
+        a, q = 2.4 * k + rng.uniform(0, 1), r * low * (0.45 if k else 0.0)
+        lump = ball(0.04, 10, 7)
+        dents = rng.normal(1.0, 0.13, (len(lump.vertices), 1))
+        paper.append(
+            moved(_faceted(lump.vertices * dents, lump.faces), q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3))
+        )
+    return parts_of((main, [scaled(s, 1, d / w, 1) for s in (shell, rim)]), (PAPER, paper))
+
+
+def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
+    """Triangles with a normal each, as paper has that was crumpled; corners that lie together stay together."""
+    _, first, weld = np.unique(
+        np.round(vertices / np.linalg.norm(vertices, axis=1, keepdims=True), 4),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    corners = vertices[first][weld.reshape(-1)][faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sound = np.linalg.norm(normals, axis=1) > 1e-12
+    corners, normals = corners[sound], normals[sound] / np.linalg.norm(normals[sound], axis=1, keepdims=True)
+    points, normals = corners.reshape(-1, 3), np.repeat(normals, 3, axis=0)
+    return Shape(points, np.arange(len(points)).reshape(-1, 3), normals, points[:, :2])
+
+
+def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish, list[Shape]]]:
+    """Base ring, body, a dark gap, a lid with a rim that is hinged behind, a pedal before it."""
+    r, top = w / 2, h * 0.86
+    base = lathe([(0, 0), (r * 0.97, 0), (r * 0.985, 0.004), (r * 0.985, h * 0.045), (0, h * 0.045)], 32)
+    body = lathe([(0, h * 0.04), (r * 0.965, h * 0.04), (r * 0.965, top), (0, top)], 32)
+    gap = lathe([(0, top - 0.002), (r * 0.93, top - 0.002), (r * 0.93, top + 0.01), (0, top + 0.01)], 32)
+    t = np.linspace(0, np.pi / 2, 8)[1:]
+    edge = top + 0.008
+    dome = np.stack([r * 0.97 * np.cos(t), edge + 0.024 + (h - edge - 0.024) * np.sin(t)], 1)
+    band = lathe([(0, edge), (r, edge), (r, edge + 0.02), (r * 0.97, edge + 0.024), (0, edge + 0.024)], 32)
+    lid = lathe([(r * 0.97, edge + 0.022), (r * 0.97, edge + 0.024), *dome], 32, 0.9)
+    hinge = box([-w * 0.16, d / 2 - 0.012, top - 0.03], [w * 0.16, d / 2 + 0.012, top + 0.03], 0.005)
+    arm = box([-0.012, -d / 2 - 0.012, 0.012], [0.012, -d / 2 + 0.03, 0.02], 0.003)
+    pedal = box([-w * 0.17, -d / 2 - 0.036, 0.010], [w * 0.17, -d / 2 - 0.008, 0.024], 0.006)
+    dark = plain((0.05, 0.05, 0.055), 0.45)
+    rounds = [scaled(s, 1, d / w, 1) for s in (body, lid)]
+    return [
+        (main, rounds),
+        (dark, [scaled(base, 1, d / w, 1), scaled(gap, 1, d / w, 1), hinge]),
+        (CHROME, [scaled(band, 1, d / w, 1), arm, pedal]),
+    ]
 
 
 def laundry_basket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import shapely
+from scipy.interpolate import PchipInterpolator
 
 from assets.built.maker import (
     BLACK,
@@ -171,16 +172,17 @@ def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     branches = bool(look.get("branches"))
     body = h * 0.42 if branches else h
     belly, neck, at = rng.uniform(0.42, 0.5), rng.uniform(0.16, 0.28), rng.uniform(0.3, 0.55)
-    t = np.linspace(0, 1, 12)
-    r = np.interp(t, [0, at, 0.85, 1], [0.28, belly, neck, neck * 1.2])
-    k = np.array([0.25, 0.5, 0.25])
-    r = np.convolve(np.pad(r, 1, mode="edge"), k, mode="valid")
+    t = np.linspace(0, 1, 22)
+    r = PchipInterpolator([0, at, 0.85, 1], [0.28, belly, neck, neck * 1.35])(t)
     r = r / r.max() * (0.5 if not branches else 0.34)
     inner = np.maximum(r - 0.035, 0.02)
     profile = [
-        (0, 0),
-        *zip(r * w, t * body),
-        *[(a * w, b * body) for a, b in zip(inner[:4:-1], t[:4:-1] - 0.005)],
+        (0, 0.004),
+        (r[0] * w - 0.006, 0.004),
+        (r[0] * w - 0.006, 0),
+        *zip(r * w, t * (body - 0.002) + 0.0005),
+        ((r[-1] + inner[-1]) / 2 * w, body),
+        *[(a * w, b * (body - 0.004)) for a, b in zip(inner[:8:-1], t[:8:-1])],
         (0, body * 0.4),
     ]
     clay = (

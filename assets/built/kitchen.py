@@ -24,7 +24,7 @@ from assets.built.maker import (
     parts_of,
     plain,
 )
-from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube, turned
+from assets.built.primitives import Shape, box, cylinder, joined, lathe, moved, quads, tube, turned
 from assets.records import Finish, MeshPart
 
 TOP = 0.038
@@ -192,13 +192,14 @@ def _knob() -> Shape:
 
 
 def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """Doors on a box; glazed where look['glazed'] is 1."""
+    """Doors on a box; where look['glazed'] is 1 two of glass with bars, crockery on the boards behind them."""
     w, d, h = size
     y = -d / 2 + 0.002
     style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
-    columns = max(1, round(w / 0.5))
+    columns = max(2, round(w / 0.4)) if look.get("glazed") and w > 0.45 else max(1, round(w / 0.5))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
     doors, grips, panes, inside = [], [], [], []
+    crockery: list[tuple[Finish, list[Shape] | Shape]] = []
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
         if look.get("glazed"):
             r = 0.05
@@ -207,6 +208,7 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
                 box([b - r, y, 0.0015], [b - 0.0015, y + 0.02, h - 0.0015], 0.0015),
                 box([a + r, y, h - r], [b - r, y + 0.02, h - 0.0015], 0.0015),
                 box([a + r, y, 0.0015], [b - r, y + 0.02, r], 0.0015),
+                *(box([a + r, y + 0.004, z - 0.007], [b - r, y + 0.016, z + 0.007], 0.002) for z in (h / 3, 2 * h / 3)),
             ]
             panes.append(
                 quads(
@@ -222,12 +224,41 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
             box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018])
             for z in np.linspace(0, h, 4)[1:-1]
         ]
+        crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
         (material(look, "front", finish, "lacquer_white/0"), doors),
         (metal(look, finish), grips),
+        *crockery,
         (GLASS, panes),
     )
+
+
+def _crockery(
+    width: float, y0: float, y1: float, boards: Sequence[float], *, rng: np.random.Generator
+) -> list[tuple[Finish, list[Shape] | Shape]]:
+    """Plates below, bowls and cups above them, glasses on top, standing on boards between y0 and y1."""
+    y, r = (y0 + y1) / 2, min(0.10, (y1 - y0) / 2)
+    plate = [(0, 0), (r * 0.6, 0), (r, 0.02), (r * 0.99, 0.022), (r * 0.6, 0.006), (0, 0.005)]
+    dish = [(0, 0), (r * 0.35, 0), (r * 0.62, 0.04), (r * 0.7, 0.06), (r * 0.66, 0.06), (r * 0.3, 0.01), (0, 0.01)]
+    cup = [(0, 0), (0.026, 0), (0.038, 0.075), (0.035, 0.075), (0.024, 0.008), (0, 0.008)]
+    glass = [(0, 0), (0.026, 0), (0.032, 0.11), (0.030, 0.11), (0.024, 0.006), (0, 0.006)]
+    white, colour = (
+        plain((0.91, 0.90, 0.88), 0.15),
+        plain(((0.33, 0.45, 0.53), (0.72, 0.62, 0.48))[int(rng.integers(2))], 0.2),
+    )
+    light: list[Shape] = []
+    tinted: list[Shape] = []
+    clear: list[Shape] = []
+    for x, pile, count in ((-width / 4, light, 6), (width / 4, tinted, 5)):
+        pile += [moved(lathe(plate, 18, 0.6), x, y, boards[0] + 0.009 * k) for k in range(count)]
+    pile = light if rng.random() < 0.5 else tinted
+    pile += [moved(lathe(dish, 16, 0.6), -width / 4, y, boards[1] + 0.018 * k) for k in range(3)]
+    ear = tube([(0.032, 0, 0.062), (0.055, 0, 0.052), (0.052, 0, 0.028), (0.03, 0, 0.02)], 0.004, 5)
+    for x in (width * 0.14, width * 0.34):
+        light.append(moved(turned(joined(lathe(cup, 14, 0.6), ear), float(rng.uniform(-2.6, -0.5))), x, y, boards[1]))
+    clear += [moved(lathe(glass, 12, 0.6), x * width, y, boards[2]) for x in (-0.38, -0.22, -0.06, 0.14, 0.3)]
+    return [(white, light), (colour, tinted), (GLASS, clear)]
 
 
 def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -247,17 +278,34 @@ def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
 
 
 def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """Two doors over one another, with look['notes'] papers under magnets on the upper one."""
+    """Two doors over one another with long bar handles, with look['notes'] papers under magnets on the upper one."""
     w, d, h = size
-    front_y, thick, split = -d / 2 + 0.03, 0.055, h * 0.36
-    body = box([-w / 2 + 0.004, front_y + thick + 0.006, 0.04], [w / 2 - 0.004, d / 2, h], 0.004)
-    foot = box([-w / 2 + 0.02, front_y + thick + 0.03, 0], [w / 2 - 0.02, d / 2 - 0.03, 0.04])
-    seal = box([-w / 2 + 0.012, front_y + thick, 0.05], [w / 2 - 0.012, front_y + thick + 0.006, h - 0.01])
-    doors = [
-        box([-w / 2, front_y, z0], [w / 2, front_y + thick, z1], 0.012)
-        for z0, z1 in ((0.05, split - 0.003), (split + 0.003, h))
+    front_y, thick, split, foot = -d / 2 + 0.052, 0.062, h * 0.36, 0.07
+    back_of_doors = front_y + thick
+    body = box([-w / 2 + 0.003, back_of_doors + 0.012, foot - 0.02], [w / 2 - 0.003, d / 2, h], 0.004)
+    seal = box([-w / 2 + 0.012, back_of_doors - 0.004, foot], [w / 2 - 0.012, back_of_doors + 0.014, h - 0.012])
+    base = box([-w / 2 + 0.02, back_of_doors - 0.01, 0], [w / 2 - 0.02, d / 2 - 0.03, foot - 0.02])
+    slats = [
+        box([-w / 2 + 0.05, back_of_doors - 0.014, z], [w / 2 - 0.05, back_of_doors - 0.008, z + 0.006])
+        for z in (0.012, 0.024, 0.036)
     ]
-    grips = [moved(handle(0, 0, 0, "bar", True, 0.3), -w / 2 + 0.045, front_y, z) for z in (split - 0.19, split + 0.26)]
+    doors = [
+        box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016)
+        for z0, z1 in ((foot - 0.012, split - 0.005), (split + 0.005, h - 0.004))
+    ]
+    hinges = [
+        box([w / 2 - 0.07, front_y + 0.008, split - 0.006], [w / 2 - 0.006, back_of_doors, split + 0.006], 0.001),
+        box([w / 2 - 0.09, back_of_doors - 0.03, h - 0.006], [w / 2 - 0.01, back_of_doors + 0.05, h], 0.002),
+    ]
+    x = -w / 2 + 0.055
+    grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.42, split - 0.05), (split + 0.05, split + 0.62))]
+    badge = box([-0.035, front_y - 0.0015, h - 0.075], [0.035, front_y + 0.001, h - 0.063], 0.0005)
+    shown = split + 0.56 * (h - split)
+    panel = box([-0.055, front_y - 0.0012, shown], [0.055, front_y + 0.001, shown + 0.034], 0.0005)
+    digits = [
+        box([x0, front_y - 0.0018, shown + 0.012], [x0 + 0.007, front_y, shown + 0.022])
+        for x0 in (-0.035, -0.024, 0.016, 0.027)
+    ]
     papers: list[tuple[Finish, list[Shape] | Shape]] = []
     magnets: list[Shape] = []
     for k in range(int(look.get("notes", 0))):
@@ -270,11 +318,23 @@ def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
         magnets.append(moved(turned(cylinder(0.012, 0, 0.006, 0.002, 12), np.pi / 2, "x"), x, front_y, z - 0.015))
     return parts_of(
         (material(look, "front", finish, "lacquer_white/0"), [*doors, body]),
-        (BLACK, [foot, seal]),
-        (metal(look, finish, "steel"), grips),
+        (BLACK, [base, seal]),
+        (plain((0.3, 0.3, 0.31), 0.5), [*slats, *hinges]),
+        (metal(look, finish, "steel"), [*grips, badge]),
+        (plain((0.02, 0.02, 0.025), 0.08), panel),
+        (plain((0.55, 0.8, 0.9), 0.3), digits),
         *papers,
         (plain((0.62, 0.16, 0.14), 0.4), magnets),
     )
+
+
+def _long_grip(x: float, y: float, z0: float, z1: float) -> Shape:
+    """An upright bar on two feet before a front at y."""
+    bar = box([x - 0.011, y - 0.052, z0], [x + 0.011, y - 0.034, z1], 0.006)
+    feet = [
+        box([x - 0.008, y - 0.04, z - 0.014], [x + 0.008, y + 0.002, z + 0.014], 0.003) for z in (z0 + 0.04, z1 - 0.04)
+    ]
+    return joined(bar, *feet)
 
 
 def island(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

@@ -84,8 +84,23 @@ def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         glass = lathe([(0, 0.012), (r * 0.97, 0.012), (r * 0.97, 0.018), (0, 0.018)], 36)
         return parts_of((WHITE, base), (_cloth(look, finish), _drum(r, r, 0, h - 0.004, 36)), (OPAL, glass))
     t = np.linspace(0, np.pi / 2, 10)
-    bowl = lathe([*np.stack([r * np.sin(t), (h - 0.02) * (1 - np.cos(t))], 1), (r, h - 0.012), (0, h - 0.012)], 36, 0.6)
-    return parts_of((metal(look, finish, "steel"), base), (OPAL, bowl))
+    low = 0.012
+    bowl = lathe(
+        [
+            *np.stack([r * 0.96 * np.sin(t), low + (h - 0.02 - low) * (1 - np.cos(t))], 1),
+            (r * 0.96, h - 0.012),
+            (0, h - 0.012),
+        ],
+        36,
+        0.6,
+    )
+    rim = lathe(
+        [(r * 0.93, h - 0.03), (r * 0.985, h - 0.03), (r, h - 0.022), (r, h - 0.004), (r * 0.93, h - 0.002)], 36
+    )
+    nut = lathe(
+        [(0, 0), (0.006, 0.001), (0.009, 0.006), (0.007, 0.011), (0.016, 0.014), (0.016, 0.017), (0, 0.017)], 16, 0.9
+    )
+    return parts_of((metal(look, finish, "steel"), [base, rim, nut]), (OPAL, bowl))
 
 
 def panel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

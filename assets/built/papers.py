@@ -197,26 +197,50 @@ def photo_frame(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
 
 
 def alarm_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """A round bedside clock on two feet, with bells."""
+    """A round bedside clock on two feet: two bells with a hammer between them under a bow, a rim around the dial."""
     w, d, h = size
     r = w * 0.46
-    zc = h * 0.45
-    case = moved(
-        turned(lathe([(0, 0), (r, 0), (r, d * 0.7), (r * 0.93, d * 0.8), (r * 0.88, d * 0.72)], 32), np.pi / 2, "x"),
-        0,
-        d * 0.4,
-        zc,
+    zc = h * 0.43
+    case = [
+        (0, 0),
+        (r * 0.86, 0),
+        (r * 0.97, d * 0.12),
+        (r, d * 0.3),
+        (r, d * 0.62),
+        (r * 0.94, d * 0.7),
+        (r * 0.9, d * 0.62),
+    ]
+    rim = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
+    shell, ring = (
+        moved(turned(lathe(profile, 36, 0.9), np.pi / 2, "x"), 0, d * 0.4, zc) for profile in (case, rim[::-1])
     )
     face = finish("clock_face/0")
-    disc = moved(turned(cylinder(r * 0.9, 0, 0.001, 0, 32), np.pi / 2, "x"), 0, d * 0.4 - d * 0.71, zc)
+    disc = moved(turned(cylinder(r * 0.9, 0, 0.001, 0, 36), np.pi / 2, "x"), 0, d * 0.4 - d * 0.66, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
+    t = np.linspace(0, np.pi / 2, 6)
+    cap = lathe([(0, -0.002), (r * 0.36, -0.002), *np.stack([r * 0.38 * np.cos(t), r * 0.30 * np.sin(t)], 1)], 20, 0.9)
+    pin = lathe(
+        [(0, -r * 0.3), (r * 0.05, -r * 0.3), (r * 0.05, r * 0.36), (r * 0.09, r * 0.38), (0, r * 0.42)], 8, 0.9
+    )
     bells = [
-        moved(turned(scaled(ball(r * 0.34, 14, 9), 1, 1, 0.75), s * 0.5, "y"), s * r * 0.55, 0, zc + r * 0.98)
+        moved(turned(s, side * 0.55, "y"), side * r * 0.56, 0, zc + r * 0.98) for side in (-1, 1) for s in (cap, pin)
+    ]
+    hammer = [
+        tube([(0, 0, zc + r * 0.9), (0, 0, zc + r * 1.16)], 0.0016, 6),
+        moved(ball(0.0045, 8, 6), 0, 0, zc + r * 1.18),
+    ]
+    a = np.linspace(0.25, np.pi - 0.25, 12)
+    bow = tube(np.stack([r * 0.6 * np.cos(a), 0 * a, zc + r * 1.02 + r * 0.42 * np.sin(a)], 1), 0.0016, 6)
+    feet = [
+        joined(
+            tube([(s * r * 0.5, 0, zc - r * 0.75), (s * r * 0.78, 0, 0.005)], [0.003, 0.004], 7),
+            moved(ball(0.0055, 8, 6), s * r * 0.78, 0, 0.0055),
+        )
         for s in (-1, 1)
     ]
-    feet = [tube([(s * r * 0.5, 0, zc - r * 0.7), (s * r * 0.75, 0, 0)], [0.004, 0.006], 7) for s in (-1, 1)]
     skin = {"brass": BRASS, "black": BLACK, "chrome": CHROME}[str(look.get("metal", "brass"))]
-    return parts_of((skin, [case, *bells, *feet]), (face, disc))
+    bright = BRASS if skin is BRASS else CHROME
+    return parts_of((skin, shell), (bright, [ring, *bells, *hammer, bow, *feet]), (face, disc))
 
 
 def remote(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

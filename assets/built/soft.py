@@ -16,6 +16,7 @@ from assets.built.primitives import (
     moved,
     pillow,
     quads,
+    reversed_shape,
     scaled,
     sheet,
     shifted_uv,
@@ -156,46 +157,60 @@ def cushion(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
 
 def throw(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A blanket folded to a stack of soft layers, fringe at one side."""
-    return parts_of((material(look, "cloth", finish, "tweed/0"), layers(size, int(look.get("layers", 4)), rng=rng)))
+    return parts_of((material(look, "cloth", finish, "tweed/0"), layers(size, int(look.get("layers", 1)), rng=rng)))
 
 
 def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[Shape]:
-    """Folded cloth: rounded slabs on one another, each a little off, joined by folds at the front."""
+    """`count` folded cloths on one another, each of four layers, the fold in front."""
     w, d, h = size
     t = h / count
     made = []
     for k in range(count):
-        c = 8
-        x, y = np.meshgrid(np.linspace(-1, 1, c + 1), np.linspace(-1, 1, c + 1))
-        edge = np.maximum(np.abs(x), np.abs(y)) ** 8
-        sag = 0.06 * t * np.sin(3 * x + rng.uniform(0, 6)) + 0.06 * t * np.cos(3 * y + rng.uniform(0, 6))
-        off = rng.normal(0, 0.003, 2)
-        top = np.stack(
-            [
-                x * (w / 2 - 0.004) + off[0],
-                y * (d / 2 - 0.004) + off[1],
-                (k + 1) * t - 0.36 * t * edge + sag * (1 - edge),
-            ],
-            -1,
-        )
-        low = np.stack([top[..., 0], top[..., 1], k * t + 0.30 * t * edge], -1)
-        mid = []
-        for p, q in ((top, low),):
-            rim = (
-                [(0, j) for j in range(c)]
-                + [(i, c) for i in range(c)]
-                + [(c, j) for j in range(c, 0, -1)]
-                + [(i, 0) for i in range(c, 0, -1)]
-            )
-            i, j = np.array(rim).T
-            a, b = q[i, j], p[i, j]
-            out = (a + b) / 2 + np.stack(
-                [np.sign(x[i, j]) * (np.abs(x[i, j]) > 0.99), np.sign(y[i, j]) * (np.abs(y[i, j]) > 0.99), 0 * x[i, j]],
-                1,
-            ) * 0.004
-            ring = np.stack([a, out, b])
-            ring = np.concatenate([ring, ring[:, :1]], axis=1)
-            mid.append(sheet(ring))
-        low_side = sheet(low)
-        made += [sheet(top), Shape(low_side.vertices, low_side.faces[:, ::-1], -low_side.normals, low_side.uv), *mid]
-    return [shifted_uv(s, *rng.random(2)) for s in made]
+        dx, dy = rng.normal(0, 0.004, 2)
+        for outer in (True, False):
+            leaf = _folded_leaf(w - 0.012, d - 0.01, t, outer, rng=rng)
+            made.append(shifted_uv(moved(leaf, dx, dy, k * t), *rng.random(2)))
+    return made
+
+
+def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Generator) -> Shape:
+    """Cloth folded once around a bend in front, `t` thick as the outer of two such leaves, or the inner of them."""
+    thick = t * 0.235
+    bend = t * (0.375 if outer else 0.125)
+    front, back = -d / 2 + t / 2, d / 2 - (0.0 if outer else 0.006) - rng.uniform(0, 0.006, 2)
+    angle = np.linspace(-np.pi / 2, -3 * np.pi / 2, 9)
+    low = np.linspace(back[0], front, 4)[:-1]
+    high = np.linspace(front, back[1], 4)[1:]
+    line = np.concatenate(
+        [
+            np.stack([low, 0 * low - bend], 1),
+            np.stack([front + bend * np.cos(angle), bend * np.sin(angle)], 1),
+            np.stack([high, 0 * high + bend], 1),
+        ]
+    )
+    along = np.gradient(line, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    out = np.stack([-along[:, 1], along[:, 0]], 1)  # towards the inside of the bend
+    ends = [line[:1] - along[:1] * thick * 0.5, line[-1:] + along[-1:] * thick * 0.5]
+    ring = np.concatenate([line - out * thick / 2, ends[1], (line + out * thick / 2)[::-1], ends[0]])
+    core = np.concatenate([line, line[-1:], line[::-1], line[:1]])
+    ring, core = np.concatenate([ring, ring[:1]]), np.concatenate([core, core[:1]])
+    share = np.array([-1, -0.985, -0.95, -0.6, -0.2, 0.2, 0.6, 0.95, 0.985, 1])
+    plump = np.array([0.05, 0.6, 1, 1, 1, 1, 1, 1, 0.6, 0.05])[:, None, None]
+    section = core + (ring - core) * plump
+    sag = (
+        0.05
+        * t
+        * np.sin(2.5 * share[:, None] + rng.uniform(0, 6))
+        * np.sin(9 * core[None, :, 0] / d + rng.uniform(0, 6))
+    )
+    x = share[:, None] * w / 2 + 0.004 * np.sin(14 * core[None, :, 0] / d + rng.uniform(0, 6)) * np.abs(share[:, None])
+    grid = np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1)
+    leaf = sheet(grid)
+    middle = np.mean(leaf.vertices, axis=0)
+    volume = np.einsum(
+        "ij,ij->",
+        leaf.vertices[leaf.faces[:, 0]] - middle,
+        np.cross(leaf.vertices[leaf.faces[:, 1]] - middle, leaf.vertices[leaf.faces[:, 2]] - middle),
+    )
+    return leaf if volume > 0 else reversed_shape(leaf)

@@ -181,7 +181,7 @@ def recognised(
     write_json(out / "look.json", facts, indent=1)
     if worst:
         rows = [sorted(by_class[name][1], key=lambda i: bool(right[i]))[:EACH] for name in worst]
-        picture = sheet([[crops[i] for i in row] for row in rows], right=[right[row] for row in rows])[..., ::-1]
+        picture = sheet([[crops[i] for i in row] for row in rows], right=[right[row].tolist() for row in rows])[..., ::-1]
         write_bytes(out / "look_worst.jpg", cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes())
     return LookReport(facts, table(facts))
 
