@@ -352,9 +352,9 @@ def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish,
     dome = np.stack([r * 0.97 * np.cos(t), edge + 0.024 + (h - edge - 0.024) * np.sin(t)], 1)
     band = lathe([(0, edge), (r, edge), (r, edge + 0.02), (r * 0.97, edge + 0.024), (0, edge + 0.024)], 32)
     lid = lathe([(r * 0.97, edge + 0.022), (r * 0.97, edge + 0.024), *dome], 32, 0.9)
-    hinge = box([-w * 0.16, d / 2 - 0.012, top - 0.03], [w * 0.16, d / 2 + 0.012, top + 0.03], 0.005)
-    arm = box([-0.012, -d / 2 - 0.012, 0.012], [0.012, -d / 2 + 0.03, 0.02], 0.003)
-    pedal = box([-w * 0.17, -d / 2 - 0.036, 0.010], [w * 0.17, -d / 2 - 0.008, 0.024], 0.006)
+    hinge = box([-w * 0.16, d / 2 - 0.012, top - 0.03], [w * 0.16, d / 2 + 0.004, top + 0.03], 0.005)
+    arm = box([-0.012, -d / 2 - 0.008, 0.012], [0.012, -d / 2 + 0.03, 0.02], 0.003)
+    pedal = box([-w * 0.17, -d / 2 - 0.016, 0.010], [w * 0.17, -d / 2 + 0.006, 0.024], 0.006)
     dark = plain((0.05, 0.05, 0.055), 0.45)
     rounds = [scaled(s, 1, d / w, 1) for s in (body, lid)]
     return [

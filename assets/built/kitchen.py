@@ -170,18 +170,42 @@ def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     hob = [box([-ow / 2 + 0.01, -0.26, h], [ow / 2 - 0.01, 0.25, h + 0.006], 0.002)]
     rings = [
         moved(lathe([(r - 0.0025, 0), (r, 0), (r, 0.0006), (r - 0.0025, 0.0006)], 28), x, yy, h + 0.0058)
-        for x, yy, r in ((-0.14, -0.11, 0.09), (0.14, -0.11, 0.07), (-0.14, 0.12, 0.07), (0.14, 0.12, 0.105))
+        for x, yy, big in ((-0.14, -0.11, 0.09), (0.14, -0.11, 0.07), (-0.14, 0.12, 0.07), (0.14, 0.12, 0.105))
+        for r in (big, big * 0.62)
     ]
+    touch = [box([x - 0.006, -0.243, h + 0.0055], [x + 0.006, -0.231, h + 0.0064]) for x in np.linspace(-0.1, 0.1, 6)]
     knobs = [moved(_knob(), x, y, z1 - panel / 2) for x in (-0.22, -0.13, 0.13, 0.22)]
+    marks = [
+        box([x - 0.0012, y - 0.0275, z1 - panel / 2], [x + 0.0012, y - 0.024, z1 - panel / 2 + 0.014])
+        for x in (-0.22, -0.13, 0.13, 0.22)
+    ]
+    low, high = z0 + drawer + 0.06, z1 - panel - 0.11
+    pane = box([-ow / 2 + 0.07, y - 0.001, low], [ow / 2 - 0.07, y + 0.002, high], 0.0008)
+    racks = [
+        box([-ow / 2 + 0.075, y - 0.0014, z - 0.0015], [ow / 2 - 0.075, y, z + 0.0015])
+        for z in low + (high - low) * np.array([0.25, 0.28, 0.6, 0.63])
+    ]
     display = [box([-0.06, y - 0.0015, z1 - 0.075], [0.06, y + 0.002, z1 - 0.035])]
-    grip = handle(0, z1 - panel - 0.045, y - 0.004, "bar", False, ow * 0.72)
+    grip = _level_grip(0, z1 - panel - 0.05, y - 0.002, ow * 0.78)
     extra = (
-        (STEEL, [*steel, grip, *knobs]),
+        (STEEL, [*steel, grip, *knobs, *racks]),
+        (plain((0.10, 0.095, 0.09), 0.06), pane),
+        (WHITE, [*marks, *touch]),
         (plain((0.03, 0.03, 0.035), 0.08), [*glass, *hob, *display]),
-        (plain((0.35, 0.35, 0.36), 0.3), rings),
+        (plain((0.55, 0.55, 0.56), 0.3), rings),
     )
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)]
     return _base(size, look, finish, [*sides, kick], [], worktop, extra)
+
+
+def _level_grip(x: float, z: float, y: float, length: float) -> Shape:
+    """The round bar of an oven's door on two feet."""
+    bar = tube([(x - length / 2, y - 0.026, z), (x + length / 2, y - 0.026, z)], 0.0075, 10)
+    feet = [
+        tube([(x + s * (length / 2 - 0.03), y, z), (x + s * (length / 2 - 0.03), y - 0.026, z)], 0.006, 8)
+        for s in (-1, 1)
+    ]
+    return joined(bar, *feet)
 
 
 def _knob() -> Shape:

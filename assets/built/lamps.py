@@ -82,7 +82,15 @@ def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     base = lathe([(0, h - 0.02), (r * 0.92, h - 0.02), (r * 0.94, h), (0, h)], 32)
     if look.get("kind") == "drum":
         glass = lathe([(0, 0.012), (r * 0.97, 0.012), (r * 0.97, 0.018), (0, 0.018)], 36)
-        return parts_of((WHITE, base), (_cloth(look, finish), _drum(r, r, 0, h - 0.004, 36)), (OPAL, glass))
+        hoops = [
+            lathe([(r * 0.985, z), (r, z), (r, z + 0.006), (r * 0.985, z + 0.006), (r * 0.985, z)], 36)
+            for z in (0.0, h - 0.010)
+        ]
+        nut = lathe([(0, 0.002), (0.010, 0.003), (0.013, 0.008), (0.008, 0.012), (0, 0.012)], 16, 0.9)
+        shade = _drum(r * 0.995, r * 0.995, 0.002, h - 0.006, 36)
+        return parts_of(
+            (WHITE, base), (metal(look, finish, "steel"), [*hoops, nut]), (_cloth(look, finish), shade), (OPAL, glass)
+        )
     t = np.linspace(0, np.pi / 2, 10)
     low = 0.012
     bowl = lathe(

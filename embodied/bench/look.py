@@ -83,7 +83,6 @@ MAPPED: dict[str, tuple[int, ...]] = {
     "orchid": _PLANT,
     "oven": (651, 827),
     "pendant lamp": _LAMP,
-    "plate": (923,),
     "potted plant": _PLANT,
     "printer": (742,),
     "radiator": (753,),
@@ -123,7 +122,7 @@ MAPPED: dict[str, tuple[int, ...]] = {
     "wine bottle": (907,),
 }
 """Our classes, and ImageNet's (challenge of 2012, numbered from 0) that name the same thing or hold it. What
-ImageNet has no word for is not judged."""
+ImageNet has no word for is not judged: its "plate" (923) is a main course."""
 
 
 @dataclass(frozen=True)
@@ -181,8 +180,9 @@ def recognised(
     write_json(out / "look.json", facts, indent=1)
     if worst:
         rows = [sorted(by_class[name][1], key=lambda i: bool(right[i]))[:EACH] for name in worst]
-        picture = sheet([[crops[i] for i in row] for row in rows], right=[right[row].tolist() for row in rows])[..., ::-1]
-        write_bytes(out / "look_worst.jpg", cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes())
+        picture = sheet([[crops[i] for i in row] for row in rows], [right[row].tolist() for row in rows])
+        jpeg = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+        write_bytes(out / "look_worst.jpg", jpeg.tobytes())
     return LookReport(facts, table(facts))
 
 
