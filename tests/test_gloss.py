@@ -142,6 +142,34 @@ def test_single_rays_from_thin_bars_are_no_dots_of_light():
     assert 0 < grid.values[8, 8, 3] < 0.3
 
 
+def night_window(kind: str = "opening", rough: float = 0.02) -> np.ndarray:
+    """What a camera before a pane sees: night behind it, a red wall far behind the camera."""
+    pytest.importorskip("embreex")
+    pages = (np.full((8, 8, 3), RED, np.uint8), np.zeros((8, 8, 3), np.uint8), np.zeros((8, 8, 3), np.uint8))
+    behind = quad("wall", [(-3, -9, -9), (-3, 9, -9), (-3, 9, 9), (-3, -9, 9)], 0)
+    night = quad("night", [(5, 9, -9), (5, -9, -9), (5, -9, 9), (5, 9, 9)], 1)
+    pane = quad("pane", [(2, 1, -1), (2, -1, -1), (2, -1, 1), (2, 1, 1)], 2)
+    pane = dataclasses.replace(pane, kind=kind, alpha=0.08, gloss=(rough, 0.5))
+    everywhere = lambda p: np.ones((len(p), 3), np.float32)
+    known = Shine([None] * 3, [None] * 3, [None] * 3, everywhere, np.ones(3, np.float32), 1.0)
+    ahead = Camera((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    return Gloss(LitPages((behind, night, pane), pages, "x"), known).over(np.zeros((64, 64, 3), np.uint8), ahead)
+
+
+def test_a_window_at_night_shows_the_room_and_only_where_the_pane_is():
+    out = night_window()
+    assert out[32, 32, 0] > out[32, 32, 1] + 20, "the red wall behind the camera"
+    assert not out[2, 2].any() and not out[32, 5].any(), "beside the pane is night"
+    light = light_of(out[32, 32])[0] / light_of(np.array(RED, np.uint8))[0]
+    assert light == pytest.approx(4 * 0.04 / (1 + 3 * 0.04), rel=0.1), "double glazing: four surfaces of 4 %"
+    table = light_of(night_window("object")[32, 32])[0] / light_of(np.array(RED, np.uint8))[0]
+    assert table == pytest.approx(2 * 0.04 / (1 + 0.04), rel=0.15), "one pane: two surfaces"
+
+
+def test_sheer_curtains_mirror_nothing():
+    assert not night_window(rough=0.8).any()
+
+
 def test_gloss_goes_with_baked_pages_of_the_classic_renderer():
     assert PictureSettings(64, "fast", look="gloss").look == "gloss"
     for wrong in (("unlit", "classic"), ("glossy", "classic"), ("normal", "filament")):

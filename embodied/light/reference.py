@@ -15,7 +15,8 @@ from embodied.light.backend import array, drjit, floats, mitsuba
 from embodied.light.files import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
-from embodied.light.trace import Hit, look, picture_at, through, world_of
+from embodied.light.trace import Hit, Panes, look, picture_at, through, world_of
+from embodied.render.film import light_of, shown_of
 from embodied.render.panorama import FACES, Panorama
 from embodied.seeds import stream
 
@@ -132,9 +133,37 @@ class Tracer:
         )
         if world.panes is None:
             return share, x, elsewhere, np.where(keep, array(hit.albedo), 0.0), square
-        colour, left, _, _ = through(world.panes, ray, dr.select(hit.ok, hit.distance, dr.inf))
+        colour, left, first, face = through(world.panes, ray, dr.select(hit.ok, hit.distance, dr.inf))
         t = np.broadcast_to(np.asarray(left).reshape(-1, 1), share.shape).astype(np.float32)
-        return share * t, x * t, elsewhere * t + array(colour), np.where(keep, array(hit.albedo), 0.0) * t, square * t
+        elsewhere = elsewhere * t + array(colour)
+        if self.quality != "diffuse":
+            mirrors, mirrored = self._in_panes(world.panes, ray, first, face, rng)
+            x = x * (1 - mirrors) + np.minimum(mirrored, most) * mirrors
+            lit = light_of(255 * elsewhere) * (1 - mirrors) + mirrored * mirrors
+            elsewhere = np.where(~keep & (mirrors > 0), shown_of(lit) / np.float32(255), elsewhere)
+        return share * t, x * t, elsewhere, np.where(keep, array(hit.albedo), 0.0) * t, square * t
+
+    def _in_panes(
+        self, panes: Panes, ray: Ray, first: Array, face: Array, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Share of the light (n, 1) that the first pane of glass on each ray mirrors, and what it mirrors, exposed (n,
+        3): nothing rough, one bounce."""
+        mi, dr, world = mitsuba(), drjit(), self._world
+        there = dr.isfinite(first)
+        normal = dr.gather(mi.Vector3f, panes.normal, face, there)
+        surfaces = dr.gather(mi.Float, panes.surfaces, face, there)
+        there &= surfaces > 0
+        c = dr.dot(normal, ray.d)
+        f = 0.04 + 0.96 * dr.power(1 - dr.minimum(dr.abs(c), 1), 5)
+        mirrors = dr.select(there, surfaces * f / (1 + (surfaces - 1) * f), 0.0)
+        at, d = ray.o + ray.d * dr.select(there, first, 0.0), ray.d - 2 * c * normal
+        onward = mi.Ray3f(at + d * radiosity.LIFT, d)
+        second = look(world, onward, there)
+        far = picture_at(world.sky, world.rows, d, there) * radiosity.GLASS
+        e = second.e if self.quality == "glossy" else self._traced(second, onward, rng)
+        seen = dr.select(second.ok & ~second.outdoor, second.albedo * e + second.glow, far)
+        points = np.where(np.asarray(there)[:, None], array(at), 0.0)
+        return np.asarray(mirrors)[:, None], np.nan_to_num(array(seen), posinf=0.0) * world.exposure.at(points)
 
     def _traced(self, hit: Hit, ray: Ray, rng: np.random.Generator) -> Array:
         """e at first hits by path tracing."""

@@ -18,7 +18,7 @@ from embodied.light.paths import Lights, Surfaces, lights_of
 from embodied.light.radiosity import Space
 from embodied.light.sky import Outdoors, outdoors
 from embodied.light.unwrap import face_normals
-from embodied.scene.lit_pages import LitPages
+from embodied.scene.lit_pages import LitPages, glass_surfaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +68,8 @@ class Panes:
     """(k * 3 * 2)."""
     opacity: Array
     """(k,)."""
+    surfaces: Array
+    """(k,) of glass that stand behind one another; 0 where it is none."""
     owner: np.ndarray
     """(k,) int32 instance ids."""
     page: Array
@@ -210,6 +212,7 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
         floats(face_normals(corners.astype(np.float64))),
         floats(np.concatenate([m.uv[m.faces] for m in clear])),
         floats(each(lambda m: m.alpha)),
+        floats(each(glass_surfaces)),
         each(lambda m: number.get(m.owner, 0)).astype(np.int32),
         wholes(each(lambda m: used[m.page])),
         wholes(size.ravel()),

@@ -24,7 +24,7 @@ from embodied.geometry import r2
 from embodied.render.camera import Camera
 from embodied.render.film import light_of, shown_of
 from embodied.render.mirrored import FINE_TILE, TILE, Mirrored, evened
-from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.lit_pages import LitMesh, LitPages, glass_surfaces
 
 MATTE = 0.7
 """Roughness from which on nothing is looked for: the lobe is so wide that three views gained 0.0 to 0.3 dB by it and
@@ -40,6 +40,10 @@ BRIGHTEST = 12.0
 """Reflected light is cut at this multiple of what is shown as a white sheet, as in the tracer."""
 COARSER = 4
 """Texels of a page, in one direction, that are averaged for what rough surfaces mirror."""
+PANE_STEP = 4
+"""Panes are looked for in every so manieth pixel; thinner ones mirror nothing."""
+CLOUDY = 0.5
+"""Opacity from which on things hide what lies behind them, as shades of lamps and sheer curtains do."""
 LIFT = 1e-3
 """Metres that a ray begins above its surface."""
 ROOKS = ((-0.25, -0.25), (0.25, 0.25))
@@ -48,6 +52,8 @@ WHITE = 5.0
 """Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
 GLASS = 0.81
 """Share of the outdoors' light that comes in through double glazing, as the bake has it."""
+PANE_F0 = 0.04
+"""Share of the light that one surface of glass mirrors straight ahead (refractive index 1.5)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +96,17 @@ class _Faces:
     """(m,) bool, beyond the windows."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Panes:
+    """Clear, smooth glass, k faces."""
+
+    scene: object
+    normal: np.ndarray
+    """(k, 3) float32."""
+    surfaces: np.ndarray
+    """(k,) float32 how many surfaces of glass stand behind one another."""
+
+
 class Gloss:
     """Owns the faces of a lit house, arranged for rays, and its light, coarser than the pages."""
 
@@ -101,6 +118,7 @@ class Gloss:
         self._faces = _faces_of(lit, shine)
         self._pages = lit.pages
         self._scene = _scene_of(self._faces.corners)
+        self._panes = _panes_of(lit)
         self._gain_at, self._beyond = shine.gain_at, shine.outdoors / GLASS
         some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
         gains = [shine.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
@@ -132,6 +150,8 @@ class Gloss:
             near = cv2.dilate(sharp, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
             near = cv2.resize(near, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_NEAREST)[:h, :w]
             self._lay_smooth(out, rgb, camera, near)
+        if self._panes is not None:
+            self._lay_panes(out, camera, self._panes)
         return out
 
     def _seen(self, camera: Camera, directions: np.ndarray, pixels: np.ndarray | None = None) -> _Seen:
@@ -163,16 +183,44 @@ class Gloss:
         onward = seen.ahead + 2 * c * half
         above = np.einsum("ij,ij->i", onward, seen.normal)[:, None] > 0
         start = np.asarray(camera.position, np.float32) + seen.ahead * seen.distance[:, None] + seen.normal * LIFT
-        face, far, u, v = _first(self._scene, start, onward)
-        there = start + onward * np.where(face >= 0, far, 0)[:, None]
-        gain = np.where(faces.outer[face][:, None], self._beyond, self._gain_at(there))
-        light = self._light_at(face, u, v, sharp=sharp) / gain
-        light = np.minimum(light, BRIGHTEST / self._middle) * self._gain_at(start)
+        light = self._arriving(start, onward, sharp=sharp) * self._gain_at(start)
         gloss = faces.gloss[seen.face]
         rough, specular, metal = gloss[:, :1], gloss[:, 1:2], gloss[:, 2:]
         f0 = 0.08 * specular * (1 - metal) + faces.tint[seen.face] * metal
         f = schlick(f0, c, rough) * above
         return (1 - (1 - metal) * (1 - f)) * above, light * f
+
+    def _lay_panes(self, out: np.ndarray, camera: Camera, panes: _Panes) -> None:
+        """Lay what panes of glass mirror over `out` (h, w, 3): windows at night show the room."""
+        h, w = out.shape[:2]
+        rough = _directions(camera, (h, w), step=PANE_STEP)
+        at = np.asarray(camera.position, np.float32)
+        shape = (-(-h // PANE_STEP), -(-w // PANE_STEP))
+        found = (_first(panes.scene, np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
+        if not found.any():
+            return
+        near = cv2.dilate(found.astype(np.uint8), np.ones((3, 3), np.uint8)).repeat(PANE_STEP, 0).repeat(PANE_STEP, 1)
+        pixels = np.flatnonzero(near[:h, :w])
+        ahead = _directions(camera, (h, w), pixels)
+        origin = np.broadcast_to(at, ahead.shape)
+        pane, distance, _, _ = _first(panes.scene, origin, ahead)
+        solid, behind, _, _ = _first(self._scene, origin, ahead)
+        chosen = np.flatnonzero((pane >= 0) & ((solid < 0) | (distance < behind)))
+        pane, ahead, pixels = pane[chosen], ahead[chosen], pixels[chosen]
+        c = -np.einsum("ij,ij->i", panes.normal[pane], ahead)[:, None]
+        onward, c = ahead + 2 * c * panes.normal[pane], np.abs(c)
+        start = at + ahead * distance[chosen, None] + onward * LIFT
+        light = self._arriving(start, onward, sharp=True) * self._gain_at(start)
+        share = stacked(schlick(np.full_like(c, PANE_F0), c, np.zeros_like(c)), panes.surfaces[pane][:, None])
+        flat = out.reshape(-1, 3)
+        flat[pixels] = shown_of(light_of(flat[pixels]) * (1 - share) + np.minimum(light, WHITE) * share)
+
+    def _arriving(self, start: np.ndarray, onward: np.ndarray, *, sharp: bool) -> np.ndarray:
+        """(n, 3) light that comes from where rays go, before it is exposed."""
+        face, far, u, v = _first(self._scene, start, onward)
+        there = start + onward * np.where(face >= 0, far, 0)[:, None]
+        gain = np.where(self._faces.outer[face][:, None], self._beyond, self._gain_at(there))
+        return np.minimum(self._light_at(face, u, v, sharp=sharp) / gain, BRIGHTEST / self._middle)
 
     def _light_at(self, face: np.ndarray, u: np.ndarray, v: np.ndarray, *, sharp: bool) -> np.ndarray:
         """(n, 3) exposed light of the places where rays ended."""
@@ -287,6 +335,14 @@ def schlick(f0: np.ndarray, cos: np.ndarray, rough: np.ndarray) -> np.ndarray:
     return f0 + (1 - f0) * grazing * (1 - 0.9 * np.square(rough))
 
 
+def stacked(f: np.ndarray, surfaces: np.ndarray) -> np.ndarray:
+    """Share of the light that surfaces behind one another mirror, f each, with all light to and fro between them.
+
+    Source: Stokes 1862 for plates that take nothing of the light: n f / (1 + (n - 1) f).
+    """
+    return surfaces * f / (1 + (surfaces - 1) * f)
+
+
 def _half_vectors(normal: np.ndarray, rough: np.ndarray, u: np.ndarray) -> np.ndarray:
     """(n, 3) float32 directions in the lobes around `normal`, for numbers (n, 2) in [0, 1).
 
@@ -383,8 +439,8 @@ def _embree() -> tuple[ModuleType, ModuleType]:
 
 
 def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
-    """The faces of what is not seen through, and of the sky."""
-    solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= 0.9 and len(m.faces)]
+    """The faces of what is hardly seen through, and of the sky; what is a little mirrors nothing."""
+    solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= CLOUDY and len(m.faces)]
     each = lambda value: np.concatenate([np.full(len(m.faces), value(i, m)) for i, m in solid])
     corners = np.concatenate([m.vertices[m.faces] for _, m in solid]).astype(np.float32)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -392,6 +448,8 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     outer = each(lambda i, m: m.kind == "outdoor")
     gloss = np.concatenate([_or_zeros(shine.gloss[i], m) for i, m in solid]).astype(np.float32) / 255
     gloss[outer] = 0
+    gloss[each(lambda i, m: m.alpha < 0.9)] = 0
+    gloss[np.concatenate([_glowing(m, shine.glow[m.page]) for _, m in solid])] = 0
     return _Faces(
         corners,
         (normal / np.maximum(length, 1e-12)).astype(np.float32),
@@ -402,6 +460,28 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
         np.concatenate([_or_zeros(shine.tint[i], m) for i, m in solid]).astype(np.float32),
         outer,
     )
+
+
+def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
+    """(m,) bool: faces that give light of their own, beside which what they mirror is nothing."""
+    if glow is None:
+        return np.zeros(len(mesh.faces), bool)
+    h, w = glow.shape[:2]
+    corners = mesh.uv[mesh.faces]
+    at = np.concatenate([corners, corners.mean(1, keepdims=True)], axis=1)
+    x, y = (np.clip(at[..., k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
+    return glow[y, x].max((1, 2)) > 0
+
+
+def _panes_of(lit: LitPages) -> _Panes | None:
+    clear = [m for m in lit.meshes if glass_surfaces(m) and len(m.faces)]
+    if not clear:
+        return None
+    corners = np.concatenate([m.vertices[m.faces] for m in clear]).astype(np.float32)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    surfaces = np.concatenate([np.full(len(m.faces), glass_surfaces(m), np.float32) for m in clear])
+    return _Panes(_scene_of(corners), normal, surfaces)
 
 
 def _or_zeros(values: np.ndarray | None, mesh: LitMesh) -> np.ndarray:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+CLEAR = 0.1
+"""Roughness up to which what is seen through is glass; curtains are rougher."""
+
 
 @dataclass(frozen=True, eq=False)
 class LitMesh:
@@ -42,3 +45,10 @@ class LitPages:
     """Hex digest of what the light depends on; part of the key of every panorama made with it."""
     owners: tuple[str, ...] = ()
     """parts.owners(house) of the house that was lit; checked by the renderer where given."""
+
+
+def glass_surfaces(mesh: LitMesh) -> int:
+    """How many surfaces of glass one looks through: four of double glazing, two of another pane; 0 where it is none."""
+    if mesh.alpha >= 0.9 or mesh.gloss is None or mesh.gloss[0] > CLEAR:
+        return 0
+    return 4 if mesh.kind == "opening" else 2
