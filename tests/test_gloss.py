@@ -142,12 +142,12 @@ def test_single_rays_from_thin_bars_are_no_dots_of_light():
     assert 0 < grid.values[8, 8, 3] < 0.3
 
 
-def night_window(kind: str = "opening", rough: float = 0.02) -> np.ndarray:
-    """What a camera before a pane sees: night behind it, a red wall far behind the camera."""
+def night_window(kind: str = "opening", rough: float = 0.02, night_at: float = 5.0) -> np.ndarray:
+    """What a camera before a pane sees: night behind it (or before it), a red wall far behind the camera."""
     pytest.importorskip("embreex")
     pages = (np.full((8, 8, 3), RED, np.uint8), np.zeros((8, 8, 3), np.uint8), np.zeros((8, 8, 3), np.uint8))
     behind = quad("wall", [(-3, -9, -9), (-3, 9, -9), (-3, 9, 9), (-3, -9, 9)], 0)
-    night = quad("night", [(5, 9, -9), (5, -9, -9), (5, -9, 9), (5, 9, 9)], 1)
+    night = quad("night", [(night_at, y, z) for y, z in ((9, -9), (-9, -9), (-9, 9), (9, 9))], 1)
     pane = quad("pane", [(2, 1, -1), (2, -1, -1), (2, -1, 1), (2, 1, 1)], 2)
     pane = dataclasses.replace(pane, kind=kind, alpha=0.08, gloss=(rough, 0.5))
     everywhere = lambda p: np.ones((len(p), 3), np.float32)
@@ -166,8 +166,9 @@ def test_a_window_at_night_shows_the_room_and_only_where_the_pane_is():
     assert table == pytest.approx(2 * 0.04 / (1 + 0.04), rel=0.15), "one pane: two surfaces"
 
 
-def test_sheer_curtains_mirror_nothing():
+def test_sheer_curtains_and_hidden_panes_mirror_nothing():
     assert not night_window(rough=0.8).any()
+    assert not night_window(night_at=1.0).any()
 
 
 def test_gloss_goes_with_baked_pages_of_the_classic_renderer():

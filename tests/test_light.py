@@ -250,6 +250,8 @@ def test_exposure_is_smooth_through_a_door_and_brightens_dark_rooms():
     gain = exposure.at(np.stack([x, np.full_like(x, 2.0), np.full_like(x, 1.5)], 1))[:, 0]
     assert gain[0] == pytest.approx(1.0, rel=0.05) and gain[-1] == pytest.approx(8.0, rel=0.05)
     assert (np.diff(gain) > -1e-5).all() and (gain[1:] / gain[:-1]).max() < 1.04
+    many = np.random.default_rng(0).uniform((-2, -2, -1), (10, 6, 4), (500, 3))
+    assert np.abs(np.log(exposure.near(many) / exposure.at(many))).max() < 0.25, "the nearest of the grid's points"
 
 
 def test_the_film_curve_rises_and_keeps_black_black():

@@ -206,6 +206,8 @@ class Gloss:
         pane, distance, _, _ = _first(panes.scene, origin, ahead)
         solid, behind, _, _ = _first(self._scene, origin, ahead)
         chosen = np.flatnonzero((pane >= 0) & ((solid < 0) | (distance < behind)))
+        if not len(chosen):
+            return
         pane, ahead, pixels = pane[chosen], ahead[chosen], pixels[chosen]
         c = -np.einsum("ij,ij->i", panes.normal[pane], ahead)[:, None]
         onward, c = ahead + 2 * c * panes.normal[pane], np.abs(c)
