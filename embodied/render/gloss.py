@@ -204,14 +204,15 @@ class Gloss:
         ahead = _directions(camera, (h, w), pixels)
         origin = np.broadcast_to(at, ahead.shape)
         pane, distance, _, _ = _first(panes.scene, origin, ahead)
-        solid, behind, _, _ = _first(self._scene, origin, ahead)
-        chosen = np.flatnonzero((pane >= 0) & ((solid < 0) | (distance < behind)))
-        if not len(chosen):
+        hit = np.flatnonzero(pane >= 0)
+        solid, behind, _, _ = _first(self._scene, origin[hit], ahead[hit])
+        hit = hit[(solid < 0) | (distance[hit] < behind)]
+        if not len(hit):
             return
-        pane, ahead, pixels = pane[chosen], ahead[chosen], pixels[chosen]
+        pane, ahead, pixels = pane[hit], ahead[hit], pixels[hit]
         c = -np.einsum("ij,ij->i", panes.normal[pane], ahead)[:, None]
         onward, c = ahead + 2 * c * panes.normal[pane], np.abs(c)
-        start = at + ahead * distance[chosen, None] + onward * LIFT
+        start = at + ahead * distance[hit, None] + onward * LIFT
         light = self._arriving(start, onward, sharp=True) * self._gain_at(start)
         share = stacked(schlick(np.full_like(c, PANE_F0), c, np.zeros_like(c)), panes.surfaces[pane][:, None])
         flat = out.reshape(-1, 3)
