@@ -30,11 +30,17 @@ from embodied.light.emitters import lamps_of, portals_of
 from embodied.light.sites import Spread, around_good, sites_of
 from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.light.tone import Exposure, develop
+from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
-DARK = Outdoors(np.full((64, 128, 3), 1e-9, np.float32), np.array([0.0, 0.0, 1.0]), np.zeros(3))
+DARK = Outdoors(
+    np.full((64, 128, 3), 1e-9, np.float32),
+    np.array([0.0, 0.0, 1.0]),
+    np.zeros(3),
+    np.full((64, 256, 3), 1e-9, np.float32),
+)
 SRGB_HALF = 0.7353569831
 """sRGB value of linear 0.5."""
 
@@ -237,10 +243,11 @@ def test_the_sun_rises_in_the_east_stands_south_at_noon_and_is_below_at_midnight
 
 
 def test_the_outdoors_gets_darker_from_noon_over_dusk_to_night_and_depends_on_the_seed_alone():
-    brightness = [paint(Sky(hour), 1, 128).picture.mean() for hour in (12.0, 18.3, 19.0, 23.0)]
+    place = Scenery("fields", "summer", 0.15, 0.0)
+    brightness = [paint(Sky(hour), 1, place, 128).picture.mean() for hour in (12.0, 18.3, 19.0, 23.0)]
     assert all(a > 3 * b for a, b in itertools.pairwise(brightness))
-    assert (paint(Sky(12.0), 5, 128).picture == paint(Sky(12.0), 5, 128).picture).all()
-    assert not paint(Sky(12.0, "overcast"), 1, 128).sun.any()
+    assert (paint(Sky(12.0), 5, place, 128).fine == paint(Sky(12.0), 5, place, 128).fine).all()
+    assert not paint(Sky(12.0, "overcast"), 1, place, 128).sun.any()
 
 
 def test_exposure_is_smooth_through_a_door_and_brightens_dark_rooms():

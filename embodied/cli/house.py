@@ -12,7 +12,7 @@ from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogu
 from embodied.cli.options import add_fields, chosen, folder_to_write
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
-from embodied.house.house import WEATHERS
+from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
 
@@ -27,7 +27,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
     group = parser.add_argument_group("what kind of house", "what is not given is drawn from the seed")
-    add_fields(group, HouseConfig, words={"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "novelty": NOVELTIES})
+    words = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
+    add_fields(group, HouseConfig, words=words | {"novelty": NOVELTIES})
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from assets.cache import write_json
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
 from embodied.cli.options import any_path
+from embodied.house.house import LANDSCAPES, SEASONS
 
 if TYPE_CHECKING:
     from embodied.house.house import House
@@ -28,6 +29,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--time", metavar="TIME", help=f"one of {', '.join(TIMES)}, or an hour such as 17.5; written into house.json"
     )
     parser.add_argument("--weather", choices=("clear", "hazy", "overcast"), help="written into house.json")
+    parser.add_argument("--landscape", choices=LANDSCAPES, help="what windows show; written into house.json")
+    parser.add_argument("--season", choices=SEASONS, help="of the landscape; written into house.json")
     parser.add_argument("--lamps", choices=("on", "off"), help="switch all lamps; written into house.json")
     parser.add_argument(
         "--quality", choices=("fast", "normal", "high"), default="normal",
@@ -49,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     path = args.folder / "house.json"
     catalogue = catalogue_of(args)
     house = load_house(path, catalogue)
-    changed = with_sky(house, args.time, args.weather, args.lamps)
+    changed = with_sky(house, args.time, args.weather, args.lamps, args.landscape, args.season)
     if changed.digest != house.digest:
         changed.save(path)
     if args.lights < 1:
@@ -71,13 +74,24 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def with_sky(house: House, time: str | None, weather: str | None, lamps: str | None) -> House:
-    """`house` at another hour, in other weather, with its lamps on or off; None keeps what is."""
+def with_sky(
+    house: House,
+    time: str | None,
+    weather: str | None,
+    lamps: str | None,
+    landscape: str | None = None,
+    season: str | None = None,
+) -> House:
+    """`house` at another hour, in other weather or surroundings, with its lamps on or off; None keeps what is."""
     sky = house.sky
     if time is not None:
         sky = dataclasses.replace(sky, hour=hour_of(time))
     if weather is not None:
         sky = dataclasses.replace(sky, weather=weather)
+    if landscape is not None:
+        sky = dataclasses.replace(sky, landscape=landscape)
+    if season is not None:
+        sky = dataclasses.replace(sky, season=season)
     lights = house.lights
     if lamps is not None:
         lights = tuple(dataclasses.replace(light, on=lamps == "on") for light in lights)

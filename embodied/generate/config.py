@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.generate.novelty import styles_of
-from embodied.house.house import HouseError
+from embodied.house.house import LANDSCAPES, SEASONS, HouseError
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
 
@@ -42,6 +42,10 @@ class HouseConfig:
     """Local solar time, hours in [0, 24)."""
     weather: str | None = None
     """Of the sky: it decides how light falls in."""
+    landscape: str | None = None
+    """What is seen through the windows."""
+    season: str | None = None
+    """Of the landscape: leaves, bare trees, snow."""
     novelty: str | None = None
     """'familiar' or 'novel': of what houses to learn from may hold when others are out of distribution, or of what
     they never hold (embodied.generate.novelty); None is all there is."""
@@ -61,6 +65,10 @@ class HouseConfig:
             raise HouseError(f"hour should lie in [0, 24), got {self.hour}")
         if self.weather not in (None, "clear", "hazy", "overcast"):
             raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
+        if self.landscape not in (None, *LANDSCAPES):
+            raise HouseError(f"landscape should be one of {LANDSCAPES}, got {self.landscape!r}")
+        if self.season not in (None, *SEASONS):
+            raise HouseError(f"season should be one of {SEASONS}, got {self.season!r}")
         if self.style is not None and self.style not in STYLES:
             raise HouseError(f"style should be one of {STYLES}, got {self.style!r}")
         if self.novelty not in (None, *NOVELTIES):

@@ -179,16 +179,18 @@ def finishes(draft: Draft) -> Draft:
 
 
 def draw_sky(config: HouseConfig, house: House, *, rng: np.random.Generator) -> Sky:
-    """Daytime mostly, the living room's largest window more or less to the south; `config` may fix hour and weather."""
+    """Daytime mostly, the living room's largest window more or less to the south; `config` may fix hour, weather,
+    landscape and season."""
+    outside = (config.landscape, config.season)
     hour = config.hour if config.hour is not None else round(float(rng.triangular(8.0, 12.0, 18.0)), 2)
     weather = config.weather or str(rng.choice(["clear", "hazy", "overcast"], p=[0.55, 0.25, 0.2]))
     living = [o for o in house.openings if o.rooms[1] is None and house.room_by_id[o.rooms[0]].kind == "living_room"]
     if not living:
-        return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4))
+        return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4), *outside)
     widest = max(living, key=lambda o: (math.dist(o.a, o.b) * (o.head - o.sill), o.id))
     into = inward(house, widest)
     north = math.atan2(into[1], into[0]) + float(rng.normal(0, 0.8))
-    return Sky(hour, weather, round(float(wrap(north)), 4))
+    return Sky(hour, weather, round(float(wrap(north)), 4), *outside)
 
 
 def furnishing(draft: Draft) -> Draft:

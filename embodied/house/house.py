@@ -30,6 +30,8 @@ SCHEMA = 1
 
 OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french_window", "garage_door")
 WEATHERS = ("clear", "hazy", "overcast")
+LANDSCAPES = ("suburb", "village", "street", "roofs", "lake", "fields", "forest")
+SEASONS = ("spring", "summer", "autumn", "winter")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
 
@@ -54,6 +56,10 @@ class Sky:
     """'clear', 'hazy' or 'overcast'."""
     north: float = math.pi / 2
     """World direction of north, radians counter-clockwise from +x."""
+    landscape: str | None = None
+    """One of LANDSCAPES; None is drawn from the house's seed, as is the season (embodied.scene.landscapes)."""
+    season: str | None = None
+    """One of SEASONS."""
 
 
 @dataclass(frozen=True)
@@ -206,8 +212,9 @@ class House:
         return float(sum(shapely.Polygon(r.polygon).area for r in self.rooms))
 
     def to_json(self) -> str:
-        """Canonical JSON: sorted keys, no blanks."""
+        """Canonical JSON: sorted keys, no blanks; a landscape and a season that are left to the seed are left out."""
         body = {"schema": SCHEMA, **dataclasses.asdict(self)}
+        body["sky"] = {k: v for k, v in body["sky"].items() if v is not None}
         return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @staticmethod
@@ -326,6 +333,10 @@ def _check_numbers(house: House) -> None:
         )
     if house.sky.weather not in WEATHERS or not 0 <= house.sky.hour < 24:
         raise HouseError(f"sky should have a weather of {WEATHERS} and an hour in [0, 24), got {house.sky}")
+    if house.sky.landscape not in (None, *LANDSCAPES) or house.sky.season not in (None, *SEASONS):
+        raise HouseError(
+            f"sky should have a landscape of {LANDSCAPES} and a season of {SEASONS}, or leave them out, got {house.sky}"
+        )
     numbers = [(p.id, (*p.position, p.yaw, *p.size)) for p in house.placements]
     numbers += [(x.id, (*x.position, *x.color, x.power)) for x in house.lights]
     numbers += [(o.id, (*o.a, *o.b, o.sill, o.head, o.angle)) for o in house.openings]

@@ -167,7 +167,8 @@ def bake_all(
 
 def _unlit(house: House) -> House:
     lights = tuple(dataclasses.replace(x, on=True) for x in house.lights)
-    return dataclasses.replace(house, sky=Sky(), lights=lights)
+    bare = Sky(landscape=house.sky.landscape, season=house.sky.season)  # which the parts know
+    return dataclasses.replace(house, sky=bare, lights=lights)
 
 
 def lightings_of(house: House, count: int) -> tuple[House, ...]:

@@ -15,7 +15,7 @@ from embodied.light.backend import array, drjit, floats, mitsuba
 from embodied.light.files import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
-from embodied.light.trace import Hit, Panes, look, picture_at, through, world_of
+from embodied.light.trace import Hit, Panes, backdrop_at, look, picture_at, through, world_of
 from embodied.render.film import light_of, shown_of
 from embodied.render.panorama import FACES, Panorama
 from embodied.seeds import stream
@@ -120,7 +120,7 @@ class Tracer:
         diffuse = hit.albedo * e
         diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
         radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
-        shown = dr.select(hit.ok, hit.e, picture_at(world.dome, world.rows, ray.d))
+        shown = dr.select(hit.ok, hit.e, backdrop_at(world.dome, world.rows, ray.d))
         keep = np.asarray(inside)[:, None]
         there, seen = array(hit.position), np.nan_to_num(array(radiance), posinf=0.0)
         gain = world.exposure.at(np.where(keep, there, 0.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +22,16 @@ from embodied.light.cover import Cover, Texels, cover, rasterise, sheets_of
 from embodied.light.radiosity import ENV_ROWS, LIFT, points_of, sky_alone
 from embodied.light.sky import Outdoors
 from embodied.light.tone import Exposure, display
-from embodied.light.unwrap import SPARSEST, face_normals
+from embodied.light.unwrap import SPARSEST
+from embodied.scene.backdrop import DOME, GLOW, dome
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
-RADIUS = 70.0
-"""Metres to the dome."""
-DOME = "outdoor/sky"
-"""Owner of the dome; no instance id belongs to it."""
+FAR = ("outdoor/neighbours", "outdoor/windows", "outdoor/street")
+COARSER = 0.8
+"""Owners of what stands beyond the plot, and how many luxels it gets along a metre against the rest."""
+LIT_WINDOWS = "outdoor/windows"
+"""Owner of the panes that glow in the evening."""
 LUXELS = 110_000
 """Luxels for all outer parts together, at most."""
 
@@ -57,13 +60,15 @@ def outside_of(
     """
     if not parts:
         return None
-    area = sum(
-        float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2
-        for c in (p.mesh.vertices[p.mesh.faces] for p in parts)
-    )
+    far = [p for p in parts if p.owner in FAR]
+    near = [p for p in parts if p.owner not in FAR]
+    area = _area(near) + COARSER**2 * _area(far)
     density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
     budget = round(min(1500.0, (density / SPARSEST) ** 2))  # of trees and hedges, no finer than the rest
-    atlas = atlas_of(things_of([_flat(p) for p in parts], density=density, budget=budget, cache=cache, finest=2))
+    unfold = functools.partial(things_of, budget=budget, cache=cache, finest=2)
+    atlas = atlas_of(
+        unfold([_flat(p) for p in near], density=density) + unfold([_flat(p) for p in far], density=COARSER * density)
+    )
     sheets = sheets_of(atlas.pages)
     covers = tuple(cover(p, p.fineness, s) for p, s in zip(atlas.pages, sheets))
     return Outside(
@@ -73,6 +78,12 @@ def outside_of(
         tuple(albedo(p, c, maps) for p, c in zip(atlas.pages, covers)),
         scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass])),
     )
+
+
+def _area(parts: Sequence[Part]) -> float:
+    """Of all faces, square metres."""
+    corners = [p.mesh.vertices[p.mesh.faces] for p in parts]
+    return sum(float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2 for c in corners)
 
 
 def daylit(outside: Outside | None, outdoors: Outdoors, exposure: Exposure, rays: int) -> list[np.ndarray]:
@@ -88,13 +99,23 @@ def daylit(outside: Outside | None, outdoors: Outdoors, exposure: Exposure, rays
             field = spread(coarse.index, e, coarse.shape)
             rows, columns = np.divmod(c.index, c.shape[1])
             light = field[rows // page.fineness, columns // page.fineness]
-            pages.append(spread(c.index, display(colour * light, gain), c.shape))
-    return [*pages, display(outdoors.picture, gain)]
+            shown = colour * light
+            if outdoors.lamps > 0 and LIT_WINDOWS in outside.atlas.owners:
+                lit = page.owner[c.face] == outside.atlas.owners.index(LIT_WINDOWS)
+                shown[lit] += (GLOW * outdoors.lamps).astype(np.float32) * _evenings(page.corners[c.face[lit]])
+            pages.append(spread(c.index, display(shown, gain), c.shape))
+    return [*pages, display(outdoors.fine, gain)]
+
+
+def _evenings(corners: np.ndarray) -> np.ndarray:
+    """(n, 1) brightness of the windows that triangles (n, 3, 3) belong to, from 0.4 to 1.2."""
+    metres = np.floor((corners.min(1) + corners.max(1)) * [0.45, 0.45, 0.2]) @ [12.9898, 78.233, 37.719]
+    return (0.4 + 0.8 * np.mod(np.sin(metres) * 43758.5453, 1.0))[:, None].astype(np.float32)
 
 
 def _flat(part: Part) -> Part:
-    """Walls, roofs and lawns of the outdoors unfold like those inside."""
-    flat = part.owner in ("outdoor/facade", "outdoor/roof", "outdoor/ground", "outdoor/terrace")
+    """What is flat outdoors unfolds like the walls inside: all but hedges and trees."""
+    flat = part.owner not in ("outdoor/hedge", "outdoor/trees")
     return dataclasses.replace(part, kind="wall") if flat else part
 
 
@@ -123,20 +144,7 @@ def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndar
     return e
 
 
-def dome_mesh(house: House, page: int, rows: int = 24) -> LitMesh:
-    """A sphere around the house that wears the picture of the outdoors on its inside."""
-    corners = np.array([c for r in house.rooms for c in r.polygon])
-    centre = np.array([*(corners.min(0) + corners.max(0)) / 2, 1.6])
-    v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, 2 * rows + 1), indexing="ij")
-    elevation, yaw = (0.5 - v) * np.pi, np.pi * (1 - 2 * u)
-    d = np.stack([np.cos(elevation) * np.cos(yaw), np.cos(elevation) * np.sin(yaw), np.sin(elevation)], axis=-1)
-    i = np.arange(rows)[:, None] * (2 * rows + 1) + np.arange(2 * rows)[None]
-    a, b, c, e = i, i + 1, i + 2 * rows + 2, i + 2 * rows + 1
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, e], -1).reshape(-1, 3)])
-    vertices = (centre + RADIUS * d).reshape(-1, 3).astype(np.float32)
-    inward = (face_normals(vertices[faces].astype(float)) * (centre - vertices[faces].mean(1))).sum(1)
-    faces = np.where((inward < 0)[:, None], faces[:, ::-1], faces)
-    size = vertices[faces]
-    real = np.linalg.norm(np.cross(size[:, 1] - size[:, 0], size[:, 2] - size[:, 0]), axis=1) > 1e-4
-    uv = np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)
-    return LitMesh(DOME, "outdoor", "", page, vertices, faces[real].astype(np.int32), uv)
+def dome_mesh(house: House, page: int) -> LitMesh:
+    """The dome that wears the picture of the outdoors."""
+    vertices, faces, uv = dome(house)
+    return LitMesh(DOME, "outdoor", "", page, vertices, faces, uv)

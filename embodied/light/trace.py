@@ -18,6 +18,7 @@ from embodied.light.paths import Lights, Surfaces, lights_of
 from embodied.light.radiosity import Space
 from embodied.light.sky import Outdoors, outdoors
 from embodied.light.unwrap import face_normals
+from embodied.scene.backdrop import KNOTS
 from embodied.scene.lit_pages import LitPages, glass_surfaces
 
 
@@ -47,7 +48,7 @@ class BakedScene:
     glow: Array
     """Flat radiance of all texels; None if nothing glows."""
     dome: Array
-    """Flat sRGB picture of the outdoors as shown."""
+    """Flat sRGB picture of the outdoors as shown, for `backdrop_at`."""
     sky: Array
     """Flat radiance of the outdoors."""
     rows: int
@@ -345,3 +346,15 @@ def picture_at(table: Array, rows: int, d: Array, active: Array = True) -> Array
     y = dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * rows
     i = mi.UInt32(dr.clip(y, 0, rows - 1)) * (2 * rows) + mi.UInt32(dr.clip(x, 0, 2 * rows - 1))
     return dr.gather(mi.Color3f, table, i, active)
+
+
+def backdrop_at(table: Array, rows: int, d: Array) -> Array:
+    """As `picture_at` for a picture as it is shown (flat, rows x 4 rows; `embodied.scene.backdrop.share_down`)."""
+    mi, dr = mitsuba(), drjit()
+    x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (4 * rows)
+    up, y = dr.asin(dr.clip(d.z, -1, 1)), mi.Float(0.0)
+    for k in range(len(KNOTS[0]) - 1):
+        (e0, e1), (v0, v1) = (KNOTS[0][k], KNOTS[0][k + 1]), (KNOTS[1][k], KNOTS[1][k + 1])
+        y = dr.select(up <= float(e0), (v0 + (up - e0) * ((v1 - v0) / (e1 - e0))) * rows, y)
+    i = mi.UInt32(dr.clip(y, 0, rows - 1)) * (4 * rows) + mi.UInt32(dr.clip(x, 0, 4 * rows - 1))
+    return dr.gather(mi.Color3f, table, i)

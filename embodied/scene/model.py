@@ -25,8 +25,9 @@ import numpy as np
 
 from assets.records import Finish, MeshPart
 from embodied.house.house import House, Placement
-from embodied.scene import collision
+from embodied.scene import backdrop, collision
 from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.landscapes import scenery_of
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.shell import shell_parts
 
@@ -164,7 +165,7 @@ def build_spec(
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:
         _light(spec)
-        _add_sky(spec)
+        _add_sky(spec, house, getattr(catalogue, "cache", None))
         parts = house_parts(house, catalogue) if parts is None else parts
         _add_parts(spec, parts, bodies)
     else:
@@ -213,7 +214,25 @@ def _light(spec: mujoco.MjSpec) -> None:
         )
 
 
-def _add_sky(spec: mujoco.MjSpec) -> None:
+def _add_sky(spec: mujoco.MjSpec, house: House, cache: Path | None) -> None:
+    """The far landscape on a dome, as lit houses have it; behind it a gradient, for who looks from beyond."""
+    add_texture(spec, "landscape", backdrop.kept_picture(scenery_of(house), house.seed, cache))
+    material = spec.add_material(name="landscape", rgba=[1, 1, 1, 1], specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "landscape"
+    vertices, faces, uv = backdrop.dome(house)
+    below = np.tile(np.array([0, 0, -1], np.float32), (len(vertices), 1))  # one normal, so that all of it is lit alike
+    _add_mesh(spec, "landscape", vertices, below, uv, faces)
+    spec.worldbody.add_geom(
+        name=f"{backdrop.DOME}#0",
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname="landscape",
+        material="landscape",
+        rgba=[1, 1, 1, 1],
+        group=VISUAL,
+        contype=0,
+        conaffinity=0,
+        mass=0,
+    )
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,

@@ -1,0 +1,256 @@
+"""The landscapes that a house may stand in, the seasons, and the neighbours near by: tables, and what is drawn from a
+house's seed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from embodied.house.house import LANDSCAPES, SEASONS, House
+from embodied.scene.buildings import Building
+from embodied.scene.walls import room_union
+from embodied.seeds import stream
+
+GROUND_DROP = 0.15
+"""How far the ground lies below the ground floor, metres."""
+GARDEN = 11.0
+"""From the house to the edge of its plot, metres."""
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """A line of hills, or a wood, all round the horizon."""
+
+    distance: float
+    """Metres."""
+    height: float
+    """Mean height above the ground, metres."""
+    rough: float
+    """By how much the height varies, metres."""
+    cover: str
+    """'wood', 'trees' (their crowns are seen), 'fields' or 'rock'."""
+    grain: int = 9
+    """Hills around the horizon."""
+
+
+@dataclass(frozen=True)
+class Town:
+    """Houses between two distances: scattered, or in streets that thin out with distance."""
+
+    nearest: float
+    farthest: float
+    count: int
+    """Of scattered houses; 0 for streets."""
+    storeys: tuple[int, int]
+    flat: float = 0.0
+    """Share of flat roofs."""
+
+
+@dataclass(frozen=True)
+class Landscape:
+    """What surrounds a house."""
+
+    likely: float
+    """How often it is drawn, against the others."""
+    border: str
+    """Of the plot: 'hedge', 'wall', 'fence', or 'none'."""
+    trees: tuple[int, int]
+    """Leafy trees and firs near the house."""
+    ground: str
+    """Beyond the plot: 'meadow', 'fields', 'town' or 'woodland'."""
+    far: tuple[Ridge | Town, ...]
+    """What is painted, farthest first."""
+    scatter: tuple[int, float, float] = (0, 50.0, 400.0)
+    """Single trees painted: how many, nearest and farthest, metres."""
+    firs: float = 0.15
+    """Share of firs among the trees that are painted."""
+    neighbours: str = ""
+    """Near buildings: '' for none, 'villas' all around, 'cottages' or 'terrace' across a street."""
+    water: tuple[float, float] | None = None
+    """Nearest and farthest shore, metres."""
+    heights: tuple[float, ...] = (GROUND_DROP,)
+    """Of the lowest floor above the ground, metres; one is drawn."""
+
+
+FAR_HILLS = (Ridge(14e3, 420, 260, "wood", 7), Ridge(6e3, 120, 90, "wood", 11))
+TABLE: dict[str, Landscape] = {
+    "suburb": Landscape(
+        0.24, "hedge", (8, 1), "meadow",
+        (*FAR_HILLS, Ridge(1800, 26, 26, "trees", 15), Town(48, 420, 90, (1, 2)), Ridge(210, 8, 6, "trees", 40)),
+        scatter=(110, 34, 190), neighbours="villas",
+    ),
+    "village": Landscape(
+        0.16, "wall", (5, 0), "fields",
+        (*FAR_HILLS, Ridge(2200, 55, 45, "fields", 8), Town(60, 260, 36, (1, 2)), Ridge(500, 7, 9, "trees", 30)),
+        scatter=(60, 40, 300), neighbours="cottages",
+    ),
+    "street": Landscape(
+        0.16, "wall", (4, 0), "town",
+        (Ridge(9e3, 160, 90, "wood", 9), Town(55, 150, 0, (3, 5), 0.25)),
+        scatter=(60, 38, 160), firs=0.02, neighbours="terrace", heights=(GROUND_DROP, 3.4, 6.5),
+    ),
+    "roofs": Landscape(
+        0.14, "none", (0, 0), "town",
+        (Ridge(22e3, 520, 330, "wood", 7), Ridge(11e3, 210, 110, "wood", 9), Town(34, 3000, 0, (2, 5), 0.2)),
+        scatter=(600, 30, 1200), firs=0.04, heights=(24.0, 30.0, 38.0),
+    ),
+    "lake": Landscape(
+        0.1, "hedge", (5, 2), "meadow",
+        (Ridge(11e3, 1250, 800, "rock", 13), Ridge(5500, 420, 330, "wood", 9), Ridge(2300, 110, 110, "wood", 12),
+         Town(1500, 1900, 60, (1, 2)), Ridge(1450, 8, 10, "trees", 60)),
+        scatter=(26, 32, 90), firs=0.3, water=(30.0, 1400.0),
+    ),
+    "fields": Landscape(
+        0.1, "fence", (4, 0), "fields",
+        (Ridge(16e3, 380, 240, "wood", 8), Ridge(7e3, 190, 130, "fields", 7), Ridge(2600, 150, 120, "fields", 6),
+         Ridge(900, 36, 34, "fields", 5), Town(380, 800, 12, (1, 2)), Ridge(330, 3.5, 6.5, "trees", 36)),
+        scatter=(70, 45, 900), firs=0.05,
+    ),
+    "forest": Landscape(
+        0.1, "none", (7, 7), "woodland",
+        (Ridge(9e3, 400, 200, "wood", 8), Ridge(900, 60, 30, "trees", 10), Ridge(130, 19, 5, "trees", 60),
+         Ridge(95, 17, 6, "trees", 60)),
+        scatter=(380, 32, 95), firs=0.55,
+    ),
+}  # fmt: skip
+"""By the names in `embodied.house.house.LANDSCAPES`."""
+
+LIKELY_SEASONS = (0.3, 0.35, 0.2, 0.15)
+"""Of spring, summer, autumn and winter."""
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """Where a house stands."""
+
+    landscape: str
+    season: str
+    height: float
+    """Of the lowest floor above the ground, metres."""
+    outlook: float
+    """World direction of the street or the lake: what the house looks at, radians."""
+
+    @property
+    def table(self) -> Landscape:
+        """What its landscape is made of."""
+        return TABLE[self.landscape]
+
+    @property
+    def snow(self) -> bool:
+        """Whether snow lies."""
+        return self.season == "winter"
+
+
+def scenery_of(house: House) -> Scenery:
+    """What the house's sky names, the rest drawn from its seed; the same in every process.
+
+    High floors are drawn only for houses that could be flats: of one storey, without a garage.
+    """
+    rng = stream(house.seed, "outdoors", "landscape")
+    flat = len(house.storeys) == 1 and not any(o.kind == "garage_door" for o in house.openings)
+    chances = np.array([TABLE[n].likely * (flat or n != "roofs") for n in LANDSCAPES])
+    drawn = LANDSCAPES[int(rng.choice(len(LANDSCAPES), p=chances / chances.sum()))]
+    season = SEASONS[int(rng.choice(len(SEASONS), p=LIKELY_SEASONS))]
+    name, up = house.sky.landscape or drawn, rng.random()
+    heights = TABLE[name].heights
+    height = heights[int(up * len(heights))] if flat else heights[0]
+    return Scenery(name, house.sky.season or season, height, _outlook(house))
+
+
+def _outlook(house: House) -> float:
+    """Outward direction with the most glass, to a quarter turn."""
+    area = np.zeros(4)
+    union = room_union(house, 0)
+    for o in house.openings:
+        if o.rooms[1] is not None or o.kind not in ("window", "french_window"):
+            continue
+        (x0, y0), (x1, y1) = o.a, o.b
+        n = np.array([y1 - y0, x0 - x1])
+        n /= max(float(np.hypot(*n)), 1e-9)
+        if union.contains(shapely.Point((x0 + x1) / 2 + 0.4 * n[0], (y0 + y1) / 2 + 0.4 * n[1])):
+            n = -n
+        area[round(math.atan2(n[1], n[0]) / (math.pi / 2)) % 4] += math.dist(o.a, o.b) * (o.head - o.sill)
+    return float(area.argmax() * math.pi / 2)
+
+
+def plot(house: House) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 of the garden, metres, world."""
+    grown = house.outer_wall - house.inner_wall / 2 + GARDEN
+    x0, y0, x1, y1 = room_union(house, 0).bounds
+    return x0 - grown, y0 - grown, x1 + grown, y1 + grown
+
+
+def side_frame(
+    bounds: tuple[float, float, float, float], yaw: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Of the plot's side towards `yaw` (a quarter turn): its middle, the way along it, the way out, half its length."""
+    x0, y0, x1, y1 = bounds
+    out = np.round([math.cos(yaw), math.sin(yaw)])
+    half = np.array([x1 - x0, y1 - y0]) / 2
+    along = np.array([-out[1], out[0]])
+    return np.array([x0 + x1, y0 + y1]) / 2 + out * half, along, out, float(abs(along @ half))
+
+
+STREET = (1.6, 5.6)
+"""Where the carriageway begins and ends beyond the edge of the plot, metres."""
+NEAREST = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
+"""From the edge of the plot to the face of the nearest building, metres."""
+
+
+def near_buildings(house: House, place: Scenery) -> list[Building]:
+    """The neighbours that stand near enough to be seen from two sides as one walks."""
+    rng = stream(house.seed, "outdoors", "neighbours")
+    kind = place.table.neighbours
+    if not kind:
+        return []
+    out: list[Building] = []
+    for k in range(4):
+        yaw = place.outlook + k * math.pi / 2
+        middle, along, away, half = side_frame(plot(house), yaw)
+        t = -half - 2.0
+        while t < half + 2.0:
+            b, gap = _neighbour(kind, k == 0, rng=rng)
+            reach = NEAREST[kind] + (
+                rng.uniform(0.0, 4.0) if kind == "villas" else rng.uniform(0.0, 0.8) * (kind == "cottages")
+            )
+            if kind != "villas" and k:
+                reach += 3.0 + 7.0 * (kind == "cottages")
+            at = middle + along * (t + b.wide / 2) + away * (reach + b.deep / 2)
+            turn = yaw + math.pi + math.pi / 2 + (rng.normal(0, 0.12) if kind == "villas" else 0.0)
+            if kind == "terrace" or rng.random() < (0.85 if k == 0 else 0.6 if kind == "villas" else 0.4):
+                out.append(
+                    Building(
+                        (float(at[0]), float(at[1])),
+                        float(turn),
+                        b.wide,
+                        b.deep,
+                        b.eaves,
+                        b.ridge,
+                        b.paint,
+                        b.tiles,
+                        b.storey,
+                    )
+                )
+            t += b.wide + gap
+    return out
+
+
+def _neighbour(kind: str, front: bool, *, rng: np.random.Generator) -> tuple[Building, float]:
+    """A building somewhere, and the gap to the next."""
+    paint, tiles = int(rng.integers(100)), int(rng.integers(100))
+    if kind == "terrace":
+        storeys = int(rng.integers(3, 5)) if front else int(rng.integers(2, 4))
+        size, ridge, storey, gap = (rng.uniform(9.0, 14.0), 10.0), rng.uniform(2.2, 3.2), rng.uniform(3.0, 3.4), 0.0
+    elif kind == "cottages":
+        storeys = 1 if rng.random() < 0.35 else 2
+        size, ridge, storey, gap = (rng.uniform(8.0, 11.5), 7.0), rng.uniform(2.8, 3.6), 2.6, rng.uniform(1.5, 6.0)
+    else:
+        storeys = 1 if rng.random() < 0.3 else 2
+        size, ridge, storey, gap = (rng.uniform(9.5, 13.0), 8.5), rng.uniform(2.4, 4.0), 2.75, rng.uniform(7.0, 12.0)
+    eaves = storeys * storey + 0.25
+    return Building(
+        (0, 0), 0.0, float(size[0]), size[1], float(eaves), float(ridge), paint, tiles, float(storey)
+    ), float(gap)

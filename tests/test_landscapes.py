@@ -1,0 +1,152 @@
+"""What is seen through windows: landscapes, seasons, neighbours, haze, lit windows."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+import shapely
+
+from assets.catalogue import load_catalogue
+from embodied.generate import HouseConfig
+from embodied.house.house import LANDSCAPES, SEASONS, House, HouseError, Sky
+from embodied.light.sky import paint
+from embodied.scene import backdrop
+from embodied.scene.landscapes import TABLE, Scenery, near_buildings, scenery_of
+from embodied.scene.model import build_spec, compile_scene, owner_of_name
+from embodied.scene.outdoors import PIECES, footprint, outdoor_parts
+
+
+def at(house: House, landscape: str | None, season: str | None = None, seed: int = 0) -> House:
+    return dataclasses.replace(house, seed=seed, sky=Sky(landscape=landscape, season=season))
+
+
+def test_the_same_seed_gives_the_same_landscape_in_another_process(two_room_house):
+    code = (
+        "import dataclasses, hashlib, conftest\n"
+        "from embodied.scene.landscapes import near_buildings, scenery_of\n"
+        "from embodied.scene.backdrop import plain_picture\n"
+        "h = [dataclasses.replace(conftest.two_rooms(), seed=s) for s in range(12)]\n"
+        "print([scenery_of(x) for x in h], near_buildings(h[0], scenery_of(h[0])))\n"
+        "print(hashlib.sha256(plain_picture(scenery_of(h[3]), 3, 64).tobytes()).hexdigest())\n"
+    )
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="tests", env=_env(hash_seed)
+        ).stdout
+        for hash_seed in ("1", "2")
+    ]
+    assert runs[0] == runs[1] and "Scenery(" in runs[0]
+
+
+def _env(hash_seed: str) -> dict[str, str]:
+    import os
+
+    return os.environ | {
+        "PYTHONHASHSEED": hash_seed,
+        "PYTHONPATH": os.pathsep.join([os.getcwd(), os.getcwd() + "/tests"]),
+    }
+
+
+def test_every_landscape_and_season_is_drawn_and_what_the_sky_names_is_kept(two_room_house):
+    drawn = [scenery_of(dataclasses.replace(two_room_house, seed=s)) for s in range(300)]
+    assert {p.landscape for p in drawn} == set(LANDSCAPES) == set(TABLE) and {p.season for p in drawn} == set(SEASONS)
+    assert all(scenery_of(at(two_room_house, "lake", "winter", s)).landscape == "lake" for s in range(5))
+    seasons = [scenery_of(at(two_room_house, "lake", None, s)).season for s in range(40)]
+    assert seasons == [p.season for p in drawn[:40]], "a landscape that is given draws no other season"
+
+
+def test_a_house_with_a_garage_stands_on_the_ground(two_room_house):
+    door = dataclasses.replace(two_room_house.openings[1], kind="garage_door")
+    house = dataclasses.replace(two_room_house, openings=(two_room_house.openings[0], door))
+    assert all(scenery_of(dataclasses.replace(house, seed=s)).height < 1 for s in range(100))
+
+
+def test_an_unknown_landscape_or_season_is_refused_by_name(two_room_house):
+    with pytest.raises(HouseError, match=r"landscape should be one of .*'lake'.*got 'moon'"):
+        HouseConfig(landscape="moon")
+    with pytest.raises(HouseError, match=r"season should be one of .*got 'monsoon'"):
+        HouseConfig(season="monsoon")
+    body = json.loads(two_room_house.to_json())
+    assert "landscape" not in body["sky"], "older versions read it, and its digest is what it was"
+    body["sky"]["landscape"] = "moon"
+    with pytest.raises(HouseError, match="landscape"):
+        House.from_json(json.dumps(body))
+    body["sky"]["landscape"] = "lake"
+    assert House.from_json(json.dumps(body)).sky.landscape == "lake"
+
+
+@pytest.mark.parametrize("landscape", LANDSCAPES)
+def test_each_landscape_compiles_and_stands_outside_the_house(two_room_house, landscape):
+    catalogue = load_catalogue()
+    season = SEASONS[LANDSCAPES.index(landscape) % 4]
+    house = at(two_room_house, landscape, season, seed=2)
+    inner = footprint(house, 0)
+    for p in outdoor_parts(house, catalogue.finish):
+        assert p.owner.removeprefix("outdoor/") in PIECES
+        c, s = np.cos(p.yaw), np.sin(p.yaw)
+        xy = p.mesh.vertices[:, :2] @ np.array([[c, s], [-s, c]]) + p.position[:2]
+        assert np.abs(xy).max() < 0.8 * backdrop.RADIUS
+        if p.owner in ("outdoor/trees", "outdoor/neighbours", "outdoor/windows", "outdoor/street", "outdoor/border"):
+            assert not shapely.contains_xy(inner.buffer(1.0), xy).any(), p.mesh_key
+    model = build_spec(house, catalogue, collisions=False).compile()
+    assert np.isfinite(model.geom_aabb).all()
+
+
+def test_the_dome_has_no_id_and_a_ray_out_of_the_window_ends_on_it(two_room_house):
+    scene = compile_scene(at(two_room_house, "lake"), load_catalogue(), collisions=False)
+    dome = [g for g in range(scene.model.ngeom) if owner_of_name(scene.model.geom(g).name) == backdrop.DOME]
+    assert len(dome) == 1 and scene.owner_of_geom[dome[0]] == 0 and scene.room_of_geom[dome[0]] == ""
+    data, hit = mujoco.MjData(scene.model), np.zeros(1, np.int32)
+    mujoco.mj_forward(scene.model, data)
+    away = mujoco.mj_ray(scene.model, data, np.array([2.5, -30.0, 2.0]), np.array([0.0, -1.0, 0.0]), None, 1, -1, hit)
+    assert hit[0] == dome[0] and 0.9 * backdrop.RADIUS - 32 < away < backdrop.RADIUS
+
+
+def test_neighbours_do_not_overlap_the_plot_and_only_three_landscapes_have_them(two_room_house):
+    for name in LANDSCAPES:
+        house = at(two_room_house, name, seed=4)
+        near = near_buildings(house, scenery_of(house))
+        assert bool(near) == (name in ("suburb", "village", "street"))
+        assert all(footprint(house, 0).distance(shapely.Point(b.at)) > 15 for b in near)
+
+
+def test_what_is_left_of_contrast_falls_with_distance_to_a_fiftieth_at_the_visibility():
+    left = backdrop.clearness(np.array([0.0, 10.0, 400.0, 3e3, 12e3]), 12e3)
+    assert np.allclose(left[0], 1) and left[-1, 1] == pytest.approx(0.02, rel=0.01)
+    assert all((a > b).all() for a, b in itertools.pairwise(left)) and (left[-1, 2] < left[-1, 0]), "hills turn blue"
+
+
+def test_farther_hills_are_nearer_to_the_colour_of_the_sky(two_room_house):
+    place = Scenery("fields", "summer", 0.15, 0.0)
+    grey = np.full((128, 512, 3), 0.9, np.float32)
+    light = backdrop.FarLight(grey[0], np.full(3, 0.3), np.zeros(3), np.array([0, 0, 1.0]), 12e3, 0.0)
+    apart = []
+    for distance in (500.0, 2000.0, 8000.0, 30000.0):
+        canvas = backdrop.Canvas(grey.copy(), 1.75)
+        ridge = backdrop.Ridge(distance, 0.06 * distance, 0.0, "wood")
+        for _, draw in backdrop._ridge(canvas, ridge, place, light, rng=np.random.default_rng(0)):
+            draw()
+        row = int(canvas.rows(np.array(0.03)))
+        apart.append(float(np.abs(canvas.picture[row] - 0.9).mean()))
+    assert all(a > 1.2 * b for a, b in itertools.pairwise(apart)), apart
+
+
+@pytest.mark.parametrize("landscape", ["street", "roofs"])
+def test_windows_are_lit_at_night_and_not_by_day(landscape):
+    place = Scenery(landscape, "summer", TABLE[landscape].heights[-1], 0.0)
+    night, noon = paint(Sky(23.0), 1, place, 256), paint(Sky(12.0), 1, place, 256)
+    assert night.lamps == 1 and noon.lamps == 0
+    warm = lambda o: (o.fine[..., 0] > 1.5 * o.fine[..., 2]) & (o.fine[..., 0] > 20 * np.median(o.fine[..., 0]))
+    assert warm(night).sum() > 100 and warm(noon).sum() == 0
+
+
+def test_rows_of_the_picture_and_elevations_agree():
+    rows = backdrop.elevations(1024)
+    assert np.allclose(backdrop.share_down(rows) * 1024 - 0.5, np.arange(1024)) and (np.diff(rows) < 0).all()
