@@ -70,6 +70,8 @@ def main() -> None:
     for _ in range(args.epochs):
         for batch in loader:
             colours, distance = colours_and_distance(batch)
+            if torch.rand(()) < 0.5:
+                colours = colours.flip(-1)  # what is mirrored is as far away
             loss = torch.nn.functional.mse_loss(network(colours), distance)
             optimiser.zero_grad()
             loss.backward()
