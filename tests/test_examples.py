@@ -73,7 +73,7 @@ def test_own_furniture_stands_in_a_house_and_is_seen(tmp_path):
 def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
     said = run("dataset_to_torch.py", tmp_path, "--data", str(flats))
     off, same = map(float, re.search(r"unseen house: (\d+) % off, (\d+) %", said).groups())
-    assert off < same - 2, "51 and 54: both houses it learns from stand high above a town, the unseen one in a village"
+    assert off < same - 5
 
 
 @pytest.mark.gl
