@@ -10,6 +10,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied.bench import look
+from embodied.bench.crops import crops_of
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 
@@ -22,7 +23,7 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     monkeypatch.setattr(look, "HOUSES", 1)
     monkeypatch.setattr(look, "generate_house", lambda *_, **__: house)
     with open_world(house, HandCatalogue(), tmp_path / "cache", size=64) as world:
-        crops = look.crops_of(world)
+        crops = crops_of(world, look.MAPPED)
     assert {c.object_class for c in crops} == {"red box", "flag"} and all(c.rgb.shape == (224, 224, 3) for c in crops)
     box = next(c.rgb.astype(int) for c in crops if c.object_class == "red box")
     assert (box[60:160, 60:160, 0] > 2 * box[60:160, 60:160, 1]).mean() > 0.8, "it fills the middle"

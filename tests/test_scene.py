@@ -17,6 +17,7 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
 from embodied.scene import collision
 from embodied.scene import model as scene
+from embodied.scene.backdrop import DOME
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 
@@ -33,12 +34,12 @@ def compiled(house):
 
 def test_every_geom_is_traceable_to_its_owner(house, compiled):
     names = owners(house)
-    assert compiled.owner_of_geom.min() > 0, "no geom without owner"
-    for g in range(compiled.model.ngeom):
-        assert compiled.model.geom(g).name.startswith(names[compiled.owner_of_geom[g] - 1] + "#")
-    drawn = {
-        names[i - 1] for i, k in zip(compiled.owner_of_geom, compiled.kind_of_geom, strict=True) if k != "collision"
-    }
+    named = [compiled.model.geom(g).name for g in range(compiled.model.ngeom)]
+    far = [g for g, owner in enumerate(compiled.owner_of_geom) if not owner]
+    assert [named[g] for g in far] == [f"{DOME}#0"], "no geom without owner but the landscape"
+    whose = {g: names[owner - 1] for g, owner in enumerate(compiled.owner_of_geom) if owner}
+    assert all(named[g].startswith(owner + "#") for g, owner in whose.items())
+    drawn = {owner for g, owner in whose.items() if compiled.kind_of_geom[g] != "collision"}
     assert drawn == {p.owner for p in house_parts(house, HandCatalogue())}
 
 

@@ -14,8 +14,9 @@ from assets.built import MAKERS
 from assets.materials import MATERIALS
 from assets.records import Finish
 from embodied.house.house import House, Opening, Room, Stair, Storey
+from embodied.house.shapes import room_union
 from embodied.scene.house_meshes import house_parts, owners
-from embodied.scene.walls import floor_turn, inset, room_union, wall_face
+from embodied.scene.walls import floor_turn, inset, wall_face
 
 KEYS = {
     "floor_finish": "oak_planks/0",

@@ -35,3 +35,9 @@ def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
         if level and shapely.Polygon(room.polygon).intersects(shapely.Point(position[:2])):
             return room.id
     return None
+
+
+def room_union(house: House, storey: int) -> shapely.Geometry:
+    """The rooms of one storey as one polygon along wall centre lines."""
+    pieces = [shapely.Polygon(r.polygon).buffer(1e-6, join_style="mitre") for r in house.rooms if r.storey == storey]
+    return shapely.unary_union(pieces).simplify(1e-5)

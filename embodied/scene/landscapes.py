@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from embodied.house.house import LANDSCAPES, SEASONS, House
+from embodied.house.shapes import room_union
 from embodied.scene.buildings import Building
-from embodied.scene.walls import room_union
 from embodied.seeds import stream
 
 GROUND_DROP = 0.15

@@ -26,6 +26,7 @@ from assets.built.primitives import (
 )
 from assets.records import Finish
 from embodied.house.house import House
+from embodied.house.shapes import room_union
 from embodied.scene.buildings import DOOR, LIT, PANE, ROOF, TRIM, WALL, Faces, faces_of
 from embodied.scene.landscapes import (
     GROUND_DROP,
@@ -38,7 +39,7 @@ from embodied.scene.landscapes import (
     side_frame,
 )
 from embodied.scene.part import Part
-from embodied.scene.walls import hole_on, room_union, wall_face
+from embodied.scene.walls import hole_on, wall_face
 from embodied.seeds import stream
 
 Bounds = tuple[float, float, float, float]

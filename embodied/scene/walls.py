@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import shapely
 
 from assets.built.primitives import Shape
 from embodied.house.house import House, Opening
@@ -99,9 +98,3 @@ def turned_uv(shape: Shape, turn: bool) -> Shape:
     if not turn:
         return shape
     return Shape(shape.vertices, shape.faces, shape.normals, np.stack([shape.uv[:, 1], -shape.uv[:, 0]], axis=1))
-
-
-def room_union(house: House, storey: int) -> shapely.Geometry:
-    """The rooms of one storey as one polygon along wall centre lines."""
-    pieces = [shapely.Polygon(r.polygon).buffer(1e-6, join_style="mitre") for r in house.rooms if r.storey == storey]
-    return shapely.unary_union(pieces).simplify(1e-5)
