@@ -20,7 +20,6 @@ from embodied.world import open_world
 def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monkeypatch):
     house = furnished(two_rooms())
     monkeypatch.setattr(look, "MAPPED", {"red box": (478,), "flag": (557,)})
-    monkeypatch.setattr(look, "HOUSES", 1)
     monkeypatch.setattr(look, "generate_house", lambda *_, **__: house)
     with open_world(house, HandCatalogue(), tmp_path / "cache", size=64) as world:
         crops = crops_of(world, look.MAPPED)
@@ -32,7 +31,8 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
         return np.tile([1, 478, 2, 3, 4], (len(pictures), 1))
 
     pictures = PictureSettings(64)
-    report = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", judge, seed=0, pictures=pictures)
+    told = {"seed": 0, "pictures": pictures, "houses": 1}
+    report = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", judge, **told)
     boxes = sum(c.object_class == "red box" for c in crops)
     assert report.facts["by_class"]["red box"] == {"shown": boxes, "recognised": boxes}
     assert report.facts["by_class"]["flag"]["recognised"] == 0 and report.facts["worst"][0] == "flag"
