@@ -29,7 +29,7 @@ def attribution(catalogue: Catalogue) -> str:
     ]
     by_pack: dict[str, list[Asset]] = {}
     for asset in catalogue.assets.values():
-        if not asset.key.startswith("built/") and "+" not in asset.key:
+        if not catalogue.parameters(asset.key) and "+" not in asset.key:
             by_pack.setdefault(asset.pack, []).append(asset)
     for name in sorted(by_pack):
         pack, assets = packs.get(name, {}), by_pack[name]

@@ -48,6 +48,11 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 """The row-major 3x3 rotation that turns nothing."""
 
 
+DETAILS = ("weave", "nap", "pores", "pebbles", "plaster", "stipple")
+"""What matters show from nearby, by number: cloth its threads; carpets, towels and velvet; wood, along u; leather;
+plaster and stone; rolled paint."""
+
+
 @dataclass(frozen=True)
 class Finish:
     """How one part of a mesh looks. Colours are sRGB in [0, 1]; maps are PNG paths."""
@@ -67,6 +72,8 @@ class Finish:
     tile: float | None = None
     """Side in metres of the square that the maps of a tileable material cover; whoever builds a
     mesh with such a finish divides metres by it to get uv. None for maps of imported models."""
+    detail: str | None = None
+    """What it shows from nearby, one of DETAILS; None for what is smooth."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,10 @@ def _is_weights(value: object) -> bool:
     return isinstance(value, dict) and set(value) <= set(ROOM_KINDS) and all(is_number(v, 0.0) for v in value.values())
 
 
+def _is_look(value: object) -> bool:
+    return isinstance(value, dict) and all(is_text(v) or is_number(v) for v in value.values())
+
+
 def _is_looks(value: object) -> bool:
     return isinstance(value, dict) and all(is_text(k) and is_text(v) for k, v in value.items())
 
@@ -69,6 +73,7 @@ SIZE = Field(
     f"a size of three lengths in metres, each from {SIZES[0]:g} to {SIZES[1]:g}",
     lambda v: is_list(v, lambda s: is_number(s, *SIZES), 3),
 )
+LOOK = Field("an object of words and numbers", _is_look)
 WEIGHTS = Field(f"room kinds with weights from 0 up; the room kinds are {', '.join(ROOM_KINDS)}", _is_weights)
 SUPPORT = Field(f"one of {', '.join(SUPPORTS)}", lambda v: v in SUPPORTS)
 FIELDS = {
@@ -102,7 +107,11 @@ FIELDS = {
     "faces": Field("a whole number from 0 up", lambda v: is_number(v, 0) and v == int(v)),
     "of": WORD,
 }
-"""What a line of catalogue.json may hold; from `yaw` on it tells the importer."""
+"""What a line of a catalogue may hold; from `yaw` on it tells the importer."""
+REMADE_FIELDS = {"build": WORD, "look": LOOK}
+"""What a line of data/catalogue.json holds besides, where code builds what the pack's model is too poor for."""
+REMADE_LICENCE = "Apache-2.0"
+"""Of meshes that code builds."""
 CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
 
 
@@ -174,7 +183,7 @@ def objects(where: str, name: str, value: object) -> Mapping[str, Row]:
 def read_models(
     where: str, rows: Mapping[str, Row], classes: Mapping[str, Row], licences: Mapping[str, str]
 ) -> tuple[dict[str, Asset], dict[str, ImportRecipe]]:
-    """The assets of catalogue rows by key over the classes they name, and how to import each.
+    """The assets of catalogue rows by key over the classes they name, and how to import each that is not built.
 
     Args:
       where: name of the file, for error messages.
@@ -183,16 +192,17 @@ def read_models(
     assets, recipes = {}, {}
     for key, given in rows.items():
         model = f"{where}: model {key!r}"
-        row = check_row(model, given, FIELDS)
+        row = check_row(model, given, FIELDS | REMADE_FIELDS)
         if "of" in row:
-            row = _variant(model, row, rows)
+            row = variant(model, row, rows)
         if row.get("class") not in classes:
             raise CatalogueError(f"{model} has the unknown class {row.get('class')!r}; use one of data/classes.json")
         shared = classes[row["class"]]
         tags = list(dict.fromkeys((*shared.get("tags", ()), *row.get("tags", ()))))
-        pack = key.split("/")[0]
-        assets[key] = asset_of(model, key, {"licence": licences.get(pack, "")} | shared | row | {"tags": tags})
-        recipes[key] = _recipe(assets[key], row)
+        licence = REMADE_LICENCE if "build" in row else licences.get(key.split("/")[0], "")
+        assets[key] = asset_of(model, key, {"licence": licence} | shared | row | {"tags": tags})
+        if "build" not in row:
+            recipes[key] = _recipe(assets[key], row)
     return assets, recipes
 
 
@@ -235,15 +245,15 @@ def merged(*rows: Mapping[str, Any], deep: Collection[str] = ()) -> Row:
     return out
 
 
-def _variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
+def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
     """`row` filled up from the model it is a variant of; surfaces and lamp follow its size."""
     base = rows.get(row["of"])
     if base is None or "of" in base:
         raise CatalogueError(f"{where} should be a variant `of` a model in the same file, got {row['of']!r}")
-    check_row(where, base, FIELDS)
+    check_row(where, base, FIELDS | REMADE_FIELDS)
     if "size" not in base:
         raise CatalogueError(f"{where} is a variant of {row['of']!r}, which should have {SIZE.what}, got none")
-    out = merged(base, row, deep=("looks",))
+    out = merged(base, row, deep=("look", "looks"))
     x, y, z = (n / o for n, o in zip(out["size"], base["size"]))
     out["surfaces"] = row.get("surfaces") or [
         [s[0], *(round(v * f, 4) for v, f in zip(s[1:6], (z, x, y, x, y))), s[6] if s[6] >= 9 else round(s[6] * z, 4)]

@@ -30,11 +30,11 @@ from assets.built.primitives import (
     tube,
     turned,
 )
-from assets.built.table import BUILDS, read_makers
+from assets.built.table import BUILDS, read_makers, remade
 from assets.materials import MATERIALS
 from assets.materials.registry import read_materials
 from assets.records import ROOM_KINDS, SUPPORTS, Finish
-from assets.rows import CatalogueError
+from assets.rows import CatalogueError, read_models
 
 
 @functools.cache
@@ -172,7 +172,7 @@ def test_assets_are_what_the_catalogue_expects():
     assert {"rug", "curtain", "picture", "mirror", "base cabinet", "kitchen sink", "towel", "cushion"} <= classes
     for key, m in MAKERS.items():
         a = m.asset
-        assert a.key == key == f"built/{key.removeprefix('built/')}"
+        assert a.key == key and a.pack == key.split("/")[0]
         assert a.support in SUPPORTS and set(a.rooms) <= set(ROOM_KINDS) and min(a.size) > 0
         assert (a.support != "surface") or a.on, f"{key} lies on nothing"
         for s in a.surfaces:
@@ -247,6 +247,31 @@ def test_a_new_row_is_a_new_thing():
     assert (a.asset.name, a.asset.colours, a.asset.licence) == ("blue vase", ("blue",), "Apache-2.0")
     assert a.look == {"seed": 0.0, "glaze": "blue"} and b.look == {"seed": 0.0} and b.asset.name == "plain vase"
     assert len(a.make(a.asset.size, (), finish)) == len(MAKERS["built/vase_blue"].make(a.asset.size, (), finish))
+
+
+def test_what_stands_for_a_poor_model_keeps_its_key_words_and_variants():
+    row = {
+        "class": "vase",
+        "name": "tall vase",
+        "size": [0.1, 0.1, 0.3],
+        "build": "decor.vase",
+        "look": {"glaze": "blue"},
+    }
+    rows = {
+        "pack/a": row,
+        "pack/a+red": {"of": "pack/a", "class": "vase", "look": {"seed": 2}},
+        "pack/b": {"class": "vase"},
+    }
+    rows["pack/b"]["size"] = [1, 1, 1]
+    classes = {"vase": {"support": "surface", "on": ["desk"]}}
+    assets, recipes = read_models("table", rows, classes, {"pack": "CC0-1.0"})
+    makers = remade("table", rows, assets)
+    assert set(recipes) == {"pack/b"} and set(makers) == {"pack/a", "pack/a+red"}
+    assert makers["pack/a"].asset.name == "tall vase" and makers["pack/a"].asset.on == ("desk",)
+    assert makers["pack/a+red"].look == {"seed": 2, "glaze": "blue"}
+    assert (assets["pack/a"].licence, assets["pack/b"].licence) == ("Apache-2.0", "CC0-1.0")
+    with pytest.raises(CatalogueError, match="decor.vase"):
+        remade("table", {"pack/a": row | {"build": "decor.vases"}}, assets)
 
 
 def test_a_thing_after_a_material_takes_its_words():

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from assets.built.maker import FinishOf, Look, Size, material, metal, parts_of, plain
-from assets.built.primitives import Shape, ball, bar, box, extruded, joined, lathe, moved, scaled, sheet, tube, turned
+from assets.built.primitives import Shape, bar, box, extruded, joined, lathe, moved, scaled, sheet, tube, turned
 from assets.records import MeshPart
 
 
@@ -102,24 +102,38 @@ def coat_hooks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
 
 
 def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
-    """A coat on a hook: a closed tube of cloth, narrow at the collar, wide and folded at the hem, and sleeves."""
-    rows, cols = 12, 30
+    """A coat on a hook: a tube of cloth with sloping shoulders, folded towards the hem, its front lapped over, with
+    sleeves, cuffs, flaps of pockets and a turned-down collar."""
+    rows, cols = 11, 28
     t = np.linspace(0, 1, rows + 1)[:, None]
     a = np.linspace(0, 2 * np.pi, cols + 1)[None]
-    half = w / 2 * np.interp(t, [0, 0.6, 0.82, 0.93, 1.0], [1.0, 0.86, 0.80, 0.42, 0.12])
-    deep = d / 2 * np.interp(t, [0, 0.6, 0.9, 1.0], [0.8, 0.9, 0.7, 0.2])
-    fold = 1 + 0.13 * (1 - t) * np.sin(7 * a + rng.uniform(0, 6) + 1.5 * t) + 0.05 * np.sin(3 * a + 4 * t)
-    x, y, z = half * np.cos(a) * fold, deep * np.sin(a) * fold, h * t + 0 * a - 0.012 * (1 - t) * np.sin(7 * a)
-    body = sheet(np.stack([x, y, z], -1))
-    sleeves = []
+    turn = rng.uniform(0, 6)
+
+    def at(t: np.ndarray, a: np.ndarray, out: float = 0.0) -> np.ndarray:
+        """Points on the body, `out` metres before it: t from hem to neck, a around it, -pi / 2 in front."""
+        half = w / 2 * np.interp(t, [0, 0.45, 0.8, 0.87, 0.94, 1.0], [0.92, 0.78, 0.80, 0.72, 0.36, 0.16]) + out
+        deep = d / 2 * np.interp(t, [0, 0.5, 0.85, 0.93, 1.0], [0.85, 0.75, 0.7, 0.45, 0.26]) + out
+        fold = 1 + 0.10 * (1 - t) ** 1.3 * np.sin(7 * a + turn + 1.5 * t) + 0.04 * (1 - t) * np.sin(3 * a + 4 * t)
+        x, y = half * np.cos(a) * fold, deep * np.sin(a) * fold
+        return np.stack(np.broadcast_arrays(x, y, h * t - 0.01 * (1 - t) * np.sin(7 * a + turn)), -1)
+
+    shapes = [sheet(at(t, a))]
+    lap = np.linspace(-0.12, 0.16, 4)[None] - np.pi / 2
+    shapes.append(sheet(at(np.linspace(0.01, 0.93, 12)[:, None], lap, 0.006), 0.004))
     for s in (-1, 1):
+        flap = np.linspace(-0.24, 0.24, 5)[None] + s * 0.62 - np.pi / 2
+        shapes.append(sheet(at(np.linspace(0.36, 0.41, 3)[:, None], flap, 0.007), 0.005))
         q = np.linspace(0, 1, 8)
-        path = np.stack(
-            [s * (w * 0.34 + 0.10 * w * np.sin(np.pi * q * 0.7)), -d * 0.20 - 0.10 * d * q, h * (0.88 - 0.52 * q)], 1
-        )
-        sleeves.append(tube(path, np.interp(q, [0, 0.15, 1], [0.02, 0.047, 0.04]) * w / 0.36, 10))
-    collar = moved(scaled(ball(0.045, 12, 8), 1.3, 0.8, 0.7), 0, 0, h - 0.035)
-    return joined(body, *sleeves, collar)
+        reach = np.interp(q, [0, 0.12, 0.3, 1], [0.24, 0.36, 0.41, 0.44 + rng.uniform(-0.02, 0.02)])
+        bend = rng.uniform(0.02, 0.10) * d * np.sin(np.pi * q) + 0.05 * d * q
+        path = np.stack([s * w * reach, -bend, h * np.interp(q, [0, 0.12, 1], [0.88, 0.83, 0.30])], 1)
+        wide = w * np.interp(q, [0, 0.15, 0.6, 1], [0.07, 0.125, 0.105, 0.095])
+        shapes.append(tube(path, wide * (1 + 0.05 * np.sin(9 * q + turn)), 8))
+        shapes.append(tube(path[-2:], 1.08 * wide[-2:], 8))
+    around = np.linspace(0, 2 * np.pi, 14, endpoint=False)
+    neck = 0.10 * w * np.cos(around), 0.22 * d * np.sin(around) - 0.01, h * (0.955 + 0.02 * np.sin(around))
+    shapes.append(tube(np.stack(neck, 1), 0.05 * w, 6, closed=True))
+    return joined(*shapes)
 
 
 def coat(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

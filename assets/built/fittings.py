@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import BLACK, WHITE, FinishOf, Look, Size, material, parts_of, plain
-from assets.built.primitives import box, cylinder, lathe, moved, tube, turned
+from assets.built.maker import BLACK, CHROME, WHITE, FinishOf, Look, Size, material, parts_of, plain
+from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube, turned
 from assets.records import MeshPart
 
 
@@ -47,21 +47,28 @@ def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
             for z in (0.03, h - 0.03):
                 made.append(box([x - 0.02, -d / 2, z - 0.03], [x + 0.02, d / 2, z + 0.03], 0.010))
     else:
-        made.append(box([-w / 2, -d / 2 + 0.012, 0], [w / 2, d / 2 - 0.02, h], 0.006))
-        ribs = max(6, round(w / 0.05))
-        for x in np.linspace(-w / 2 + 0.03, w / 2 - 0.03, ribs):
-            made.append(box([x - 0.014, -d / 2, 0.03], [x + 0.014, -d / 2 + 0.015, h - 0.03], 0.005))
-        made += [box([-w / 2 + 0.1, d / 2 - 0.02, z], [-w / 2 + 0.13, d / 2, z + 0.05]) for z in (0.1, h - 0.15)]
-        made += [box([w / 2 - 0.13, d / 2 - 0.02, z], [w / 2 - 0.1, d / 2, z + 0.05]) for z in (0.1, h - 0.15)]
+        right = w / 2 - 0.07  # the valve stands beside the panel
+        made.append(box([-w / 2, -d / 2 + 0.016, 0], [right, d / 2 - 0.02, h], 0.006))
+        for x in np.linspace(-w / 2 + 0.03, right - 0.03, max(6, round(w / 0.055))):
+            made.append(_rib(x, -d / 2, 0.035, h - 0.035))
+        made += [
+            box([x - 0.015, d / 2 - 0.02, z], [x + 0.015, d / 2, z + 0.05])
+            for x in (-w / 2 + 0.115, right - 0.115)
+            for z in (0.1, h - 0.15)
+        ]
     grille = (
         []
         if look.get("kind") == "columns"
         else [
             box([x - 0.004, -d / 2 + 0.02, h - 0.001], [x + 0.004, d / 2 - 0.028, h + 0.0015])
-            for x in np.linspace(-w / 2 + 0.02, w / 2 - 0.02, max(8, round(w / 0.022)))
+            for x in np.linspace(-w / 2 + 0.02, w / 2 - 0.09, max(8, round(w / 0.022)))
         ]
     )
-    knob = moved(turned(cylinder(0.018, 0, 0.06, 0.004, 14), np.pi / 2, "y"), w / 2 - 0.05, -d / 2 + 0.03, 0.05)
+    pipe: list[Shape] = []
+    if look.get("kind") == "columns":
+        knob = [moved(turned(cylinder(0.018, 0, 0.06, 0.004, 14), np.pi / 2, "y"), w / 2 - 0.05, -d / 2 + 0.03, 0.05)]
+    else:
+        knob, pipe = _valve(w / 2 - 0.03, w / 2 - 0.07, d, h)
     return parts_of(
         (
             finish("lacquer_white/0")
@@ -69,6 +76,44 @@ def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
             else material(look, "skin", finish, "lacquer_white/0"),
             made,
         ),
+        (CHROME, pipe),
         (plain((0.35, 0.35, 0.35), 0.6), grille),
         (WHITE, knob),
     )
+
+
+def _rib(x: float, y: float, z0: float, z1: float) -> Shape:
+    """A pressed rib of a panel radiator, its face at y and its sides sloping back 16 mm, so that light models it."""
+    a, b, deep = 0.010, 0.022, 0.0165
+    front, back = [(x - a, y), (x + a, y)], [(x - b, y + deep), (x + b, y + deep)]
+    (p, q), (r, s) = front, back
+    lift = 0.02
+    return quads(
+        [
+            [(*p, z0 + lift), (*q, z0 + lift), (*q, z1 - lift), (*p, z1 - lift)],
+            [(*r, z0), (*p, z0 + lift), (*p, z1 - lift), (*r, z1)],
+            [(*q, z0 + lift), (*s, z0), (*s, z1), (*q, z1 - lift)],
+            [(*p, z1 - lift), (*q, z1 - lift), (*s, z1), (*r, z1)],
+            [(*r, z0), (*s, z0), (*q, z0 + lift), (*p, z0 + lift)],
+        ]
+    )
+
+
+def _valve(x: float, panel: float, d: float, h: float) -> tuple[list[Shape], list[Shape]]:
+    """A thermostat's head above the valve at x beside the panel's edge, and the pipes to panel, wall and vent."""
+    y = -d / 2 + 0.035
+    head = lathe([(0, 0.075), (0.017, 0.075), (0.021, 0.082), (0.022, 0.135), (0.018, 0.142), (0, 0.142)], 18, 0.9)
+    ribs = [
+        box(
+            [x + 0.0215 * c - 0.002, y + 0.0215 * s - 0.002, 0.088],
+            [x + 0.0215 * c + 0.002, y + 0.0215 * s + 0.002, 0.13],
+        )
+        for c, s in ((np.cos(t), np.sin(t)) for t in np.linspace(0, 2 * np.pi, 9)[:-1])
+    ]
+    pipes = [
+        moved(cylinder(0.012, 0.02, 0.078, 0.002, 14), x, y, 0),
+        tube([(x, y, 0.045), (panel - 0.01, y, 0.045)], 0.009, 10),
+        tube([(x, y, 0.03), (x, d / 2, 0.03)], 0.008, 10),
+        moved(turned(cylinder(0.008, 0, 0.014, 0.002, 10), np.pi / 2, "y"), panel - 0.002, y, h - 0.06),
+    ]
+    return [moved(head, x, y, 0), *ribs], pipes

@@ -10,6 +10,7 @@ import numpy as np
 from assets.built.maker import (
     BLACK,
     CHROME,
+    GAP,
     GLASS,
     STEEL,
     WHITE,
@@ -19,6 +20,7 @@ from assets.built.maker import (
     carcass,
     front,
     handle,
+    joints,
     material,
     metal,
     parts_of,
@@ -49,6 +51,7 @@ def _base(
     return parts_of(
         (WHITE, body),
         (BLACK, plinth),
+        (GAP, joints(doors)),
         (material(look, "front", finish, "lacquer_white/0"), doors),
         (metal(look, finish), grips),
         (material(look, "worktop", finish, "oak_worktop/0"), worktop),
@@ -251,6 +254,7 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
+        (GAP, [] if look.get("glazed") else joints(doors)),
         (material(look, "front", finish, "lacquer_white/0"), doors),
         (metal(look, finish), grips),
         *crockery,
@@ -298,16 +302,26 @@ def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     ]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
-    return parts_of((material(look, "front", finish, "lacquer_white/0"), [*doors, side]), (metal(look, finish), grips))
+    return parts_of(
+        (material(look, "front", finish, "lacquer_white/0"), [*doors, side]),
+        (GAP, joints(doors)),
+        (metal(look, finish), grips),
+    )
 
 
 def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """Two doors over one another with long bar handles, with look['notes'] papers under magnets on the upper one."""
+    """Two doors over one another, a dark seal between them, upright grips that meet there.
+
+    On the upper door look['notes'] papers hang under magnets; where look['water'] is 1 it gives water and ice.
+    """
     w, d, h = size
     front_y, thick, split, foot = -d / 2 + 0.052, 0.062, h * 0.36, 0.07
     back_of_doors = front_y + thick
     body = box([-w / 2 + 0.003, back_of_doors + 0.012, foot - 0.02], [w / 2 - 0.003, d / 2, h], 0.004)
-    seal = box([-w / 2 + 0.012, back_of_doors - 0.004, foot], [w / 2 - 0.012, back_of_doors + 0.014, h - 0.012])
+    seal = [
+        box([-w / 2 + 0.012, back_of_doors - 0.004, foot], [w / 2 - 0.012, back_of_doors + 0.014, h - 0.012]),
+        box([-w / 2 + 0.006, front_y + 0.012, split - 0.012], [w / 2 - 0.006, back_of_doors, split + 0.012]),
+    ]
     base = box([-w / 2 + 0.02, back_of_doors - 0.01, 0], [w / 2 - 0.02, d / 2 - 0.03, foot - 0.02])
     slats = [
         box([-w / 2 + 0.05, back_of_doors - 0.014, z], [w / 2 - 0.05, back_of_doors - 0.008, z + 0.006])
@@ -315,41 +329,79 @@ def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     ]
     doors = [
         box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016)
-        for z0, z1 in ((foot - 0.012, split - 0.005), (split + 0.005, h - 0.004))
+        for z0, z1 in ((foot - 0.012, split - 0.008), (split + 0.008, h - 0.004))
     ]
-    hinges = [
-        box([w / 2 - 0.07, front_y + 0.008, split - 0.006], [w / 2 - 0.006, back_of_doors, split + 0.006], 0.001),
-        box([w / 2 - 0.09, back_of_doors - 0.03, h - 0.006], [w / 2 - 0.01, back_of_doors + 0.05, h], 0.002),
-    ]
+    hinges = [box([w / 2 - 0.09, back_of_doors - 0.03, h - 0.006], [w / 2 - 0.01, back_of_doors + 0.05, h], 0.002)]
     x = -w / 2 + 0.055
-    grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.42, split - 0.05), (split + 0.05, split + 0.62))]
-    badge = box([-0.035, front_y - 0.0015, h - 0.075], [0.035, front_y + 0.001, h - 0.063], 0.0005)
-    shown = split + 0.56 * (h - split)
-    panel = box([-0.055, front_y - 0.0012, shown], [0.055, front_y + 0.001, shown + 0.034], 0.0005)
-    digits = [
-        box([x0, front_y - 0.0018, shown + 0.012], [x0 + 0.007, front_y, shown + 0.022])
-        for x0 in (-0.035, -0.024, 0.016, 0.027)
+    grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.46, split - 0.04), (split + 0.04, split + 0.70))]
+    badge = box([-0.045, front_y - 0.0015, h - 0.085], [0.045, front_y + 0.001, h - 0.066], 0.0005)
+    papers, magnets = _notes(int(look.get("notes", 0)), w, h, front_y, rng=rng)
+    skin = material(look, "front", finish, "lacquer_white/0")
+    sides = plain((0.42, 0.42, 0.43), 0.5) if skin.metallic else skin
+    return parts_of(
+        (skin, doors),
+        (sides, body),
+        (BLACK, [base]),
+        (plain((0.09, 0.09, 0.095), 0.7), seal),
+        (plain((0.3, 0.3, 0.31), 0.5), [*slats, *hinges]),
+        (metal(look, finish, "steel"), [*grips, badge]),
+        *(_water(front_y, split + 0.30) if look.get("water") else _display(front_y, split + 0.56 * (h - split))),
+        *papers,
+        (plain((0.62, 0.16, 0.14), 0.4), magnets),
+    )
+
+
+def _display(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
+    """The temperature on a fridge's door at y."""
+    panel = box([-0.055, y - 0.0012, z], [0.055, y + 0.001, z + 0.034], 0.0005)
+    digits = [box([x, y - 0.0018, z + 0.012], [x + 0.007, y, z + 0.022]) for x in (-0.035, -0.024, 0.016, 0.027)]
+    return [(plain((0.02, 0.02, 0.025), 0.08), panel), (plain((0.55, 0.8, 0.9), 0.3), digits)]
+
+
+def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
+    """What gives water and ice, in a fridge's door at y: a steel frame, a dark niche, keys over it, a spout, a tray."""
+    wide, high, rim, x = 0.20, 0.36, 0.012, 0.04
+    x0, x1, sill = x - wide / 2, x + wide / 2, z + 0.26
+    frame = [
+        box([x0, y - 0.006, z], [x0 + rim, y + 0.002, z + high], 0.002),
+        box([x1 - rim, y - 0.006, z], [x1, y + 0.002, z + high], 0.002),
+        *(
+            box([x0 + rim, y - 0.006, a], [x1 - rim, y + 0.002, a + rim], 0.002)
+            for a in (z, sill - rim, z + high - rim)
+        ),
     ]
+    niche = box([x0 + rim, y - 0.0012, z + rim], [x1 - rim, y + 0.001, sill - rim])
+    keys = box([x0 + rim, y - 0.003, sill], [x1 - rim, y + 0.001, z + high - rim], 0.001)
+    lit = [
+        box([x + k * 0.05 - 0.012, y - 0.0036, sill + 0.04], [x + k * 0.05 + 0.012, y, sill + 0.052])
+        for k in (-1, 0, 1)
+    ]
+    spout = moved(cylinder(0.016, 0, 0.03, 0.003, 14), x, y - 0.014, sill - rim - 0.03)
+    lever = box([x - 0.02, y - 0.008, z + 0.07], [x + 0.02, y, sill - 0.06], 0.003)
+    tray = box([x0 + rim, y - 0.022, z + rim], [x1 - rim, y, z + rim + 0.008], 0.002)
+    return [
+        (STEEL, [*frame, tray]),
+        (plain((0.035, 0.035, 0.04), 0.25), [niche, keys]),
+        (plain((0.2, 0.2, 0.21), 0.3), [spout, lever]),
+        (plain((0.55, 0.8, 0.9), 0.3), lit),
+    ]
+
+
+def _notes(
+    count: int, w: float, h: float, y: float, *, rng: np.random.Generator
+) -> tuple[list[tuple[Finish, list[Shape] | Shape]], list[Shape]]:
+    """Papers on a fridge's door at y, and the magnets that hold them."""
     papers: list[tuple[Finish, list[Shape] | Shape]] = []
     magnets: list[Shape] = []
-    for k in range(int(look.get("notes", 0))):
+    for k in range(count):
         x = (k % 3 - 1) * w * 0.24 + rng.normal(0, 0.015) + 0.03
         z = h - 0.16 - 0.21 * (k // 3) - rng.uniform(0, 0.05)
         pw, ph = rng.uniform(0.07, 0.12), rng.uniform(0.08, 0.16)
         leaf = turned(box([-pw / 2, -0.0008, -ph], [pw / 2, 0, 0]), rng.normal(0, 0.05), "y")
         tint = ((0.9, 0.885, 0.84), (0.9, 0.8, 0.4), (0.9, 0.885, 0.84), (0.75, 0.83, 0.88), (0.88, 0.62, 0.66))
-        papers.append((plain(tint[int(rng.integers(5))], 0.9), moved(leaf, x, front_y - 0.0004, z)))
-        magnets.append(moved(turned(cylinder(0.012, 0, 0.006, 0.002, 12), np.pi / 2, "x"), x, front_y, z - 0.015))
-    return parts_of(
-        (material(look, "front", finish, "lacquer_white/0"), [*doors, body]),
-        (BLACK, [base, seal]),
-        (plain((0.3, 0.3, 0.31), 0.5), [*slats, *hinges]),
-        (metal(look, finish, "steel"), [*grips, badge]),
-        (plain((0.02, 0.02, 0.025), 0.08), panel),
-        (plain((0.55, 0.8, 0.9), 0.3), digits),
-        *papers,
-        (plain((0.62, 0.16, 0.14), 0.4), magnets),
-    )
+        papers.append((plain(tint[int(rng.integers(5))], 0.9), moved(leaf, x, y - 0.0004, z)))
+        magnets.append(moved(turned(cylinder(0.012, 0, 0.006, 0.002, 12), np.pi / 2, "x"), x, y, z - 0.015))
+    return papers, magnets
 
 
 def _long_grip(x: float, y: float, z0: float, z1: float) -> Shape:
@@ -384,6 +436,7 @@ def island(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of(
         (material(look, "front", finish, "lacquer_white/0"), [*doors, body]),
         (BLACK, plinth),
+        (GAP, joints(doors)),
         (metal(look, finish), grips),
         (material(look, "worktop", finish, "oak_worktop/0"), top),
     )

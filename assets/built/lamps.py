@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from assets.built.maker import (
@@ -18,7 +20,22 @@ from assets.built.maker import (
     plain,
     tinted,
 )
-from assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, moved, scaled, tube, turned, two_sided
+from assets.built.primitives import (
+    Shape,
+    ball,
+    box,
+    cylinder,
+    joined,
+    lathe,
+    moved,
+    quads,
+    reversed_shape,
+    scaled,
+    sheet,
+    tube,
+    turned,
+    two_sided,
+)
 from assets.records import Finish, MeshPart
 
 OPAL = plain((0.96, 0.94, 0.89), 0.3, emission=(7.0, 5.9, 4.5))
@@ -112,17 +129,52 @@ def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
 
 
 def panel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """A square LED panel in a slim frame."""
+    """A square pane of opal glass that bulges out of a sloping metal frame, with a nut in its middle."""
     w, d, h = size
-    f = 0.02
-    rim = [
-        box([-w / 2, -d / 2, 0], [-w / 2 + f, d / 2, h], 0.002),
-        box([w / 2 - f, -d / 2, 0], [w / 2, d / 2, h], 0.002),
-        box([-w / 2 + f, -d / 2, 0], [w / 2 - f, -d / 2 + f, h], 0.002),
-        box([-w / 2 + f, d / 2 - f, 0], [w / 2 - f, d / 2, h], 0.002),
-    ]
-    glass = box([-w / 2 + f, -d / 2 + f, 0.004], [w / 2 - f, d / 2 - f, h])
-    return parts_of((WHITE, rim), (plain((0.97, 0.96, 0.93), 0.4, emission=LIGHTS["panel"]), glass))
+    rows = [(0.5, h), (0.5, 0.55 * h), (0.46, 0.22 * h), (0.40, 0.22 * h), (0.385, 0.45 * h)]
+    rings = [np.array([(-a, -a, z), (a, -a, z), (a, a, z), (-a, a, z)]) * [w, d, 1] for a, z in rows]
+    frame = quads(
+        [
+            [outer[k], inner[k], inner[(k + 1) % 4], outer[(k + 1) % 4]]
+            for outer, inner in itertools.pairwise(rings)
+            for k in range(4)
+        ]
+    )
+    t = np.linspace(-1, 1, 11)
+    x, y = np.meshgrid(t, t)
+    rise = np.maximum(np.abs(x), np.abs(y)) ** 3 * h * 0.25
+    pane = sheet(np.stack([x * 0.395 * w, y * 0.395 * d, 0.12 * h + rise], -1))
+    nut = lathe([(0, 0), (0.008, 0.001), (0.012, 0.004), (0.008, 0.007), (0.018, 0.010), (0, 0.012)], 16)
+    return parts_of(
+        (metal(look, finish, "steel"), [frame, nut]),
+        (plain((0.97, 0.96, 0.93), 0.25, emission=LIGHTS["panel"]), reversed_shape(pane)),
+    )
+
+
+def bar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A wooden bar on a rod from the ceiling, three bell-shaped shades of opal glass below it."""
+    w, d, h = size
+    r = d / 2
+    high = r * 1.9
+    beam = high + 0.05
+    rim = metal(look, finish, "black")
+    wood = box([-w / 2 + r * 0.5, -0.014, beam], [w / 2 - r * 0.5, 0.014, beam + 0.03], 0.003)
+    rod = tube([(0, 0, beam + 0.02), (0, 0, h - 0.02)], 0.006, 8)
+    canopy = lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)
+    t = np.linspace(0, 1, 9)
+    bell = np.stack([r * (1 - 0.72 * t**1.6), high * t], 1)
+    shade = two_sided(lathe([*bell, (0.02, high + 0.004)], 24, 0.9))
+    lip = lathe([(r * 0.97, 0), (r, 0), (r, 0.004), (r * 0.97, 0.004), (r * 0.97, 0)], 24)
+    cap = lathe(
+        [(0, high - 0.01), (r * 0.34, high - 0.01), (r * 0.34, high + 0.02), (0.012, high + 0.04), (0, beam)], 16
+    )
+    places = (-w / 2 + r, 0.0, w / 2 - r)
+    return parts_of(
+        (material(look, "wood", finish, "walnut/0"), wood),
+        (rim, [rod, canopy, *(moved(s, x) for x in places for s in (cap, lip))]),
+        (OPAL, [moved(shade, x) for x in places]),
+        (GLOW, [moved(_bulb(high * 0.45, r * 0.34), x) for x in places]),
+    )
 
 
 def downlight(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

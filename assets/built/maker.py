@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, tube, turned
+from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, quads, tube, turned
 from assets.records import Asset, Color, Finish, MeshPart, SupportSurface
 
 Size = tuple[float, float, float]
@@ -22,6 +22,8 @@ Build = Callable[..., list[MeshPart]]
 WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
 PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)
 BLACK = Finish(color=(0.045, 0.045, 0.05, 1.0), roughness=0.4)
+GAP = Finish(color=(0.05, 0.048, 0.045, 1.0), roughness=1.0, specular=0.05)
+"""What stands behind the joints of doors and drawers: they look dark, and are finer than the baked light."""
 GLASS = Finish(color=(0.88, 0.93, 0.92, 0.16), roughness=0.03)
 MIRROR = Finish(color=(0.82, 0.84, 0.84, 1.0), roughness=0.02, metallic=1.0, mirror=True)
 CHROME = Finish(color=(0.83, 0.83, 0.84, 1.0), roughness=0.09, metallic=1.0)
@@ -124,7 +126,7 @@ def surface(
 
 def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "flat", thick: float = 0.02) -> Shape:
     """A door or drawer front whose face is at y: 'flat' or 'shaker' (frame and sunk panel)."""
-    g = 0.0015
+    g = 0.002
     x0, x1, z0, z1 = x0 + g, x1 - g, z0 + g, z1 - g
     rail = min(0.06, (x1 - x0) * 0.28, (z1 - z0) * 0.3)
     if style != "shaker" or z1 - z0 < 0.13:
@@ -136,6 +138,19 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
         box([x0 + rail, y, z0], [x1 - rail, y + thick, z0 + rail], 0.0015),
         box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + thick, z1 - rail + 0.002]),
     )
+
+
+def joints(fronts: Sequence[Shape]) -> list[Shape]:
+    """The dark of the joints around doors and drawers (of the finish GAP): a narrow frame a little behind each."""
+    frames = []
+    for shape in fronts:
+        (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
+        y, out, into = y + 0.003, 0.003, 0.006
+        outer = [(x0 - out, z0 - out), (x1 + out, z0 - out), (x1 + out, z1 + out), (x0 - out, z1 + out)]
+        inner = [(x0 + into, z0 + into), (x1 - into, z0 + into), (x1 - into, z1 - into), (x0 + into, z1 - into)]
+        sides = [(outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]) for k in range(4)]
+        frames.append(quads([[(x, y, z) for x, z in side] for side in sides]))
+    return frames
 
 
 def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:

@@ -35,7 +35,7 @@ from assets.built.primitives import (
     turned,
     two_sided,
 )
-from assets.records import MeshPart
+from assets.records import Finish, MeshPart
 
 CLOTH = (
     (0.55, 0.16, 0.14),
@@ -51,6 +51,9 @@ CLOTH = (
     (0.35, 0.16, 0.22),
     (0.80, 0.78, 0.74),
 )
+GILT, INK = plain((0.80, 0.70, 0.45), 0.45), plain((0.14, 0.12, 0.12), 0.6)
+PALE = 1.35
+"""Sum of a cloth's channels from which on it is printed dark."""
 SHELVES = (
     "bookcase",
     "shelving unit",
@@ -81,11 +84,47 @@ def _book(w: float, d: float, h: float, *, rng: np.random.Generator) -> tuple[Sh
     return cover, pages, band
 
 
+def _words(low: float, high: float, count: int, *, rng: np.random.Generator) -> np.ndarray:
+    """(count, 2) where words of a line of print begin and end."""
+    ends = np.sort(rng.uniform(low, high, count - 1)) if count > 1 else np.zeros(0)
+    starts, stops = np.concatenate([[low], ends + 0.002]), np.concatenate([ends - 0.002, [high]])
+    return np.stack([starts, np.maximum(stops, starts + 0.003)], axis=1)
+
+
+def _on_spine(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
+    """The title on the spine of a standing book: words that run upwards."""
+    tall = min(0.32 * w, rng.uniform(0.004, 0.009))
+    low = rng.uniform(0.12, 0.3) * h
+    z = _words(low, low + rng.uniform(0.2, 0.38) * h, int(rng.integers(1, 4)), rng=rng)
+    y, x = np.full_like(z[:, 0], -d / 2 - 0.0006), np.full_like(z[:, 0], tall / 2)
+    corners = [(-x, y, z[:, 0]), (x, y, z[:, 0]), (x, y, z[:, 1]), (-x, y, z[:, 1])]
+    return quads(np.stack([np.stack(c, axis=1) for c in corners], axis=1))
+
+
+def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
+    """Title, rule and author on the front (-x) of a standing book whose spine looks to -y."""
+    lines = []
+    top, tall = h * rng.uniform(0.78, 0.88), h * rng.uniform(0.035, 0.06)
+    for k, high in ((0, tall), (1, tall), (2, 0.004), (7, 0.6 * tall)):
+        reach = d * rng.uniform(0.18, 0.36)
+        words = _words(-reach, reach, 1 if k == 2 else int(rng.integers(1, 4)), rng=rng)
+        lines += [(y0, y1, top - 1.7 * k * tall, top - 1.7 * k * tall + high) for y0, y1 in words]
+    x = -w / 2 - 0.0006
+    return quads([[(x, y1, z0), (x, y0, z0), (x, y0, z1), (x, y1, z1)] for y0, y1, z0, z1 in lines])
+
+
+def _ink(cloth: int) -> Finish:
+    """Gilt on dark cloth, dark print on light cloth."""
+    return INK if sum(CLOTH[cloth]) > PALE else GILT
+
+
 def book_row(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Books side by side, of many heights and colours; the last ones may lean."""
     w, d, h = size
     by_color: dict[int, list[Shape]] = {}
+    titles: dict[Finish, list[Shape]] = {GILT: [], INK: []}
     pages, bands = [], []
+    (prints,) = rng.spawn(1)
     x = -w / 2
     palette = rng.permutation(len(CLOTH))[: int(rng.integers(5, 10))]
     first = True
@@ -96,7 +135,9 @@ def book_row(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         tall, deep = (1.0, 1.0) if first else (rng.uniform(0.72, 1.0), rng.uniform(0.75, 1.0))
         cover, leaves, band = _book(t - 0.0008, d * deep, h * tall, rng=rng)
         shift = {"x": x + t / 2, "y": -d / 2 + d * deep / 2 + (0 if first else rng.uniform(0, 0.01))}
-        by_color.setdefault(int(palette[rng.integers(len(palette))]), []).append(moved(cover, **shift))
+        cloth = int(palette[rng.integers(len(palette))])
+        by_color.setdefault(cloth, []).append(moved(cover, **shift))
+        titles[_ink(cloth)].append(moved(_on_spine(t, d * deep, h * tall, rng=prints), **shift))
         pages.append(moved(leaves, **shift))
         if band is not None:
             bands.append(moved(band, **shift))
@@ -107,6 +148,7 @@ def book_row(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         *((plain(CLOTH[k], 0.75, specular=0.25), s) for k, s in sorted(by_color.items())),
         (PAPER, pages),
         (plain((0.80, 0.70, 0.45), 0.45), bands),
+        *titles.items(),
     )
 
 
@@ -116,16 +158,22 @@ def book_stack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     count = int(look.get("count", 3))
     heights = rng.uniform(0.7, 1.3, count)
     z, made, pages = 0.0, [], []
+    (prints,) = rng.spawn(1)
     colours = rng.permutation(len(CLOTH))
     for k, t in enumerate(heights / heights.sum() * h):
         shrink = 1.0 - 0.06 * k
-        cover, leaves, _ = _book(t, d * 0.94 * shrink, w * 0.94 * shrink, rng=rng)
+        inner = t, d * 0.94 * shrink, w * 0.94 * shrink
+        cover, leaves, _ = _book(*inner, rng=rng)
+        print_ = _on_spine(*inner, rng=prints)
+        if k == count - 1:
+            print_ = joined(print_, _on_front(*inner, rng=prints))
         angle = 0.0 if count == 1 else rng.normal(0, 0.12)
         place = [
             moved(turned(moved(turned(s, np.pi / 2, "y"), -w * 0.47 * shrink, 0, t / 2), angle), 0, 0, z)
-            for s in (cover, leaves)
+            for s in (cover, leaves, print_)
         ]
-        made.append((plain(CLOTH[colours[k % len(CLOTH)]], 0.6, specular=0.3), place[0]))
+        cloth = int(colours[k % len(CLOTH)])
+        made += [(plain(CLOTH[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
         pages.append(place[1])
         z += t
     return parts_of(*made, (PAPER, pages))

@@ -481,7 +481,11 @@ def folds(
     amplitude = depth * (0.75 + 0.25 * np.sin(2 * np.pi * s * rng.uniform(1, 3) + rng.uniform(0, 6)))
     z = np.linspace(0, height, rows + 1)[:, None]
     drop = 1 - z / height
-    y = -amplitude * np.sin(phase + 0.25 * drop * np.sin(3 * phase / count + 1.0)) * (0.55 + 0.45 * drop)
+    # Below the heading folds wander and run into one another.
+    turn, lean = rng.uniform(0, 6), rng.uniform(0.5, 0.9)
+    wander = drop * (0.25 * np.sin(3 * phase / count + 1.0) + lean * np.sin(2.3 * phase / count + 2.2 * drop + turn))
+    merged = 0.25 * drop * np.sin(0.5 * phase + turn)
+    y = -amplitude * (np.sin(phase + wander) + merged) / (1 + 0.25 * drop) * (0.55 + 0.45 * drop)
     x = (s - 0.5)[None] * width * (1 - gather * (z / height))
     x = x + 0.35 * depth * np.cos(2 * phase) * drop * 0.3
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)

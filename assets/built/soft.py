@@ -25,6 +25,8 @@ from assets.built.primitives import (
 )
 from assets.records import MeshPart
 
+PLEAT = 0.095
+"""Width of a fold of a drawn curtain, metres."""
 LIVING = {
     "living_room": 1.0,
     "family_room": 1.0,
@@ -89,8 +91,8 @@ def curtain(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     parts, hooks = [], []
     for side in (-1, 1):
         width = panel * rng.uniform(0.94, 1.06)
-        count = max(4, round(width / 0.075))
-        grid = folds(width, rod_z - 0.035, count, min(d * 0.30, 0.055), rng=rng, columns=count * 7, rows=5)
+        count = max(4, round(width / PLEAT))
+        grid = folds(width, rod_z - 0.035, count, min(d * 0.36, 0.06), rng=rng, columns=count * 9, rows=7, gather=0.1)
         cloth_sheet = sheet(grid, 0.0025)
         # Cloth is gathered: the pattern runs on over the folds, as measured along the sheet.
         parts.append(moved(cloth_sheet, side * (w / 2 - 0.05 - width / 2), -0.01, 0.0))
@@ -138,7 +140,7 @@ def roller_blind(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         for s in (-1, 1)
     ]
     chain = tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
-    return parts_of((material(look, "cloth", finish, "linen/1"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
+    return parts_of((material(look, "cloth", finish, "screen/0"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
 
 
 def cushion(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

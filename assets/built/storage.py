@@ -8,6 +8,7 @@ import numpy as np
 
 from assets.built.maker import (
     BLACK,
+    GAP,
     MIRROR,
     STEEL,
     FinishOf,
@@ -16,6 +17,7 @@ from assets.built.maker import (
     carcass,
     front,
     handle,
+    joints,
     material,
     metal,
     parts_of,
@@ -98,8 +100,46 @@ def wardrobe(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     return parts_of(
         (material(look, "front", finish, "lacquer_white/0"), [*doors, body, top]),
         (BLACK, plinth),
+        (GAP, joints(doors)),
         (metal(look, finish, "steel"), grips),
         (MIRROR, glass),
+    )
+
+
+def bedside(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+    """A bedside table on feet: two drawers, or one over an open shelf where look["drawers"] is 1."""
+    w, d, h = size
+    open_below = look.get("drawers") == 1
+    board, foot, lip = 0.02, (0.03 if open_below else 0.05), (0.007 if open_below else 0.03)
+    top_y = -d / 2 + lip
+    y = top_y + (0.022 if open_below else 0.003)
+    x, low, high = w / 2 - 0.008, foot + board, h - 0.022
+    split = 0.64 * h + board if open_below else (low + high) / 2
+    body = [
+        box([-w / 2, top_y, high], [w / 2, d / 2, h], 0.004),
+        box([-x, y, foot], [-x + board, d / 2 - 0.004, high], 0.002),
+        box([x - board, y, foot], [x, d / 2 - 0.004, high], 0.002),
+        box([-x + board, y + 0.004, foot], [x - board, d / 2 - 0.004, low], 0.001),
+        box([-x + board, d / 2 - 0.012, low], [x - board, d / 2 - 0.004, high]),
+    ]
+    if open_below:
+        body.append(box([-x + board, y + 0.004, split - board], [x - board, d / 2 - 0.012, split], 0.001))
+    feet = [
+        box([a - 0.016, b - 0.016, 0], [a + 0.016, b + 0.016, foot + 0.002], 0.004)
+        for a in (-x + 0.03, x - 0.03)
+        for b in (y + 0.03, d / 2 - 0.04)
+    ]
+    rows = [(split, high)] if open_below else [(low, split), (split, high)]
+    edge = x - board - 0.001
+    drawers = [front(-edge, edge, a + 0.001, b - 0.001, y, "flat", 0.018) for a, b in rows]
+    grip = "knob" if open_below else "bar"
+    grips = [handle(0, (a + b) / 2 + (0 if open_below else 0.03), y, grip, False, 0.16) for a, b in rows]
+    wood = material(look, "wood", finish, "oak/0")
+    return parts_of(
+        (wood, [*body, *feet]),
+        (material(look, "front", finish, "oak/0") if "front" in look else wood, drawers),
+        (GAP, joints(drawers)),
+        (metal(look, finish, "steel"), grips),
     )
 
 

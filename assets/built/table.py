@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from assets.built import (
+    appliances,
     bath,
     decor,
     entry,
@@ -15,6 +16,7 @@ from assets.built import (
     fittings,
     kitchen,
     lamps,
+    luggage,
     papers,
     plants,
     soft,
@@ -23,10 +25,27 @@ from assets.built import (
 )
 from assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
 from assets.materials import MATERIALS
-from assets.records import SupportSurface
-from assets.rows import FIELDS, WORD, CatalogueError, Field, Row, asset_of, check_row, is_number, is_text, merged
+from assets.records import Asset, SupportSurface
+from assets.rows import (
+    FIELDS,
+    LOOK,
+    REMADE_LICENCE,
+    WORD,
+    CatalogueError,
+    Field,
+    Row,
+    asset_of,
+    check_row,
+    is_number,
+    is_text,
+    merged,
+    variant,
+)
 
-MODULES = (bath, decor, entry, everyday, fittings, kitchen, lamps, papers, plants, soft, storage, tableware)
+MODULES = (
+    *(appliances, bath, decor, entry, everyday, fittings, kitchen),
+    *(lamps, luggage, papers, plants, soft, storage, tableware),
+)
 BUILDS: Mapping[str, Build] = MappingProxyType(
     {
         f"{module.__name__.rpartition('.')[2]}.{name}": build
@@ -56,10 +75,6 @@ def _is_surfaces(value: object) -> bool:
     )
 
 
-def _is_look(value: object) -> bool:
-    return isinstance(value, dict) and all(is_text(v) or is_number(v) for v in value.values())
-
-
 BUILT_FIELDS = {
     **{
         name: FIELDS[name]
@@ -73,7 +88,7 @@ BUILT_FIELDS = {
     "emits": Field(f"one of {sorted(LIGHTS)}", lambda v: v in LIGHTS),
     "after": WORD,
     "set": WORD,
-    "look": Field("an object of words and numbers", _is_look),
+    "look": LOOK,
 }
 SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": WORD}
 
@@ -97,6 +112,29 @@ def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
                 raise CatalogueError(f"{thing} stands there twice; give one of them another name")
             makers[key] = _maker(thing, key, _whole(thing, shared, row, sets))
     return MappingProxyType(dict(sorted(makers.items())))
+
+
+def remade(where: str, rows: Mapping[str, Row], assets: Mapping[str, Asset]) -> Mapping[str, Maker]:
+    """The makers of those rows of the packs' catalogue that name a builder, by key.
+
+    Such a thing keeps its key, words, size and surfaces, so that houses stay as they are; its mesh is built.
+
+    Args:
+      where: name of the file, for error messages.
+      assets: of these rows.
+
+    Raises:
+      CatalogueError: a builder that does not exist.
+    """
+    makers = {}
+    for key, given in rows.items():
+        row = variant(f"{where}: model {key!r}", given, rows) if "of" in given else given
+        if "build" in row:
+            check_row(f"{where}: model {key!r}", {"build": row["build"]}, {"build": BUILT_FIELDS["build"]})
+            look: Look = row.get("look", {})
+            make = functools.partial(made, key, BUILDS[row["build"]], look)
+            makers[key] = Maker(assets[key], make, {"seed": 0.0, **look})
+    return makers
 
 
 def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
@@ -124,7 +162,7 @@ def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
 def _maker(where: str, key: str, row: Row) -> Maker:
     look: Look = row.get("look", {})
     plain = {name: value for name, value in row.items() if name not in ("surfaces", "emits")}
-    asset = asset_of(where, key, plain | {"licence": "Apache-2.0"})
+    asset = asset_of(where, key, plain | {"licence": REMADE_LICENCE})
     given = row.get("surfaces", [])
     surfaces = SURFACES[given](asset.size, look) if isinstance(given, str) else tuple(surface(**s) for s in given)
     asset = dataclasses.replace(asset, surfaces=surfaces, emits=LIGHTS[row["emits"]] if "emits" in row else None)

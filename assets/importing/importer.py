@@ -21,6 +21,7 @@ from PIL import Image, UnidentifiedImageError
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.closure import code_digest
+from assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
 from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import MeshError, MtlMaterial, libraries, parse_mtl, parse_obj
@@ -57,6 +58,8 @@ class RawPart:
     """(m, 3, 2) float64 of the corners."""
     finish: Finish
     image: Image.Image | None = None
+    cover: str | None = None
+    """What it wears, folds alone where it has an image (assets.importing.covers)."""
 
 
 def import_model(pack: Pack, recipe: ImportRecipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
@@ -175,10 +178,14 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
 
 
 def _looking(part: RawPart, looks: dict[str, str]) -> RawPart:
-    if part.name not in looks:
-        return part
-    finish, keep = corrected(part.finish, looks[part.name])
-    return replace(part, finish=finish, image=part.image if keep else None, uv=part.uv if keep else None)
+    look = looks.get(part.name, "")
+    finish, keep = corrected(part.finish, look)
+    textured = keep and part.image is not None
+    clear = finish.color[3] < 0.9 or finish.metallic > 0.5 or finish.mirror
+    cover = kind_of(part.name, look) if textured else cover_of(part.name, finish.color, look, clear)
+    finish = replace(finish, detail=cover and COVERS[cover].detail)
+    image, uv = (part.image, part.uv) if textured else (None, None)
+    return replace(part, finish=finish, image=image, uv=uv, cover=cover)
 
 
 def _placed(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[np.ndarray]:
@@ -204,11 +211,15 @@ def _placed(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[np.ndarray]:
 def _part(
     part: RawPart, points: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, recipe: ImportRecipe
 ) -> tuple[MeshPart, Image.Image | None]:
-    vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
-    finish = part.finish
+    finish, image = part.finish, part.image
     if part.name in recipe.glow and recipe.emits:
         finish = replace(finish, emission=recipe.emits)
-    return MeshPart(vertices, triangles, normals, coords, finish), part.image
+    elif part.cover is not None and (image is None or uv is None):
+        uv, image = laid_on(part.cover, points, faces), picture(part.cover, finish.color)
+    elif part.cover in FOLDED and image is not None and uv is not None:
+        image = creased(image, part.cover, points, faces, uv)
+    vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
+    return MeshPart(vertices, triangles, normals, coords, finish), image
 
 
 def _to_size(parts: list, size: tuple[float, float, float]) -> list:

@@ -72,12 +72,16 @@ LOOKS: dict[str, dict[str, Any]] = {
     "metal": {"roughness": 0.3, "metallic": 1.0},
     "chrome": {"color": (0.8, 0.8, 0.8, 1.0), "roughness": 0.15, "metallic": 1.0},
     "cloth": {"roughness": 0.95, "metallic": 0.0, "specular": 0.1},
+    "bedding": {"roughness": 0.95, "metallic": 0.0, "specular": 0.1},
     "leather": {"roughness": 0.5, "metallic": 0.0},
     "wood": {"roughness": 0.55, "metallic": 0.0},
     "plastic": {"roughness": 0.4, "metallic": 0.0},
     "ceramic": {"roughness": 0.15, "metallic": 0.0},
     "paint": {"roughness": 0.45, "metallic": 0.0},
     "matt": {"roughness": 0.9, "metallic": 0.0, "specular": 0.3},
+    "terry": {"roughness": 0.97, "metallic": 0.0, "specular": 0.05},
+    "chipboard": {"roughness": 0.7, "metallic": 0.0},
+    "plain": {},
 }
 """Words by which a reviewer corrects a material in catalogue.json."""
 

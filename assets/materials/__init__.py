@@ -14,7 +14,7 @@ from assets.cache import atomic_path, digest, write_json
 from assets.closure import code_digest
 from assets.materials import maps
 from assets.materials.maps import Maps, normal_map
-from assets.materials.material import ROLES, Material
+from assets.materials.material import ROLES, Material, detail_of
 from assets.materials.registry import MATERIALS, PAINTERS, painters_of
 from assets.records import Finish
 
@@ -63,6 +63,7 @@ def finish(key: str, cache: Path) -> Finish:
         metallic=material.metallic,
         specular=material.specular,
         tile=material.tile,
+        detail=detail_of(material),
     )
 
 

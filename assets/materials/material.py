@@ -44,6 +44,25 @@ ROLES = (
 """What a material may be used for."""
 
 
+DETAIL_OF_FAMILY = {
+    "fabric": "weave",
+    "wallpaper": "stipple",
+    "carpet": "nap",
+    "rug": "nap",
+    "wood": "pores",
+    "leather": "pebbles",
+    "plaster": "plaster",
+    "concrete": "plaster",
+    "brick": "plaster",
+    "paint": "stipple",
+}
+"""What materials of a family show; others are smooth."""
+
+
+DETAIL_OF_PAINTER = {"textile.felt": "nap", "textile.Pile": "nap"}
+"""What cloth without threads shows, whatever its family."""
+
+
 class Recipe(Protocol):
     """Draws the maps of a material: n pixels wide, over a square of `tile` metres."""
 
@@ -73,3 +92,8 @@ class Material:
     """The row of the table that the recipe was made from: {"by": painter, argument: value, ...}."""
     specular: float = 0.5
     metallic: float = 0.0
+
+
+def detail_of(material: Material) -> str | None:
+    """What a material shows from nearby, one of assets.records.DETAILS."""
+    return DETAIL_OF_PAINTER.get(material.told["by"], DETAIL_OF_FAMILY.get(material.family))

@@ -10,6 +10,22 @@ import numpy as np
 from assets.materials.maps import Colors, Maps, coordinates, fbm, mix, noise, rgb, smooth_step
 from assets.records import Color
 
+LIGHT_FROM = (0.55, 0.83)
+"""Where light on folds comes from, in a tile, right and up: on upright cloth from above."""
+
+
+def folds(n: int, tile: float, width: float, strength: float, *, rng: np.random.Generator) -> np.ndarray:
+    """(n, n) factors with mean 1 of soft folds some `width` metres apart, lit from LIGHT_FROM, dark in hollows."""
+    cycles = tile / width
+    height = np.zeros((n, n), np.float32)
+    for stretch, across in ((3.0, False), (3.0, True), (1.5, False)):
+        field = fbm(n, max(2.0, 0.35 * cycles), 1.6 * cycles, 1.6, stretch, rng=rng)
+        height += 0.8 - np.abs(field.T if across else field) ** 0.8
+    dx, dy = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / 2, (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / 2
+    lit = -(LIGHT_FROM[0] * dx + LIGHT_FROM[1] * dy)
+    shade = np.tanh(lit / (2.0 * lit.std())) + 0.25 * np.tanh((height - height.mean()) / height.std())
+    return (1 + strength * (shade - shade.mean()) / shade.std()).astype(np.float32)
+
 
 @dataclass(frozen=True)
 class Weave:
@@ -29,6 +45,8 @@ class Weave:
     """How uneven the threads' thickness is."""
     fuzz: float = 0.05
     rough: float = 0.92
+    creases: float = 0.0
+    """Standard deviation of lightness by soft folds, a hand's breadth apart."""
 
     def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
         u, v = coordinates(n, tile)
@@ -57,6 +75,8 @@ class Weave:
         shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
         color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
         height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
+        if self.creases:
+            color = color * folds(n, tile, 0.1, self.creases, rng=rng)[..., None]
         height = height * 0.35 * tile / self.threads + 0.02 * tile / self.threads * (fibre_up + fibre_level)
         return Maps(
             np.clip(color, 0.01, 0.97).astype(np.float32),
@@ -121,12 +141,21 @@ def sisal(n: int, tile: float, color: Color = (0.70, 0.61, 0.47), ribs: int = 64
 
 
 def felt(
-    n: int, tile: float, color: Color, mottle: float = 0.012, rough: float = 0.95, *, rng: np.random.Generator
+    n: int,
+    tile: float,
+    color: Color,
+    mottle: float = 0.012,
+    rough: float = 0.95,
+    creases: float = 0.0,
+    *,
+    rng: np.random.Generator,
 ) -> Maps:
-    """Velvet, felt, fleece: no threads to see, soft shading in the nap."""
+    """Velvet, felt, fleece: no threads to see, soft shading in the nap and, as in Weave, in creases."""
     nap = noise(n, 1.6, 2.4, rng=rng)
     cloud = fbm(n, 5, 60, 1.2, rng=rng)
     out = rgb(color) * (1 + 0.05 * nap + mottle * cloud)[..., None]
+    if creases:
+        out = out * folds(n, tile, 0.1, creases, rng=rng)[..., None]
     return Maps(
         np.clip(out, 0.01, 0.97).astype(np.float32),
         (1.2e-4 * nap).astype(np.float32),

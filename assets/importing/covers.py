@@ -1,0 +1,254 @@
+"""Covers: what untextured cloth, leather and wood of models wears: threads, folds, grain, in the part's own colour.
+
+A cover is a tile of factors with mean 1 that a part's colour is multiplied by, laid on by projection along the axes
+of the model: along the longest side of each board for wood, upright for cloth.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from assets.importing.meshing import face_normals
+from assets.importing.mtl_finish import CLOTH
+from assets.materials.maps import blurred, fbm, noise
+from assets.materials.textile import folds, leather
+from assets.materials.wood import furniture
+
+LEATHER = re.compile(r"leather|cuero|cuir|leder|\bskai\b", re.IGNORECASE)
+WOOD = re.compile(
+    r"wood|madera|madeira|fusta|bois|holz|legno|timber|plank|(?<![a-z])oak|walnut|beech|mah[ao]g|cherry|teak|[vw]enge|"
+    r"\bpine\b",
+    re.IGNORECASE,
+)
+BODY = re.compile(r"hair|skin", re.IGNORECASE)
+"""What is matt as cloth is, and not woven."""
+PIXELS = 512
+"""Side of a tile: what textures of models are shrunk to."""
+THREADS = 5.0
+"""Pixels by which a tile is blurred until its folds alone are left."""
+FOLDED = ("cloth", "bedding")
+"""Covers whose folds textures get, too."""
+BRIGHTEST, DARKEST = 0.95, 0.02
+"""sRGB that no texel passes."""
+ROUNDS = 6
+"""Times that directions are averaged over neighbours."""
+STEEP = 0.45
+"""Cosine to an axis below which cloth is not projected along it: stretched to more than twice its length."""
+BEND = np.cos(np.radians(40.0))
+"""Cosine of the angle at which one board ends and the next begins."""
+
+
+@dataclass(frozen=True)
+class Covering:
+    tile: float
+    """Side of the square that a tile covers, metres."""
+    draw: Callable[[int, float, np.random.Generator], np.ndarray]
+    """(n, n, 3) or (n, n, 1) factors, mean about 1."""
+    detail: str
+    """What it shows from nearby (assets.materials.detail)."""
+    grained: bool = False
+    """Runs along the longest side of every board."""
+
+
+def _threads(n: int, rng: np.random.Generator, strength: float) -> np.ndarray:
+    up, level = noise(n, 0.7, 14, rng=rng), noise(n, 14, 0.7, rng=rng)
+    return (1 + strength * (up + level) / np.sqrt(2)).astype(np.float32)
+
+
+def _cloth(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
+    clouds = 1 + 0.02 * fbm(n, 4, 60, 1.2, rng=rng)
+    return (_threads(n, rng, 0.07) * clouds * folds(n, tile, 0.10, 0.028, rng=rng))[..., None]
+
+
+def _bedding(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
+    return (_threads(n, rng, 0.02) * folds(n, tile, 0.18, 0.075, rng=rng) * folds(n, tile, 0.05, 0.025, rng=rng))[
+        ..., None
+    ]
+
+
+def _leather(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
+    grain = leather(n, tile, (0.5, 0.5, 0.5), rng=rng).color[..., :1] / 0.5
+    return (1 + 0.5 * (grain - 1)) * folds(n, tile, 0.12, 0.018, rng=rng)[..., None]
+
+
+def _wood(n: int, tile: float, rng: np.random.Generator, species: str) -> np.ndarray:
+    color = furniture(n, tile, species, 3, rng=rng).color
+    return color / color.mean((0, 1))
+
+
+def _terry(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
+    loops = 1 + 0.10 * noise(n, 2.5, 2.5, rng=rng) + 0.03 * fbm(n, 4, 30, 1.2, rng=rng)
+    return (loops * folds(n, tile, 0.12, 0.04, rng=rng))[..., None]
+
+
+def _chipboard(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
+    chips = noise(n, 5, 2, rng=rng) + noise(n, 2, 5, rng=rng)
+    return (1 + 0.05 * chips + 0.03 * noise(n, 1, 1, rng=rng))[..., None]
+
+
+COVERS = {
+    "cloth": Covering(0.6, _cloth, "weave"),
+    "bedding": Covering(1.1, _bedding, "weave"),
+    "terry": Covering(0.6, _terry, "nap"),
+    "leather": Covering(0.5, _leather, "pebbles"),
+    "chipboard": Covering(0.5, _chipboard, "plaster"),
+    "wood": Covering(1.0, functools.partial(_wood, species="oak"), "pores", grained=True),
+    "dark wood": Covering(1.0, functools.partial(_wood, species="walnut"), "pores", grained=True),
+}
+"""By the word that a reviewer says for it, but for dark wood, which follows from the colour."""
+WOODEN = 0.12
+"""How much redder than blue, as a share of the brightest channel, what shows its grain must be: the rest is painted."""
+OTHER = {"paint", "plastic", "ceramic", "chrome", "metal", "matt"}
+"""Words of a reviewer after which a name says nothing."""
+DARK = 0.42
+"""sRGB mean below which wood is drawn as walnut."""
+
+
+def kind_of(name: str, look: str) -> str | None:
+    """The cover that a textured material's `look` or its name stands for; None for none."""
+    return None if "plain" in look.split() else _said(look) or _named(name)
+
+
+def cover_of(name: str, color: tuple[float, ...], look: str, clear: bool) -> str | None:
+    """The cover of an untextured material: what its `look` says, or else its name; None for none.
+
+    Args:
+      color: sRGB.
+      clear: it is glass, metal or a mirror.
+    """
+    words = look.split()
+    if clear or "plain" in words:
+        return None
+    said = _said(look)
+    if said is None and not set(words) & OTHER:
+        said = _named(name)
+    if said != "wood":
+        return said
+    red, green, blue = color[:3]
+    if red - blue < WOODEN * max(color[:3]) or not red >= green >= blue:
+        return None
+    return "dark wood" if sum(color[:3]) / 3 < DARK else "wood"
+
+
+def _said(look: str) -> str | None:
+    return next((w for w in look.split() if w in COVERS), None)
+
+
+def _named(name: str) -> str | None:
+    patterns = (("leather", LEATHER), ("cloth", CLOTH), ("wood", WOOD))
+    return next((cover for cover, pattern in patterns if pattern.search(name) and not BODY.search(name)), None)
+
+
+@functools.lru_cache(maxsize=64)
+def picture(cover: str, color: tuple[float, ...]) -> Image.Image:
+    """The tile of a cover in a colour (sRGB)."""
+    shown = np.clip(_factors(cover) * np.asarray(color[:3], np.float32), DARKEST, BRIGHTEST)
+    return Image.fromarray(np.round(shown * 255).astype(np.uint8), "RGB")
+
+
+@functools.cache
+def _factors(cover: str) -> np.ndarray:
+    made = COVERS[cover]
+    factors = made.draw(PIXELS, made.tile, np.random.default_rng(sorted(COVERS).index(cover)))
+    return np.broadcast_to(factors / factors.mean((0, 1)), (PIXELS, PIXELS, 3))
+
+
+def creased(image: Image.Image, cover: str, vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray) -> Image.Image:
+    """A texture of cloth with the folds of a cover, whole tiles of them to each of its repeats; itself where those are
+    smaller than half a tile.
+
+    Args:
+      uv: (m, 3, 2) of the corners of a part.
+    """
+    across, down = (round(extent / COVERS[cover].tile) for extent in _extent(vertices[faces], uv))
+    if not (across and down):
+        return image  # repeats too often to hold folds
+    tile = blurred(_factors(cover)[..., :3].mean(-1), THREADS)
+    shade = np.asarray(Image.fromarray(np.tile(tile, (down, across))).resize(image.size, Image.Resampling.BOX))
+    pixels = np.asarray(image, np.float32).copy()
+    pixels[..., :3] = np.clip(pixels[..., :3] * shade[..., None], 255 * DARKEST, 255 * BRIGHTEST)
+    return Image.fromarray(np.round(pixels).astype(np.uint8), image.mode)
+
+
+def _extent(corners: np.ndarray, uv: np.ndarray) -> tuple[float, float]:
+    """Metres that a texture's width and height cover on triangles (m, 3, 3), in the median by area."""
+    sides, turns = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    area = turns[:, 0, 0] * turns[:, 1, 1] - turns[:, 0, 1] * turns[:, 1, 0]
+    sound = np.abs(area) > 1e-9
+    if not sound.any():
+        return 0.0, 0.0
+    sides, turns, area = sides[sound], turns[sound], area[sound, None]
+    u = (sides[:, 0] * turns[:, 1, 1, None] - sides[:, 1] * turns[:, 0, 1, None]) / area
+    v = (sides[:, 1] * turns[:, 0, 0, None] - sides[:, 0] * turns[:, 1, 0, None]) / area
+    weight = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return _median(np.linalg.norm(u, axis=1), weight), _median(np.linalg.norm(v, axis=1), weight)
+
+
+def _median(values: np.ndarray, weight: np.ndarray) -> float:
+    order = np.argsort(values)
+    sums = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
+
+
+def laid_on(cover: str, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(m, 3, 2) uv of the corners of a part (metres, z up) for the tile of a cover."""
+    made = COVERS[cover]
+    unit = face_normals(vertices, faces)
+    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
+    seen_along = np.abs(unit).argmax(1)
+    if not made.grained:
+        around = np.abs(_evened(vertices, faces, unit)).argmax(1)
+        steep = np.abs(np.take_along_axis(unit, around[:, None], 1)[:, 0]) < STEEP
+        seen_along = np.where(steep, seen_along, around)
+    u_axis, v_axis = np.array([1, 0, 0])[seen_along], np.array([2, 2, 1])[seen_along]
+    shift = np.zeros((len(faces), 2))
+    if made.grained:
+        board = _boards(faces, unit)
+        longest = _longest(vertices, faces, board)[board]
+        turned = longest == v_axis
+        u_axis, v_axis = np.where(turned, v_axis, u_axis), np.where(turned, u_axis, v_axis)
+        shift = np.random.default_rng(0).random((board.max() + 1, 2))[board]
+    corners = vertices[faces]
+    across = np.take_along_axis(corners, u_axis[:, None, None].repeat(3, 1), 2)[..., 0]
+    along = np.take_along_axis(corners, v_axis[:, None, None].repeat(3, 1), 2)[..., 0]
+    return np.stack([across, along], axis=-1) / made.tile + shift[:, None]
+
+
+def _evened(vertices: np.ndarray, faces: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """(m, 3) directions of faces averaged over those around, lest the folds of a blanket cut its cloth to pieces."""
+    for _ in range(ROUNDS):
+        sums = np.zeros((len(vertices), 3))
+        for k in range(3):
+            np.add.at(sums, faces[:, k], unit)
+        unit = sums[faces].sum(1)
+        unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
+    return unit
+
+
+def _boards(faces: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """(m,) number of the board of each face: faces that meet at less than BEND's angle belong together."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, edge = np.unique(edges, axis=0, return_inverse=True)
+    face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(edge.reshape(-1), kind="stable")
+    edge, face = edge.reshape(-1)[order], face[order]
+    meets = (edge[1:] == edge[:-1]) & (np.einsum("ij,ij->i", unit[face[1:]], unit[face[:-1]]) > BEND)
+    links = coo_matrix((np.ones(int(meets.sum())), (face[1:][meets], face[:-1][meets])), shape=(len(faces),) * 2)
+    return connected_components(links, directed=False)[1]
+
+
+def _longest(vertices: np.ndarray, faces: np.ndarray, board: np.ndarray) -> np.ndarray:
+    """(boards,) the axis along which each board is longest."""
+    low, high = np.full((board.max() + 1, 3), np.inf), np.full((board.max() + 1, 3), -np.inf)
+    for k in range(3):
+        np.minimum.at(low, board, vertices[faces[:, k]])
+        np.maximum.at(high, board, vertices[faces[:, k]])
+    return (high - low).argmax(1)
