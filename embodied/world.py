@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.light import Bake
     from embodied.light.reference import Tracer
-    from embodied.render.gloss import Shine
+    from embodied.render.gloss import Gloss, Shine
 
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
@@ -97,7 +97,8 @@ class World:
         """All that the panoramas depend on, and what draws them."""
         return (
             self._origin
-            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if (k, v) != ("look", "matte")}
+            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k != "look"}
+            | ({"look": "gloss"} if self.pictures.shown_with == "gloss" else {})  # matte ones are older than the word
             | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
         )
 
@@ -134,11 +135,8 @@ class World:
             if self.pictures.quality == "none":
                 raise ValueError(f"world {self.name!r} was opened without pictures; open it with another quality")
             painter = overlay = None
-            if self.pictures.look == "gloss":
-                from embodied.render.gloss import Gloss  # late: loads Embree
-
-                bake = self._baked()
-                overlay = Gloss(bake.lit, shine_of(bake))
+            if self.pictures.shown_with == "gloss":
+                overlay = gloss_of(self._baked())
             if self.lit is not None and self.pictures.backend == "filament":
                 from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
@@ -311,6 +309,16 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_diff
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
+def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
+    """What lays a baked house's reflections over its pictures, and, unless told otherwise, what matter shows from
+    nearby."""
+    from embodied.light.rays import rays_among  # late: loads the path tracer
+    from embodied.render.gloss import Gloss
+
+    shine = shine_of(bake)
+    return Gloss(bake.lit, shine if detail else dataclasses.replace(shine, detail=()), rays_among)
+
+
 def shine_of(bake: Bake) -> Shine:
     """What a bake knows of its house's gloss; colours of metal faces from the middle of each face."""
     from embodied.light.colours import linear  # late: loads the path tracer
@@ -318,7 +326,8 @@ def shine_of(bake: Bake) -> Shine:
 
     own, lit = bake.manifest["own_pages"], bake.lit
     with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
-        gloss = [z[f"g{i}"] if f"g{i}" in z.files and m.page < own else None for i, m in enumerate(lit.meshes)]
+        faces = [z[f"g{i}"] if f"g{i}" in z.files and m.page < own else None for i, m in enumerate(lit.meshes)]
+    gloss, detail = ([None if f is None else f[:, k] for f in faces] for k in (slice(3), 3))
     tint: list[np.ndarray | None] = []
     glow: list[np.ndarray | None] = [None] * len(lit.pages)
     for page in range(own):
@@ -338,7 +347,7 @@ def shine_of(bake: Bake) -> Shine:
         tint.append(linear(picture[y, x] / 255.0))
     exposure = bake.exposure
     outdoors = exposure.outdoors.astype(np.float32)
-    return Shine(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)))
+    return Shine(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)), detail)
 
 
 def makers(pictures: PictureSettings) -> tuple[str, ...]:
@@ -346,8 +355,8 @@ def makers(pictures: PictureSettings) -> tuple[str, ...]:
     modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
     if pictures.lit:
         modules.append("embodied.light.baking")
-    if pictures.look == "gloss":
-        modules.append("embodied.render.gloss")
+    if pictures.shown_with == "gloss":
+        modules += ["embodied.render.gloss", "embodied.light.rays"]
     if pictures.backend == "filament":
         modules.append("embodied.render.filament")
     if pictures.quality in TRACED:

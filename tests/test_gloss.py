@@ -11,6 +11,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from assets.records import Finish
+from embodied.light.rays import embree_among, mitsuba_among, rays_among
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
 from embodied.render.gloss import Gloss, Shine, interleaved, schlick
@@ -57,7 +58,7 @@ def house(rough: float, specular: float = 0.5, metal: float = 0.0, gains=(1.0, 1
     room, wall_s = (np.full(3, g, np.float32) for g in gains)
     exposed = lambda p: np.where(p[:, :1] > 3.99, wall_s, room)
     known = Shine([shine, None], [tint, None], [None, None], exposed, np.ones(3, np.float32), 1.0)
-    return Gloss(LitPages((floor, back), pages, "x"), known)
+    return Gloss(LitPages((floor, back), pages, "x"), known, rays_among)
 
 
 def drawn(size: int = 96) -> np.ndarray:
@@ -125,21 +126,18 @@ def test_every_direction_of_a_tile_counts_the_same_wherever_the_surface_goes_on(
     pixel = np.arange(h * w)
     up = np.tile(np.float32([0, 0, 1]), (h * w, 1))
     for lone in ((0, 0), (3, 5), (7, 2)):
-        grid = Mirrored((h, w), pixel, np.zeros(h * w, np.int32), up, np.ones(h * w, bool))
+        grid = Mirrored((h, w), pixel, np.zeros(h * w, np.int32), up)
         row, column = np.divmod(pixel, w)
-        grid.values.reshape(-1, 6)[:, 3] = (row % 8 == lone[0]) & (column % 8 == lone[1])
-        grid.weight[:] = 1
-        grid.smooth()
-        assert np.allclose(grid.values[8:-8, 8:-8, 3], 1 / 64, atol=1e-6)
+        light = ((row % 8 == lone[0]) & (column % 8 == lone[1])).astype(np.float32)
+        grid.smooth(light, light[:, None].repeat(3, 1))
+        assert np.allclose(grid.values[:, 8:-8, 8:-8], 1 / 64, atol=1e-6)
 
 
 def test_single_rays_from_thin_bars_are_no_dots_of_light():
-    pixel = np.arange(16 * 16)
-    up, alone = np.tile(np.float32([0, 0, 1]), (256, 1)), np.where(pixel % 16 == 8, 1, 0).astype(np.int32)
-    grid = Mirrored((16, 16), pixel, alone, up, alone == 1)
-    grid.values.reshape(-1, 6)[8 * 16 + 8, 3:], grid.weight.reshape(-1)[8 * 16 + 8] = 9.0, 1
-    grid.smooth()
-    assert 0 < grid.values[8, 8, 3] < 0.3
+    middle = np.array([8 * 16 + 8])
+    grid = Mirrored((16, 16), middle, np.ones(1, np.int32), np.float32([[0, 0, 1]]))
+    grid.smooth(np.ones(1, np.float32), np.full((1, 3), 9.0, np.float32))
+    assert 0 < grid.values[1, 8, 8] < 0.3
 
 
 def night_window(kind: str = "opening", rough: float = 0.02, night_at: float = 5.0) -> np.ndarray:
@@ -153,7 +151,8 @@ def night_window(kind: str = "opening", rough: float = 0.02, night_at: float = 5
     everywhere = lambda p: np.ones((len(p), 3), np.float32)
     known = Shine([None] * 3, [None] * 3, [None] * 3, everywhere, np.ones(3, np.float32), 1.0)
     ahead = Camera((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    return Gloss(LitPages((behind, night, pane), pages, "x"), known).over(np.zeros((64, 64, 3), np.uint8), ahead)
+    gloss = Gloss(LitPages((behind, night, pane), pages, "x"), known, rays_among)
+    return gloss.over(np.zeros((64, 64, 3), np.uint8), ahead)
 
 
 def test_a_window_at_night_shows_the_room_and_only_where_the_pane_is():
@@ -171,14 +170,44 @@ def test_sheer_curtains_and_hidden_panes_mirror_nothing():
     assert not night_window(night_at=1.0).any()
 
 
-def test_gloss_goes_with_baked_pages_of_the_classic_renderer():
+@pytest.mark.parametrize("among", [embree_among, mitsuba_among])
+def test_rays_meet_what_geometry_says(among):
+    """Against all triangles in turn (Moeller and Trumbore 1997)."""
+    if among is embree_among:
+        pytest.importorskip("embreex")
+    rng = np.random.default_rng(3)
+    corners = (rng.uniform(-2, 2, (60, 1, 3)) + rng.uniform(-0.7, 0.7, (60, 3, 3))).astype(np.float32)
+    start, onward = rng.uniform(-2, 2, (500, 3)), rng.normal(size=(500, 3))
+    onward /= np.linalg.norm(onward, axis=1, keepdims=True)
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = np.cross(onward[:, None], b)
+    inverse = 1 / np.einsum("ijk,jk->ij", p, a)
+    s = start[:, None] - corners[:, 0]
+    u = np.einsum("ijk,ijk->ij", p, s) * inverse
+    q = np.cross(s, a)
+    v = np.einsum("ik,ijk->ij", onward, q) * inverse
+    t = np.einsum("jk,ijk->ij", b, q) * inverse
+    t[(u < 0) | (v < 0) | (u + v > 1) | (t < 0)] = np.inf
+    nearest, met = t.argmin(1), np.isfinite(t.min(1))
+    assert 50 < met.sum() < 450
+    face, far, second, third = among(corners)(start.astype(np.float32), onward.astype(np.float32))
+    assert np.array_equal(face, np.where(met, nearest, -1))
+    assert np.allclose(far[met], t.min(1)[met], atol=1e-4)
+    there = np.arange(500)[met], nearest[met]
+    assert np.allclose(second[met], u[there], atol=1e-4) and np.allclose(third[met], v[there], atol=1e-4)
+    assert [len(x) for x in among(corners)(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))] == [0] * 4
+
+
+def test_gloss_goes_with_baked_pages_of_the_classic_renderer_and_is_what_they_are_shown_with():
     assert PictureSettings(64, "fast", look="gloss").look == "gloss"
     for wrong in (("unlit", "classic"), ("glossy", "classic"), ("normal", "filament")):
         with pytest.raises(ValueError, match="look 'gloss'"):
             PictureSettings(64, *wrong, look="gloss")
     with pytest.raises(ValueError, match="look 'shiny' is unknown"):
         PictureSettings(64, "fast", look="shiny")
-    assert dataclasses.asdict(PictureSettings())["look"] == "matte"
+    ways = [("fast",), ("normal",), ("normal", "filament"), ("unlit",), ("none",), ("glossy",), ("reference",)]
+    assert [PictureSettings(64, *way).shown_with for way in ways] == ["gloss"] * 2 + ["matte"] * 5
+    assert PictureSettings(64, "fast", look="matte").shown_with == "matte"
 
 
 class Polished(HandCatalogue):
@@ -193,9 +222,7 @@ class Polished(HandCatalogue):
 def test_a_world_with_gloss_shows_the_same_things_at_the_same_places_in_another_light(tmp_path):
     pytest.importorskip("embreex")
     house = furnished(two_rooms())
-    matte, gloss = (
-        open_world(house, Polished(), tmp_path, size=48, quality="fast", look=look) for look in ("matte", "gloss")
-    )
+    matte, gloss = (open_world(house, Polished(), tmp_path, size=48, quality="fast", look=k) for k in ("matte", None))
     with matte, gloss:
         a, b = matte.panorama(0), gloss.panorama(0)
         assert np.array_equal(a.depth, b.depth) and np.array_equal(a.ids, b.ids)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.bench import look
+from embodied.bench import crops, look
 from embodied.bench.crops import crops_of
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
@@ -22,9 +24,9 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     monkeypatch.setattr(look, "MAPPED", {"red box": (478,), "flag": (557,)})
     monkeypatch.setattr(look, "generate_house", lambda *_, **__: house)
     with open_world(house, HandCatalogue(), tmp_path / "cache", size=64) as world:
-        crops = crops_of(world, look.MAPPED)
-    assert {c.object_class for c in crops} == {"red box", "flag"} and all(c.rgb.shape == (224, 224, 3) for c in crops)
-    box = next(c.rgb.astype(int) for c in crops if c.object_class == "red box")
+        shown = crops_of(world, look.MAPPED)
+    assert {c.object_class for c in shown} == {"red box", "flag"} and all(c.rgb.shape == (224, 224, 3) for c in shown)
+    box = next(c.rgb.astype(int) for c in shown if c.object_class == "red box")
     assert (box[60:160, 60:160, 0] > 2 * box[60:160, 60:160, 1]).mean() > 0.8, "it fills the middle"
 
     def judge(pictures: np.ndarray) -> np.ndarray:
@@ -33,9 +35,23 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     pictures = PictureSettings(64)
     told = {"seed": 0, "pictures": pictures, "houses": 1}
     report = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", judge, **told)
-    boxes = sum(c.object_class == "red box" for c in crops)
+    boxes = sum(c.object_class == "red box" for c in shown)
     assert report.facts["by_class"]["red box"] == {"shown": boxes, "recognised": boxes}
     assert report.facts["by_class"]["flag"]["recognised"] == 0 and report.facts["worst"][0] == "flag"
     assert report.facts["classes"] == 0.5
-    assert json.loads((tmp_path / "out" / "look.json").read_text())["crops"] == len(crops)
+    assert json.loads((tmp_path / "out" / "look.json").read_text())["crops"] == len(shown)
     assert (tmp_path / "out" / "look_worst.jpg").stat().st_size > 1000
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+@pytest.mark.parametrize(("yaw", "side"), [(0.0, -1), (math.pi, 1)])
+def test_a_thing_is_shown_from_before_where_all_sides_are_alike(tmp_path, monkeypatch, yaw, side):
+    bare = furnished(two_rooms())
+    box = next(p for p in bare.placements if p.id == "red_box_1")
+    house = dataclasses.replace(bare, placements=(dataclasses.replace(box, yaw=yaw),))
+    eyes: list[np.ndarray] = []
+    monkeypatch.setattr(crops, "_crop", lambda world, thing, mine, eye: eyes.append(eye))
+    with open_world(house, HandCatalogue(), tmp_path / "cache", size=64) as world:
+        crops_of(world, {"red box"})
+    assert len(eyes) == 1 and side * (eyes[0][1] - box.position[1]) > 0

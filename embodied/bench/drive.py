@@ -27,9 +27,9 @@ LINES = (
 """What is seen, and how many commands per second the project promises with it."""
 
 
-def drive(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
+def drive(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: str) -> Iterator[Measure]:
     """Guided drives through one flat; whoever draws with the CPU has all of that counted."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality) as world:
+    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality, look=look) as world:
         seconds = {}
         for name, sees, aim in LINES:
             driving = Driving({world.name: world}, DriveSettings(sees=sees))

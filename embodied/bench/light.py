@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes.util
 import functools
-import importlib.util
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -29,11 +28,10 @@ from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.render.filament import FilamentPainter
-from embodied.world import shine_of
+from embodied.world import gloss_of
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
-    from embodied.render.gloss import Gloss
 
 HOUSES, VIEWS = 4, 3
 """How many houses are compared, and rooms of each."""
@@ -45,12 +43,8 @@ AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
 BAKES = ("fast", "normal")
 """Light qualities that are compared; what is traced reads the last one."""
-DRAWN = (
-    *("unlit", *BAKES),
-    *(("gloss",) if importlib.util.find_spec("embreex") else ()),
-    *(("filament",) if ctypes.util.find_library("vulkan") else ()),
-)
-"""What a Renderer draws: 'gloss' and 'filament' over the last bake, where they are installed."""
+DRAWN = (*("unlit", *BAKES, "gloss"), *(("filament",) if ctypes.util.find_library("vulkan") else ()))
+"""What a Renderer draws: 'gloss' and, where Vulkan is, 'filament' over the last bake, all others matte."""
 WAYS = (*DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
@@ -162,7 +156,7 @@ def draw(
             lit = None if way == "unlit" else baked.get(way, baked[BAKES[-1]]).lit
             best = baked[BAKES[-1]]
             painter = FilamentPainter(house, catalogue, best.lit) if way == "filament" else None
-            overlay = _gloss(best) if way == "gloss" else None
+            overlay = gloss_of(best, detail=False) if way == "gloss" else None
             with Renderer(house, catalogue, lit=lit, painter=painter, overlay=overlay) as r:
                 hour = house.sky.hour
                 shots += [once(way, v[0], functools.partial(_drawn, r, way, v, hour, size)) for v in views]
@@ -170,12 +164,6 @@ def draw(
             tracer = Tracer(baked[BAKES[-1]], house, quality=way, rays=16 if way == "glossy" else rays)
             shots += [once(way, v[0], functools.partial(_traced, tracer, way, v, house.sky.hour, size)) for v in views]
     return shots
-
-
-def _gloss(baked: Bake) -> Gloss:
-    from embodied.render.gloss import Gloss  # late: loads Embree
-
-    return Gloss(baked.lit, shine_of(baked))
 
 
 def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float, size: tuple[int, int]) -> Shot:

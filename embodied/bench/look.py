@@ -169,7 +169,7 @@ def recognised(
     facts = {
         "houses": [seed + k for k in range(houses)],
         "quality": pictures.quality,
-        "look": pictures.look,
+        "look": pictures.shown_with,
         "crops": len(crops),
         "objects": float(right.mean()) if len(right) else None,
         "classes": float(np.mean([np.mean(r) for r, _ in by_class.values()])) if by_class else None,

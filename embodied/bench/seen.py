@@ -49,7 +49,8 @@ TOGETHER = 1.6
 def seen(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
     """Random walks through one flat whose panoramas are in memory: on one core, and a batch that looks on all."""
     with one_core():
-        with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality) as world:
+        house = generate_house(seed, FLAT, catalogue)
+        with open_world(house, catalogue, cache, quality=quality, look="matte") as world:
             yield from _measures(world, seed)
         yield from _batches(seed, cache, quality)
 
@@ -72,7 +73,8 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
 
 def _batches(seed: int, cache: Path, quality: str) -> Iterator[Measure]:
     """One environment against batches of them, all in the flat that `make` generates from `seed`."""
-    asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": PictureSettings(quality=quality)}
+    drawn = PictureSettings(quality=quality, look="matte")
+    asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
     for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
         assert isinstance(world, World), "generated, so it can be drawn"
         with world:

@@ -48,10 +48,10 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
 
 
-def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
+def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: str) -> Iterator[Measure]:
     """Cube faces, panoramas and resampled views, and the naive way beside them."""
     house = generate_house(seed, LARGE, catalogue)
-    with open_world(house, catalogue, cache, size=256, quality=quality) as world:
+    with open_world(house, catalogue, cache, size=256, quality=quality, look=look) as world:
         renderer, eyes = world.renderer, world.graph.positions
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
         cameras = [c for n in nodes for c in face_cameras(eyes[n])]

@@ -49,7 +49,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
     parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
-    parser.add_argument("--look", choices=LOOKS, default="matte", help="with what look shows crops (default: matte)")
+    parser.add_argument(
+        "--look", choices=LOOKS, default="matte", help="with what pictures, drive and look draw (default: matte)"
+    )
     parser.add_argument(
         "--houses", type=whole(), help="that memory loads and drops (default: 1000), or whose things look shows (3)"
     )
@@ -87,11 +89,11 @@ def run(args: argparse.Namespace) -> int:
         return freeze(args, catalogue)
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
-        "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality),
+        "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality, args.look),
         "steps": lambda: world.steps(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
-        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality),
+        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality, args.look),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses or 1000),
     }

@@ -93,7 +93,7 @@ def _add_drawing(parser: argparse.ArgumentParser) -> None:
         help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
         "that are there already, else fast; hari: none)",
     )
-    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP.replace("%(default)s", "as are there, else matte"))
+    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP.replace("default: ", "default: as are there, else "))
     parser.add_argument(
         "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
     )
@@ -137,7 +137,8 @@ def run(args: argparse.Namespace) -> int:
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.panoramas, args.size, data.pictures, args.look)
     if pictures.quality != "none":
-        note(f"drawing panoramas: {pictures.quality}, faces of {pictures.size} pixels; what is drawn already is kept")
+        way = f"{pictures.quality}, {pictures.shown_with}, faces of {pictures.size} pixels"
+        note(f"drawing panoramas: {way}; what is drawn already is kept")
         draw_panoramas(
             config,
             args.out,
@@ -151,10 +152,11 @@ def run(args: argparse.Namespace) -> int:
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
+    drawn = dataclasses.asdict(pictures) | {"look": pictures.shown_with}
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
     show(
         args,
-        {"folder": str(args.out), "digest": data.digest, "splits": splits, "panoramas": dataclasses.asdict(pictures)},
+        {"folder": str(args.out), "digest": data.digest, "splits": splits, "panoramas": drawn},
         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
     )
     return 0
@@ -174,7 +176,9 @@ def chosen_pictures(
     if quality is None and held is not None:
         return dataclasses.replace(held, size=size or held.size, look=look or held.look)
     chosen = quality or ("none" if kind in WORDS_ONLY else "fast")
-    return PictureSettings(size or PictureSettings().size, chosen, look=look or "matte")
+    if look is None and held is not None and held.quality == chosen:
+        look = held.look
+    return PictureSettings(size or PictureSettings().size, chosen, look=look)
 
 
 def chosen_scale(args: argparse.Namespace) -> str:

@@ -132,8 +132,9 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     """
     import numpy as np
 
+    from agents.vision.drawn import pictures_of
     from agents.vision.features import feature_path, load_features
-    from agents.vision.run import encoder_of, pictures_of
+    from agents.vision.run import encoder_of
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args)

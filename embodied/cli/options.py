@@ -136,7 +136,7 @@ def _refuse_unwritable(wanted: Path) -> None:
 
 LOOK_HELP = (
     "matte: what baked light shows to everybody; gloss: reflections laid over it, for qualities fast and normal, at "
-    "two to three times the price (default: %(default)s)"
+    "two to three times the price (default: gloss where it can be)"
 )
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""

@@ -33,7 +33,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan"
     )
-    parser.add_argument("--look", choices=LOOKS, default="matte", help=LOOK_HELP)
+    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP)
     parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
     parser.add_argument("--equirect", type=file_to_write, metavar="PNG", help="where to write the picture of --node")
     parser.add_argument("--view", type=file_to_write, metavar="PNG", help="where to write a view from --node")

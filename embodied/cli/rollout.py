@@ -37,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--episodes", type=whole(), default=1, metavar="N", help="how many tasks (default: %(default)s)"
     )
     parser.add_argument("--quality", choices=DRAWN, default="normal", help="how the house is drawn (default: normal)")
-    parser.add_argument("--look", choices=LOOKS, default="matte", help=LOOK_HELP)
+    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP)
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )

@@ -116,7 +116,7 @@ def record_again(
     with contextlib.ExitStack() as stack:
         eyes = None
         if seen is not None:
-            from agents.vision.run import drawn_world  # loads torch
+            from agents.vision.drawn import drawn_world  # loads torch
 
             eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
         world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
@@ -136,4 +136,6 @@ def looked_at(run: Path) -> Looked:
 
     path = run / "run.json"
     facts = read_json(path) if path.exists() else {}
+    if isinstance(told := facts.get("pictures"), dict):  # runs that name no look are older than gloss
+        facts["pictures"] = {n: {"look": "matte"} | p if isinstance(p, dict) else p for n, p in told.items()}
     return from_plain(Looked, {k: facts[k] for k in ("looking", "pictures") if k in facts}, str(path))

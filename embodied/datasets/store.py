@@ -160,9 +160,11 @@ class Dataset:
             return None
         fields = {f.name: made_of[f.name] for f in dataclasses.fields(PictureSettings) if f.name in made_of}
         try:
-            return from_plain(PictureSettings, fields)
+            drawn = from_plain(PictureSettings, {"look": "matte"} | fields)  # files of before gloss name no look
         except RecordError:  # drawn by a version with other words for it
             return None
+        unnamed = dataclasses.replace(drawn, look=None)
+        return unnamed if unnamed.shown_with == drawn.look else drawn
 
     @property
     def pictures(self) -> PictureSettings | None:

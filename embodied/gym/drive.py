@@ -10,6 +10,7 @@ the way of dm_control's suite: embodied.gym.suite.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +119,8 @@ def make_driving(
 
     Args:
       data, split: of any kind; the light of its houses is baked where the cache does not have it.
-      pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere.
+      pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere. Matte unless they name a look:
+        every command is a picture of its own, and gloss takes more than twice the time.
       settings: fields of DriveSettings.
     """
     if isinstance(sees := settings.get("sees"), str):
@@ -134,7 +136,7 @@ def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings |
     whole, catalogue = Dataset(data), load_catalogue(cache)
     names = whole.names(split)
     drawn = pictures or pictures_of(whole, names, wanted=False)
-    return {name: whole.open_world(name, catalogue, cache, drawn) for name in names}
+    return {name: whole.open_world(name, catalogue, cache, _live(drawn)) for name in names}
 
 
 def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
@@ -142,4 +144,9 @@ def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | None) -> dic
     name, catalogue = f"flat_{seed}", load_catalogue(cache)
     house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
     drawn = pictures or PictureSettings(quality="fast")
-    return {name: open_world(house, catalogue, cache, graph=graph, pictures=drawn)}
+    return {name: open_world(house, catalogue, cache, graph=graph, pictures=_live(drawn))}
+
+
+def _live(pictures: PictureSettings) -> PictureSettings:
+    """Without gloss unless they name it."""
+    return replace(pictures, look=pictures.look or "matte")

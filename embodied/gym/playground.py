@@ -158,7 +158,7 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
             f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
             f"{again}, or choose sees='oracle'"
         )
-    if wanted and len(ways := {(p.quality, p.size, p.look) for p in found.values()}) > 1:
+    if wanted and len(ways := {(p.quality, p.size, p.shown_with) for p in found.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
     return next(iter(found.values()), PictureSettings())
 

@@ -20,10 +20,10 @@ from tqdm import tqdm
 
 from assets.cache import digest, write_json
 from assets.catalogue import Catalogue
-from assets.records import Finish
+from assets.records import DETAILS, Finish
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light import tone
-from embodied.light.atlas import Atlas, atlas_of, coarsened, things_of
+from embodied.light.atlas import Atlas, Page, atlas_of, coarsened, things_of
 from embodied.light.backend import rest, warn
 from embodied.light.colours import ColourMaps
 from embodied.light.compose import Composer, Solved, page_of
@@ -373,7 +373,8 @@ def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
       first: number of the atlas's first page.
 
     Returns:
-      Meshes, and for each (m, 3) uint8: roughness, specular and metallic times 255 (see gloss_of).
+      Meshes, and for each (m, 4) uint8: roughness, specular and metallic times 255, and detail (see gloss_of and
+      detail_of).
     """
     out, shine = [], []
     for number, page in enumerate(atlas.pages, first):
@@ -402,6 +403,7 @@ def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
                 )
             )
             kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
+            kind = np.column_stack([kind, detail_of(page, mine)])
             area = areas_of(page.corners[mine])
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
             out[-1] = dataclasses.replace(out[-1], gloss=mean)
@@ -415,6 +417,19 @@ def gloss_of(finish: Finish) -> tuple[int, int, int]:
         return 4, 255, 255
     rough, specular, metal = (min(max(x, 0.0), 1.0) for x in (finish.roughness, finish.specular, finish.metallic))
     return round(255 * rough), round(255 * specular), round(255 * metal)
+
+
+def detail_of(page: Page, faces: np.ndarray) -> np.ndarray:
+    """(k,) uint8 of some faces: number of what they show from nearby, from 1 on, and 16 times that of the axis along
+    which their texture's u runs, 3 for none; 0 for smooth ones."""
+    number = np.array([1 + DETAILS.index(f.detail) if f.detail else 0 for f in page.finishes], np.uint8)
+    corners, uv = page.corners[faces], page.uv[faces].astype(np.float64)
+    sides, turns = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    area = turns[:, 0, 0] * turns[:, 1, 1] - turns[:, 0, 1] * turns[:, 1, 0]
+    along = sides[:, 0] * turns[:, 1, 1, None] - sides[:, 1] * turns[:, 0, 1, None]
+    axis = np.where(np.abs(area) > 1e-12, np.abs(along).argmax(1), 3)
+    detail = number[page.finish[faces]]
+    return np.where(detail > 0, detail + 16 * axis, 0).astype(np.uint8)
 
 
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:

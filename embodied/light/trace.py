@@ -130,7 +130,7 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     """Upload a bake."""
     lit = bake.lit
     with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
-        gloss = [z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
+        gloss = [z[f"g{i}"][:, :3] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
     number = {o: i + 1 for i, o in enumerate(lit.owners)}
     solid = [(m, g) for m, g in zip(lit.meshes, gloss) if m.alpha >= 0.9 and g is not None and len(m.faces)]
     corners = np.concatenate([m.vertices[m.faces] for m, _ in solid])

@@ -14,18 +14,20 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import ModuleType
 
 import cv2
 import numpy as np
 
-from embodied.errors import UnableError
 from embodied.geometry import r2
 from embodied.render.camera import Camera
+from embodied.render.detail import Detail
 from embodied.render.film import light_of, shown_of
 from embodied.render.mirrored import FINE_TILE, TILE, Mirrored, evened
 from embodied.scene.lit_pages import LitMesh, LitPages, glass_surfaces
 
+Rays = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+"""From starts and directions, (n, 3) each, to what is met first, (n,) each: triangle (-1 for none), distance in lengths
+of the direction, and how much of the triangle's second and third corner is in that place."""
 MATTE = 0.7
 """Roughness from which on nothing is looked for: the lobe is so wide that three views gained 0.0 to 0.3 dB by it and
 cost half as much again."""
@@ -72,6 +74,8 @@ class Shine:
     """(3,) what light is multiplied by that windows show."""
     middle: float
     """What light is multiplied by in rooms, in the median."""
+    detail: Sequence[np.ndarray | None] = ()
+    """Per mesh (m,) uint8 of each face (embodied.render.detail); empty: none shows any."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,7 @@ class _Faces:
 class _Panes:
     """Clear, smooth glass, k faces."""
 
-    scene: object
+    first: Rays
     normal: np.ndarray
     """(k, 3) float32."""
     surfaces: np.ndarray
@@ -110,15 +114,17 @@ class _Panes:
 class Gloss:
     """Owns the faces of a lit house, arranged for rays, and its light, coarser than the pages."""
 
-    def __init__(self, lit: LitPages, shine: Shine) -> None:
+    def __init__(self, lit: LitPages, shine: Shine, rays_among: Callable[[np.ndarray], Rays]) -> None:
         """
-        Raises:
-          UnableError: Embree is not installed.
+        Args:
+          rays_among: from triangles (m, 3, 3) to rays among them.
         """
         self._faces = _faces_of(lit, shine)
         self._pages = lit.pages
-        self._scene = _scene_of(self._faces.corners)
-        self._panes = _panes_of(lit)
+        gloss = self._faces.gloss
+        self._mirrors = np.append((gloss[:, 0] < MATTE) & (gloss[:, 1] > 0), False)  # nothing that is met is face -1
+        self._first = rays_among(self._faces.corners)
+        self._panes = _panes_of(lit, rays_among)
         self._gain_at, self._beyond = shine.gain_at, shine.outdoors / GLASS
         some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
         gains = [shine.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
@@ -129,44 +135,50 @@ class Gloss:
         self._base = np.cumsum(texels) - texels
         self._light = np.concatenate([s.reshape(-1, 3) for s in small])
         self._middle = shine.middle
+        self._detail = Detail(self._faces.corners, self._faces.normal, _details_of(lit, shine.detail))
 
     def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         """The picture (h, w, 3) uint8 that `camera` drew, with what its surfaces mirror; matte pixels stay."""
         h, w = rgb.shape[:2]
         out = np.array(rgb)
-        seen = self._seen(camera, _directions(camera, (h, w), step=2))
-        owner = self._faces.owner[seen.face]
-        grid = Mirrored(((h + 1) // 2, (w + 1) // 2), seen.pixel, owner, seen.normal, seen.dull)
+        half = (h + 1) // 2, (w + 1) // 2
+        ahead = _directions(camera, (h, w), step=2)
+        met = self._met(camera, ahead)
+        self._detail.lay(out, camera, _directions(camera, (h, w)), *met)
+        seen = self._seen(ahead, *met)
         if seen.dull.any():
-            self._rough(seen, camera, grid)
-            values = self._enlarged(camera, grid, (h, w))
-            where = np.flatnonzero(values[..., :3].any(-1))
-            lost, mirrored = values.reshape(-1, 6)[where, :3], values.reshape(-1, 6)[where, 3:]
+            values = self._enlarged(camera, self._rough(seen.of(seen.dull), camera, half), (h, w))
+            where = np.flatnonzero(values[0])
+            lost, mirrored = values[0].ravel()[where, None], values[1:].reshape(3, -1)[:, where].T
             own = light_of(out.reshape(-1, 3)[where])
             out.reshape(-1, 3)[where] = shown_of(own * (1 - lost) + mirrored)
-        sharp = np.zeros(grid.shape, np.uint8)
-        sharp.ravel()[seen.pixel[seen.sharp]] = 1
-        if sharp.any():
+        if seen.sharp.any():
+            sharp = np.zeros(half, np.uint8)
+            sharp.ravel()[seen.pixel[seen.sharp]] = 1
             near = cv2.dilate(sharp, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
-            near = cv2.resize(near, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_NEAREST)[:h, :w]
-            self._lay_smooth(out, rgb, camera, near)
+            self._lay_smooth(out, rgb, camera, _twice(near)[:h, :w])
         if self._panes is not None:
             self._lay_panes(out, camera, self._panes)
         return out
 
-    def _seen(self, camera: Camera, directions: np.ndarray, pixels: np.ndarray | None = None) -> _Seen:
-        """What is seen along directions (n, 3) from a camera, `pixels` of its picture."""
-        faces = self._faces
+    def _met(self, camera: Camera, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) face (-1 for none) and distance of what is seen along directions (n, 3) from a camera."""
         origin = np.broadcast_to(np.asarray(camera.position, np.float32), directions.shape)
-        face, distance, _, _ = _first(self._scene, np.ascontiguousarray(origin), directions)
-        hit = np.flatnonzero(face >= 0)
+        return self._first(origin, directions)[:2]
+
+    def _seen(
+        self, directions: np.ndarray, face: np.ndarray, distance: np.ndarray, pixels: np.ndarray | None = None
+    ) -> _Seen:
+        """What mirrors of what was met along directions (n, 3), `pixels` of a picture."""
+        faces = self._faces
+        hit = np.flatnonzero(self._mirrors[face])
         face, ahead = face[hit], directions[hit]
         gloss = faces.gloss[face]
         cos = -np.einsum("ij,ij->i", faces.normal[face], ahead)
         facing = np.where(cos < 0, np.float32(-1), np.float32(1))
         metal = gloss[:, 2]
         f0 = 0.08 * gloss[:, 1] * (1 - metal) + metal
-        worth = (schlick(f0, np.abs(cos), gloss[:, 0]) > FAINT) & (gloss[:, 0] < MATTE) & (gloss[:, 1] > 0)
+        worth = schlick(f0, np.abs(cos), gloss[:, 0]) > FAINT
         pixels = hit if pixels is None else pixels[hit]
         sharp = (gloss[:, 0] < SMOOTH) | (metal > METAL)
         normal = faces.normal[face] * facing[:, None]
@@ -196,16 +208,16 @@ class Gloss:
         rough = _directions(camera, (h, w), step=PANE_STEP)
         at = np.asarray(camera.position, np.float32)
         shape = (-(-h // PANE_STEP), -(-w // PANE_STEP))
-        found = (_first(panes.scene, np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
+        found = (panes.first(np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
         if not found.any():
             return
         near = cv2.dilate(found.astype(np.uint8), np.ones((3, 3), np.uint8)).repeat(PANE_STEP, 0).repeat(PANE_STEP, 1)
         pixels = np.flatnonzero(near[:h, :w])
         ahead = _directions(camera, (h, w), pixels)
         origin = np.broadcast_to(at, ahead.shape)
-        pane, distance, _, _ = _first(panes.scene, origin, ahead)
+        pane, distance, _, _ = panes.first(origin, ahead)
         hit = np.flatnonzero(pane >= 0)
-        solid, behind, _, _ = _first(self._scene, origin[hit], ahead[hit])
+        solid, behind, _, _ = self._first(origin[hit], ahead[hit])
         hit = hit[(solid < 0) | (distance[hit] < behind)]
         if not len(hit):
             return
@@ -220,7 +232,7 @@ class Gloss:
 
     def _arriving(self, start: np.ndarray, onward: np.ndarray, *, sharp: bool) -> np.ndarray:
         """(n, 3) light that comes from where rays go, before it is exposed."""
-        face, far, u, v = _first(self._scene, start, onward)
+        face, far, u, v = self._first(start, onward)
         there = start + onward * np.where(face >= 0, far, 0)[:, None]
         gain = np.where(self._faces.outer[face][:, None], self._beyond, self._gain_at(there))
         return np.minimum(self._light_at(face, u, v, sharp=sharp) / gain, BRIGHTEST / self._middle)
@@ -255,30 +267,31 @@ class Gloss:
             out[i] = light_of(upper * (1 - fy) + lower * fy)
         return out
 
-    def _rough(self, seen: _Seen, camera: Camera, grid: Mirrored) -> None:
-        """Fill `grid` with what rough surfaces lose and mirror, averaged over neighbours on the same surface."""
-        row, column = np.divmod(seen.pixel, grid.shape[1])
-        chosen, k = seen.of(seen.dull), interleaved(TILE)[row % TILE, column % TILE][seen.dull]
-        half = _half_vectors(chosen.normal, chosen.rough, _lobe(TILE * TILE)[k])
-        lost, mirrored = self._mirrored(camera, chosen, half, sharp=False)
-        grid.values.reshape(-1, 6)[chosen.pixel] = np.concatenate([lost, mirrored], axis=1)
-        grid.weight.ravel()[chosen.pixel] = 1
-        grid.smooth()
+    def _rough(self, seen: _Seen, camera: Camera, size: tuple[int, int]) -> Mirrored:
+        """What rough surfaces lose and mirror in a picture of half the size, averaged over neighbours on the same
+        surface; what they lose is the mean of the colours."""
+        row, column = np.divmod(seen.pixel, size[1])
+        k = interleaved(TILE)[row % TILE, column % TILE]
+        half = _half_vectors(seen.normal, seen.rough, _lobe(TILE * TILE)[k])
+        lost, mirrored = self._mirrored(camera, seen, half, sharp=False)
+        grid = Mirrored(size, seen.pixel, self._faces.owner[seen.face], seen.normal)
+        grid.smooth(lost.mean(1), mirrored)
+        return grid
 
     def _enlarged(self, camera: Camera, grid: Mirrored, size: tuple[int, int]) -> np.ndarray:
-        """(h, w, 6) what is lost and mirrored, in full size: between surfaces every pixel asks whose it is."""
+        """(4, h, w) what is lost and mirrored, in full size: between surfaces every pixel asks whose it is."""
         h, w = size
-        values = cv2.resize(grid.values, (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_LINEAR)[:h, :w]
-        unsure = cv2.resize(grid.edges(), (grid.shape[1] * 2, grid.shape[0] * 2), interpolation=cv2.INTER_NEAREST)
-        pixels = np.flatnonzero(unsure[:h, :w])
+        values = np.stack([_twice(plane, cv2.INTER_LINEAR)[:h, :w] for plane in grid.values])
+        pixels = np.flatnonzero(_twice(grid.edges())[:h, :w])
         if not len(pixels):
             return values
-        values = np.ascontiguousarray(values)
-        flat = values.reshape(-1, 6)
-        flat[pixels] = 0
-        seen = self._seen(camera, _directions(camera, size, pixels), pixels)
+        flat = values.reshape(4, -1)
+        flat[:, pixels] = 0
+        ahead = _directions(camera, size, pixels)
+        seen = self._seen(ahead, *self._met(camera, ahead), pixels)
         seen = seen.of(seen.dull)
-        flat[seen.pixel] = grid.nearest(*np.divmod(seen.pixel, w), self._faces.owner[seen.face], seen.normal)
+        near = grid.nearest(*np.divmod(seen.pixel, w), self._faces.owner[seen.face], seen.normal)
+        flat[:, seen.pixel] = near.T
         return values
 
     def _lay_smooth(self, out: np.ndarray, rgb: np.ndarray, camera: Camera, where: np.ndarray) -> None:
@@ -286,7 +299,8 @@ class Gloss:
         pixels = np.flatnonzero(where)
         all_pixels = np.tile(pixels, len(ROOKS))
         aside = np.repeat(np.array(ROOKS, np.float32), len(pixels), axis=0)
-        seen = self._seen(camera, _directions(camera, rgb.shape[:2], all_pixels, aside=aside), all_pixels)
+        ahead = _directions(camera, rgb.shape[:2], all_pixels, aside=aside)
+        seen = self._seen(ahead, *self._met(camera, ahead), all_pixels)
         turn = np.repeat(np.arange(len(ROOKS)), len(pixels))
         row, column = np.divmod(all_pixels, rgb.shape[1])
         rows, columns = FINE_TILE
@@ -297,10 +311,11 @@ class Gloss:
             return
         half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, u))
         lost, mirrored = self._mirrored(camera, seen, half, sharp=True)
-        where, which = np.unique(seen.pixel, return_inverse=True)
-        sums = lambda a: np.stack([np.bincount(which, a[:, k]) for k in range(a.shape[1])], axis=1) / len(ROOKS)
-        values = sums(np.concatenate([lost, np.minimum(mirrored, WHITE)], axis=1))
-        rough = sums((seen.rough >= SMOOTH)[:, None])[:, 0] > 0.5
+        which = seen.which % len(pixels)
+        there = np.bincount(which, minlength=len(pixels)) > 0
+        mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(ROOKS)
+        values = np.stack([mean(a) for a in (*lost.T, *np.minimum(mirrored, WHITE).T)], axis=1)
+        where, rough = pixels[there], mean(seen.rough >= SMOOTH) > 0.5
         if rough.any():
             values[rough] = evened(values[rough], where[rough], rgb.shape[:2])
         own = light_of(out.reshape(-1, 3)[where])
@@ -330,6 +345,11 @@ class _Seen:
         """Some of them."""
         names = ("pixel", "face", "distance", "ahead", "normal", "rough", "dull", "sharp", "which")
         return _Seen(*(getattr(self, name)[which] for name in names))
+
+
+def _twice(a: np.ndarray, way: int = cv2.INTER_NEAREST) -> np.ndarray:
+    """(2 h, 2 w) of (h, w)."""
+    return cv2.resize(a, (2 * a.shape[1], 2 * a.shape[0]), interpolation=way)
 
 
 def schlick(f0: np.ndarray, cos: np.ndarray, rough: np.ndarray) -> np.ndarray:
@@ -430,35 +450,6 @@ def _across(size: tuple[int, int], step: int, tall: float) -> tuple[np.ndarray, 
     return x, (1 - (np.arange(0, h, step) + step / 2) / h * 2) * tall
 
 
-def _first(
-    scene: object, start: np.ndarray, onward: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Face (-1 for none), distance and barycentrics of what rays meet first; (n,) each."""
-    found = scene.run(  # type: ignore[attr-defined]
-        np.ascontiguousarray(start, np.float32), np.ascontiguousarray(onward, np.float32), output=1
-    )
-    return found["primID"], found["tfar"], found["u"], found["v"]
-
-
-def _scene_of(corners: np.ndarray) -> object:
-    """An Embree scene of triangles (m, 3, 3)."""
-    scene_module, mesh_module = _embree()
-    scene = scene_module.EmbreeScene()
-    mesh_module.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
-    return scene
-
-
-def _embree() -> tuple[ModuleType, ModuleType]:
-    try:
-        from embreex import mesh_construction, rtcore_scene
-    except ImportError as e:
-        raise UnableError(
-            "gloss needs Intel's Embree, which is not installed here: pip install 'embreex>=4.4', or draw without "
-            f"gloss ({e})"
-        ) from e
-    return rtcore_scene, mesh_construction
-
-
 def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     """The faces of what is hardly seen through, and of the sky; what is a little mirrors nothing."""
     solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= CLOUDY and len(m.faces)]
@@ -483,6 +474,13 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     )
 
 
+def _details_of(lit: LitPages, detail: Sequence[np.ndarray | None]) -> np.ndarray:
+    """(m,) uint8 for the faces of `_faces_of`."""
+    solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= CLOUDY and len(m.faces)]
+    known = [(m, detail[i] if detail else None) for i, m in solid]
+    return np.concatenate([np.zeros(len(m.faces), np.uint8) if d is None else d for m, d in known])
+
+
 def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
     """(m,) bool: faces that give light of their own, beside which what they mirror is nothing."""
     if glow is None:
@@ -494,7 +492,7 @@ def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
     return glow[y, x].max((1, 2)) > 0
 
 
-def _panes_of(lit: LitPages) -> _Panes | None:
+def _panes_of(lit: LitPages, rays_among: Callable[[np.ndarray], Rays]) -> _Panes | None:
     clear = [m for m in lit.meshes if glass_surfaces(m) and len(m.faces)]
     if not clear:
         return None
@@ -502,7 +500,7 @@ def _panes_of(lit: LitPages) -> _Panes | None:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     surfaces = np.concatenate([np.full(len(m.faces), glass_surfaces(m), np.float32) for m in clear])
-    return _Panes(_scene_of(corners), normal, surfaces)
+    return _Panes(rays_among(corners), normal, surfaces)
 
 
 def _or_zeros(values: np.ndarray | None, mesh: LitMesh) -> np.ndarray:

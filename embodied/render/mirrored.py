@@ -21,41 +21,43 @@ CREASE = 0.9
 class Mirrored:
     """A picture of half the size: whose surface each pixel shows, and what it loses and mirrors."""
 
-    def __init__(
-        self, shape: tuple[int, int], pixel: np.ndarray, owner: np.ndarray, normal: np.ndarray, dull: np.ndarray
-    ) -> None:
+    def __init__(self, shape: tuple[int, int], pixel: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> None:
         """
         Args:
-          pixel: (n,) flat positions in the picture of what was seen.
+          pixel: (n,) flat positions in the picture of what mirrors and is looked at in this size.
           owner: (n,) whose surface it is.
           normal: (n, 3) of it, towards the camera.
-          dull: (n,) bool, whether it is looked at in this size.
         """
-        self.shape = shape
+        self.shape, self._pixel = shape, pixel
         self.owner = np.full(shape, -1, np.int32)
-        self.owner.ravel()[pixel] = np.where(dull, owner, -2 - owner)
-        self.normal = np.zeros((*shape, 3), np.float32)
-        self.normal.reshape(-1, 3)[pixel] = normal
-        self.values = np.zeros((*shape, 6), np.float32)
-        self.weight = np.zeros((*shape, 1), np.float32)
+        self.owner.ravel()[pixel] = owner
+        self._normal = np.zeros((3, *shape), np.float32)
+        self._normal.reshape(3, -1)[:, pixel] = normal.T
+        self.values = np.zeros((4, *shape), np.float32)
 
-    def smooth(self) -> None:
-        """Average on the same surface so that every direction of a tile counts the same: over four pixels along rows
-        and columns, then over three of those sums, TILE / 2 apart."""
+    def smooth(self, lost: np.ndarray, mirrored: np.ndarray) -> None:
+        """Fill `values` with the share of its own light that the surface loses and what it sends for it, averaged on
+        the same surface so that every direction of a tile counts the same: over four pixels along rows and columns,
+        then over three of those sums, TILE / 2 apart.
+
+        Args:
+          lost: (n,) of the pixels that mirror.
+          mirrored: (n, 3).
+        """
+        sums = np.zeros((5, *self.shape), np.float32)
+        flat = sums.reshape(5, -1)
+        flat[0, self._pixel], flat[1:4, self._pixel], flat[4, self._pixel] = lost, mirrored.T, 1
         for axis, step, reach in ((1, 1, 2), (0, 1, 2), (1, TILE // 2, 1), (0, TILE // 2, 1)):
-            total, weight = self.values.copy(), self.weight.copy()
+            total = sums.copy()
             for k in range(1, reach + 1):
-                share = np.float32(0.5 if k == reach else 1.0)
                 near, far = _apart(axis, k * step)
-                same = (self._alike(near, far) * share)[..., None]
-                total[near] += self.values[far] * same
-                total[far] += self.values[near] * same
-                weight[near] += self.weight[far] * same
-                weight[far] += self.weight[near] * same
-            self.values, self.weight = total, weight
-        self.values /= np.maximum(self.weight, 1e-6)
-        most = GLINT * np.sqrt(self.weight / np.float32(TILE * TILE))
-        np.minimum(self.values[..., 3:], most, out=self.values[..., 3:])
+                same = self._alike(near, far) * np.float32(0.5 if k == reach else 1.0)
+                total[:, *near] += sums[:, *far] * same
+                total[:, *far] += sums[:, *near] * same
+            sums = total
+        self.values = sums[:4] / np.maximum(sums[4], 1e-6)
+        most = GLINT * np.sqrt(sums[4] / np.float32(TILE * TILE))
+        np.minimum(self.values[1:], most, out=self.values[1:])
 
     def edges(self) -> np.ndarray:
         """(h, w) uint8: pixels beside another surface of which one mirrors."""
@@ -68,34 +70,49 @@ class Mirrored:
         return edge
 
     def nearest(self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """(n, 6) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
-        total, found = self._around(row, column, owner, normal, (0, 1))
+        """(n, 4) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
+        known = np.concatenate([self.values, self._normal]).reshape(7, -1).T.copy()
+        total, found = self._around(known, row, column, owner, normal, (0, 1))
         if len(left := np.flatnonzero(~found)):
-            total[left] = self._around(row[left], column[left], owner[left], normal[left], (-1, 0, 1, 2))[0]
+            wider = (-1, 0, 1, 2)
+            total[left] = self._around(known, row[left], column[left], owner[left], normal[left], wider)[0]
         return total
 
     def _around(
-        self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray, steps: Sequence[int]
+        self,
+        known: np.ndarray,
+        row: np.ndarray,
+        column: np.ndarray,
+        owner: np.ndarray,
+        normal: np.ndarray,
+        steps: Sequence[int],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """`nearest` among so many neighbours each way, and for which pixels there was one; zeros for the others."""
+        """`nearest` among so many neighbours each way, and for which pixels there was one; zeros for the others.
+
+        Args:
+          known: (h * w, 7) values and normals.
+        """
         h, w = self.shape
         y0, x0 = (row - 1) >> 1, (column - 1) >> 1
-        y, x = (row - 0.5) / 2 - y0, (column - 0.5) / 2 - x0
-        owners, normals, values = self.owner.ravel(), self.normal.reshape(-1, 3), self.values.reshape(-1, 6)
-        total, weight = np.zeros((len(row), 6), np.float32), np.zeros(len(row), np.float32)
+        y, x = ((row - 0.5) / 2 - y0).astype(np.float32), ((column - 0.5) / 2 - x0).astype(np.float32)
+        owners = self.owner.ravel()
+        total, weight = np.zeros((len(row), 4), np.float32), np.zeros(len(row), np.float32)
         for dy in steps:
             for dx in steps:
                 at = np.clip(y0 + dy, 0, h - 1) * w + np.clip(x0 + dx, 0, w - 1)
-                near = np.exp(-2 * ((y - dy) ** 2 + (x - dx) ** 2)).astype(np.float32)
-                near *= (owners[at] == owner) & (np.einsum("ij,ij->i", normals[at], normal) > CREASE)
-                total += values[at] * near[:, None]
-                weight += near
+                there = np.flatnonzero(owners[at] == owner)
+                found = known[at[there]]
+                near = np.exp(-2 * (np.square(y[there] - dy) + np.square(x[there] - dx)))
+                near *= np.einsum("ij,ij->i", found[:, 4:], normal[there]) > CREASE
+                total[there] += found[:, :4] * near[:, None]
+                weight[there] += near
         return total / np.maximum(weight, 1e-6)[:, None], weight > 0
 
     def _alike(self, near: tuple[slice, slice], far: tuple[slice, slice]) -> np.ndarray:
         """Whether pixels and their neighbours show the same surface."""
-        same = self.owner[near] == self.owner[far]
-        return same & (np.einsum("ijk,ijk->ij", self.normal[near], self.normal[far]) > CREASE)
+        x, y, z = self._normal
+        cos = x[near] * x[far] + y[near] * y[far] + z[near] * z[far]
+        return (self.owner[near] == self.owner[far]) & (cos > CREASE)
 
 
 def evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:

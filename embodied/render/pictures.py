@@ -31,8 +31,9 @@ class PictureSettings:
     """One of BACKENDS."""
     light: str | None = None
     """Light settings by name (embodied.light); those that the quality stands for if None."""
-    look: str = "matte"
-    """One of LOOKS; 'gloss' is for the qualities 'fast' and 'normal' of the classic renderer."""
+    look: str | None = None
+    """One of LOOKS; 'gloss' is for the qualities 'fast' and 'normal' of the classic renderer, and what None stands for
+    there; elsewhere it stands for 'matte'."""
 
     def __post_init__(self) -> None:
         if self.quality not in QUALITIES:
@@ -44,9 +45,9 @@ class PictureSettings:
             raise ValueError(
                 f"backend 'filament' draws qualities 'fast' and 'normal', not {self.quality!r}; use backend 'classic'"
             )
-        if self.look not in LOOKS:
+        if self.look not in (None, *LOOKS):
             raise ValueError(f"look {self.look!r} is unknown; use one of {LOOKS}")
-        if self.look == "gloss" and (self.quality not in ("fast", "normal") or self.backend != "classic"):
+        if self.look == "gloss" and not self._baked:
             raise ValueError(
                 f"look 'gloss' is laid over what the classic renderer draws in qualities 'fast' and 'normal', not over "
                 f"{self.quality!r} by {self.backend!r}; use look 'matte'"
@@ -65,6 +66,16 @@ class PictureSettings:
         if not self.lit:
             return None
         return self.light or ("fast" if self.quality == "fast" else "normal")
+
+    @property
+    def shown_with(self) -> str:
+        """One of LOOKS: `look`, or what it stands for where it is None."""
+        return self.look or ("gloss" if self._baked else "matte")
+
+    @property
+    def _baked(self) -> bool:
+        """Whether the classic renderer draws pages of baked light, over which gloss can be laid."""
+        return self.quality in ("fast", "normal") and self.backend == "classic"
 
 
 def check_size(size: int) -> None:
