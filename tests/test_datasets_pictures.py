@@ -14,6 +14,7 @@ from hand_data import build, small_house
 from handmade import HandCatalogue
 from test_cluster import FakeRay
 
+from agents.vision import drawn
 from agents.vision import run as vision
 from agents.vision.config import PLAIN
 from agents.vision.encoder import random_encoder
@@ -40,6 +41,10 @@ def test_houses_are_drawn_lit_unless_the_kind_needs_words_only_or_pictures_are_t
     assert chosen_pictures("hanna", None, 64, held) == PictureSettings(64, "normal")
     assert chosen_pictures("hanna", "fast", None, held) == PictureSettings(256, "fast")
     assert chosen_pictures("hanna", "none", None, held).quality == "none"
+    matte = PictureSettings(256, "fast", look="matte")
+    assert all(chosen_pictures("hanna", q, None, matte) == matte for q in (None, "fast")), "nor with gloss"
+    assert chosen_pictures("hanna", "fast", None, matte, "gloss").shown_with == "gloss"
+    assert chosen_pictures("hanna", "normal", None, matte).shown_with == "gloss", "drawn anew anyway"
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +56,7 @@ def data(tmp_path_factory) -> Dataset:
 
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
-    for module in (building, vision):
+    for module in (building, drawn):
         monkeypatch.setattr(module, "load_catalogue", lambda *_: HandCatalogue())
 
 
@@ -140,7 +145,7 @@ def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_an
 @pytest.mark.gl
 def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     """An unlit run must not pass for a lit one."""
-    monkeypatch.setattr(vision, "PLAIN", SMALL)
+    monkeypatch.setattr(drawn, "PLAIN", SMALL)
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     encoder = random_encoder(seed=0)
@@ -159,7 +164,7 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     assert features(None).startswith("3 of 3 houses made, pictures: 3 unlit_16")
     for name in names:
         pretend_drawn(data, name, lit, code="whoever drew them")
-    assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_16")
+    assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
     assert features("unlit").startswith("0 of 3 houses made"), "they are still there"
     name = names[0]
@@ -171,5 +176,5 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     path.unlink()
     monkeypatch.setitem(sys.modules, "ray", FakeRay())
     assert features("fast", ray="local").startswith("1 of 3 houses made") and path.exists(), "on a cluster's nodes, too"
-    with pytest.raises(ValueError, match="made from drawing fast_16"):
+    with pytest.raises(ValueError, match="made from drawing fast_gloss_"):
         load_features(path, pictures=PLAIN)

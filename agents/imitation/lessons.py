@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
+from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder
 from agents.vision.features import feature_path, load_bank
-from agents.vision.run import pictures_of
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import AS_PUBLISHED

@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from agents.imitation.checkpoint import read_checkpoint, refuse_changes, write_checkpoint
+from agents.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
 from agents.imitation.loop import Note, Progress, Session
 from assets.cache import write_json
 

@@ -9,8 +9,11 @@ from dataclasses import dataclass, field
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
-NETWORKS = ("compact", "resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
-"""Keys of agents.vision.resnet.ARCHITECTURES; the others than 'compact' are torchvision's."""
+OURS = ("compact", "keen", "lite0")
+TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
+NETWORKS = (*OURS, *TORCHVISIONS)
+"""Keys of agents.vision.designs.DESIGNS."""
+BEGINNINGS = ("random", "imagenet")
 PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
@@ -19,7 +22,7 @@ def drawing(pictures: PictureSettings) -> str:
     """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
     lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
     other = () if pictures.backend == "classic" else (pictures.backend,)
-    look = () if pictures.look == "matte" else (pictures.look,)
+    look = () if pictures.shown_with == "matte" else (pictures.shown_with,)
     return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size)])
 
 
@@ -42,13 +45,19 @@ class VisionConfig:
     """How the encoder is trained."""
 
     network: str = "compact"
-    """'compact' or one of 'resnet18' to 'resnet152' (resnet.ARCHITECTURES)."""
+    """One of NETWORKS: 'compact' and 'keen' are small residual networks, 'lite0' is EfficientNet-Lite0."""
+    begin: str = "random"
+    """'imagenet' takes the weights of a package, which there are for 'lite0'."""
+    frozen: bool = False
+    """The body stays as it begins; the neck and the heads learn."""
     training_houses: int = 0
     """Learn from so many of the data set's training houses; 0: from all."""
     epochs: int = 6
     """Times that every strip is seen."""
     batch: int = 8
     """Strips per update."""
+    shade: float = 0.0
+    """Deviation of the logarithm of an uneven light laid over strips; 0.3 suits pictures without light."""
     learning_rate: float = 2e-3
     """Highest rate of a one-cycle schedule."""
     weight_decay: float = 1e-2
@@ -67,9 +76,16 @@ class VisionConfig:
             check_camera(name)
         if self.network not in NETWORKS:
             raise ValueError(f"network must be one of {NETWORKS}, got {self.network!r}")
+        if self.begin not in BEGINNINGS or (self.begin == "imagenet" and self.network != "lite0"):
+            raise ValueError(
+                f"begin must be one of {BEGINNINGS}, and 'imagenet' goes with network 'lite0', got {self.begin!r} with "
+                f"{self.network!r}"
+            )
         for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if not 0 <= self.shade < math.inf:
+            raise ValueError(f"shade must not be negative, got {self.shade}")
         if not 0 < self.learning_rate < math.inf or not 0 <= self.weight_decay < math.inf:
             raise ValueError(
                 f"learning_rate must be positive and weight_decay not negative, got {self.learning_rate} and "

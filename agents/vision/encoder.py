@@ -14,8 +14,10 @@ from torch import Tensor
 
 from agents.shipped import SHIPPED_ENCODER
 from agents.tensor_file import load_tensors, put, read_weights, save_tensors
-from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision, normalise
-from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from agents.vision.designs import DESIGNS, build
+from agents.vision.network import Network
+from agents.vision.resnet import load_torchvision
+from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
 
 FORMAT, OLD_FORMAT = "embodied-encoder-2", "embodied-encoder-1"
 """The older one has no checksum, but its digest covers weights and settings, too."""
@@ -30,9 +32,9 @@ MARGIN = 3 * CELL
 class Encoder:
     """A frozen network and what is done with its output."""
 
-    network: ResNet
+    network: Network
     name: str
-    """Key of resnet.ARCHITECTURES."""
+    """Key of designs.DESIGNS."""
     sharing: str = "strip"
     """'strip': one look at the panorama, views are windows of the feature map; 'views': every view
     is looked at alone, as the VLN literature does with ImageNet networks."""
@@ -44,7 +46,7 @@ class Encoder:
     @property
     def size(self) -> int:
         """D."""
-        return self.network.architecture.size
+        return self.network.size
 
     @functools.cached_property
     def digest(self) -> str:
@@ -58,14 +60,14 @@ class Encoder:
     @torch.no_grad()
     def encode_strips(self, strips: np.ndarray) -> np.ndarray:
         """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
-        return self._finish(pool_views(strip_map(self.network, self._send(strips)))).cpu().numpy()
+        return self._finish(pool_views(strip_map(self.network, self._send(strips)), self.network.peaks)).cpu().numpy()
 
     @torch.no_grad()
     def encode_views(self, views: np.ndarray) -> np.ndarray:
         """(n, 36, H, W, 3) uint8 -> (n, 36, D) float32, each view alone."""
         n = len(views)
         flat = self._send(views.reshape(-1, *views.shape[2:]))
-        out = torch.cat([self.network.features(normalise(part)) for part in flat.split(36)])
+        out = torch.cat([self.network.features(self.network.normalise(part)) for part in flat.split(36)])
         return self._finish(out.view(n, views.shape[1], -1)).cpu().numpy()
 
     def to(self, device: torch.device | str) -> Encoder:
@@ -82,21 +84,27 @@ class Encoder:
         return torch.from_numpy(np.ascontiguousarray(images)).to(next(self.network.parameters()).device)
 
 
-def strip_map(network: ResNet, strips: Tensor) -> Tensor:
+def strip_map(network: Network, strips: Tensor) -> Tensor:
     """(n, 192, 576, 3) uint8 -> (n, D, 12, 36) feature map of strips; left and right ends know each other."""
-    if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.architecture.stride != CELL:
+    if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.stride != CELL:
         raise ValueError(
             f"expected strips (n, {HEIGHT}, {WIDTH}, 3) and a network of stride {CELL}, got {tuple(strips.shape)} and "
-            f"stride {network.architecture.stride}; use sharing 'views' for other networks"
+            f"stride {network.stride}; use sharing 'views' for other networks"
         )
     wide = torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2)
-    return network.feature_map(normalise(wide))[..., MARGIN // CELL : -(MARGIN // CELL)]
+    return network.feature_map(network.normalise(wide))[..., MARGIN // CELL : -(MARGIN // CELL)]
 
 
-def pool_views(maps: Tensor) -> Tensor:
-    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window."""
+def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:
+    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window, but for the last `peaks`
+    channels, of which it is the largest value."""
     weights = torch.from_numpy(windows()).to(maps.device).view(36, ROWS * COLUMNS)
-    return torch.einsum("vc,ndc->nvd", weights, maps.flatten(2))
+    cells, means = maps.flatten(2), maps.shape[1] - peaks
+    mean = torch.einsum("vc,ndc->nvd", weights, cells[:, :means])
+    if not peaks:
+        return mean
+    inside = torch.from_numpy(inside_windows()).to(maps.device)
+    return torch.cat([mean, cells[:, means:, inside].amax(-1).transpose(1, 2)], -1)
 
 
 def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
@@ -115,7 +123,7 @@ def random_encoder(name: str = "compact", *, seed: int, sharing: str = "strip") 
     """An untrained encoder: the floor that training has to beat."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return Encoder(ResNet(ARCHITECTURES[name]).eval(), name, sharing)
+        return Encoder(build(name).eval(), name, sharing)
 
 
 def imagenet_encoder(name: str, weights: Path) -> Encoder:
@@ -136,11 +144,11 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
       ValueError: truncated, of another format, or not the weights its digest names.
     """
     tensors, settings = load_tensors(path, (FORMAT, OLD_FORMAT), "train the encoder again with `embodied train vision`")
-    if settings.get("name") not in ARCHITECTURES or settings.get("sharing") not in SHARINGS:
+    if settings.get("name") not in DESIGNS or settings.get("sharing") not in SHARINGS:
         raise ValueError(f"{path}: unknown settings {settings}; train the encoder again with `embodied train vision`")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = ResNet(ARCHITECTURES[settings["name"]])
+    network = build(settings["name"])
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     put(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix)

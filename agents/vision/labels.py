@@ -61,7 +61,7 @@ class HouseStrips:
 
     @staticmethod
     def load(path: Path) -> HouseStrips:
-        """Read what `save` wrote; the house's name is the file's stem.
+        """Read what `save` wrote; the house's name is the file's stem, what follows a @ says which lighting it is.
 
         Raises:
           FileNotFoundError, OSError.
@@ -78,7 +78,7 @@ class HouseStrips:
         wanted = {"rgb": (n, HEIGHT, WIDTH, 3), "share": (*cells, len(classes)), "rooms": cells, "log_depth": cells}
         if shapes != {**wanted, "room": (n,)}:
             raise ValueError(f"{path}: its arrays do not fit each other ({shapes}); delete it and render again")
-        return HouseStrips(Path(path).stem, classes, **arrays)
+        return HouseStrips(Path(path).stem.partition("@")[0], classes, **arrays)
 
 
 def shell_class(owner: str) -> str:

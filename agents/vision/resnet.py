@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""Of ImageNet's RGB in [0, 1]; what torchvision's weights expect."""
+from agents.vision.network import Network
 
 
 @dataclass(frozen=True)
@@ -95,13 +93,13 @@ def _downsample(inputs: int, outputs: int, stride: int) -> nn.Module | None:
     return nn.Sequential(nn.Conv2d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm2d(outputs))
 
 
-class ResNet(nn.Module):
+class ResNet(Network):
     """Images to a feature map; `fc` classifies its average, when there are classes."""
 
     def __init__(self, architecture: Architecture, classes: int = 0) -> None:
         super().__init__()
         a = architecture
-        self.architecture = a
+        self.size, self.stride = a.size, a.stride
         block = {"basic": BasicBlock, "bottleneck": Bottleneck}[a.block]
         self.conv1 = nn.Conv2d(3, a.stem, 7, 2, 3, bias=False)
         self.bn1 = nn.BatchNorm2d(a.stem)
@@ -124,22 +122,11 @@ class ResNet(nn.Module):
             x = getattr(self, f"layer{stage}")(x)
         return x
 
-    def features(self, images: Tensor) -> Tensor:
-        """(n, 3, H, W) -> (n, D), the average of the feature map: what VLN calls ResNet features."""
-        return self.feature_map(images).mean((2, 3))
-
     def forward(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) -> (n, classes) logits."""
         if self.fc is None:
             raise RuntimeError("this network was built without classes; use `features`, or build it with classes")
         return self.fc(self.features(images))
-
-
-def normalise(images: Tensor) -> Tensor:
-    """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as ImageNet weights expect."""
-    mean = torch.tensor(MEAN, device=images.device).view(1, 3, 1, 1)
-    deviation = torch.tensor(DEVIATION, device=images.device).view(1, 3, 1, 1)
-    return ((images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation).contiguous()
 
 
 def load_torchvision(name: str, weights: Mapping[str, Tensor]) -> ResNet:

@@ -21,20 +21,23 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
 from agents.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
+from agents.vision.designs import begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.resnet import ARCHITECTURES, ResNet
+from agents.vision.network import Network
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import write_json
 from assets.records import ROOM_KINDS
-from embodied.records import load_json
+from embodied.records import from_plain, load_json
 from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
 
-SHADE = 0.3
-"""Deviation of the logarithm of the uneven light laid over training strips."""
+CHECKPOINT = "embodied-vision-checkpoint-1"
+STATEFUL = ("network", "heads", "_optimizer", "_schedule")
+"""What of a training is in its checkpoints."""
 
 
 class Heads(nn.Module):
@@ -75,10 +78,10 @@ class StripBatch:
     """(n,) int64."""
 
 
-def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
     maps = strip_map(network, batch.rgb)  # (n, D, 12, 36)
-    views = pool_views(maps)  # (n, 36, D)
+    views = pool_views(maps, network.peaks)  # (n, 36, D)
     cells = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # (n, C, 12, 36): covers 3 % of the cell
     parts = {
         "cell objects": F.binary_cross_entropy_with_logits(heads.cell_objects(maps), cells) * 10,
@@ -98,20 +101,24 @@ def batches(
     classes: Sequence[int],
     size: int,
     cameras: Sequence[str] = ("ideal",),
+    shade: float = 0.0,
     *,
     rng: np.random.Generator,
 ) -> Iterator[StripBatch]:
-    """One pass over all nodes in random order, each strip rolled, perhaps mirrored, recoloured, and photographed by
-    one of `cameras`."""
-    where = [(h, i) for h, house in enumerate(houses) for i in range(len(house.rgb))]
+    """One pass over all nodes in random order, each in one of its house's lightings, rolled, perhaps mirrored,
+    recoloured, and photographed by one of `cameras`."""
+    lightings = _by_name(houses)
+    where = [(name, i) for name, several in lightings.items() for i in range(len(several[0].rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
         rgb, share, rooms, depth, room = [], [], [], [], []
-        for h, i in chosen:
-            house, turn, mirror = houses[h], int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
-            seen = recolour(turned(house.rgb[i], turn * CELL, mirror), rng=rng)
+        for name, i in chosen:
+            several = lightings[name]
+            house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
+            turn, mirror = int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
+            seen = recolour(turned(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
             rgb.append(taken(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
             share.append(turned(house.share[i], turn, mirror)[..., columns])
             rooms.append(turned(house.rooms[i], turn, mirror))
@@ -128,23 +135,36 @@ def batches(
         )
 
 
+def _by_name(houses: Sequence[HouseStrips]) -> dict[str, list[HouseStrips]]:
+    """The lightings of each house."""
+    out: dict[str, list[HouseStrips]] = {}
+    for house in houses:
+        out.setdefault(house.name, []).append(house)
+    return out
+
+
+def strips_of(houses: Sequence[HouseStrips]) -> int:
+    """How many strips an epoch has: one per viewpoint, however many lightings a house has."""
+    return sum(len(several[0].rgb) for several in _by_name(houses).values())
+
+
 def turned(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
     """A strip or its labels (rows, columns, ...) as seen after turning, and in a mirror."""
     rolled = np.roll(strip, columns, 1)
     return rolled[:, ::-1] if mirror else rolled
 
 
-def recolour(image: np.ndarray, *, rng: np.random.Generator) -> np.ndarray:
-    """(H, W, 3) uint8 with another exposure, white balance and gamma, lit unevenly: lighting must not matter.
-
-    The strips of training are drawn without light; lamps, windows and shadows come with the bake.
-    """
+def recolour(image: np.ndarray, uneven: float = 0.0, *, rng: np.random.Generator) -> np.ndarray:
+    """(H, W, 3) uint8 with another exposure, white balance and gamma, and lit unevenly where `uneven` says how much:
+    strips that are drawn without light lack lamps, windows and shadows."""
     gain = rng.uniform(0.7, 1.35) * rng.uniform(0.93, 1.07, 3)
     gamma = rng.uniform(0.8, 1.25)
     ramp = (np.arange(256)[:, None] / 255) ** gamma * gain
     table = np.clip(ramp * 255, 0, 255).astype(np.uint8)  # (256, 3)
     recoloured = np.stack([table[image[..., c], c] for c in range(3)], -1)
-    shade = np.exp(rng.normal(0.0, SHADE, (4, 9))).astype(np.float32)
+    if not uneven:
+        return recoloured
+    shade = np.exp(rng.normal(0.0, uneven, (4, 9))).astype(np.float32)
     shade = cv2.resize(np.concatenate([shade, shade[:, :1]], 1), image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
     return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
@@ -163,49 +183,105 @@ def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
 
 
 def train_encoder(
-    houses: Sequence[HouseStrips], config: VisionConfig, *, note: Callable[[str], None] = print
+    houses: Sequence[HouseStrips],
+    config: VisionConfig,
+    checkpoint: Path | None = None,
+    *,
+    note: Callable[[str], None] = print,
 ) -> tuple[Encoder, Heads, list[str]]:
     """The encoder, its heads, and the names of the classes the heads speak of.
+
+    Args:
+      checkpoint: where the state after each epoch is kept; training goes on from it.
 
     Raises:
       ValueError: no strips, or strips with different classes.
       FloatingPointError: the loss is no longer a number.
+      CheckpointError: damaged, or of other settings.
+      UnableError: it should begin as ImageNet taught, and the package of weights is not installed.
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
     classes = frequent_classes(houses, config.least_views)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
-        network = ResNet(ARCHITECTURES[config.network])
-        heads = Heads(network.architecture.size, len(classes))
-    network.train()  # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
-    parameters = [*network.parameters(), *heads.parameters()]
-    optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
-    nodes = sum(len(h.rgb) for h in houses)
-    updates = config.epochs * (nodes // config.batch)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, total_steps=max(updates, 1))
-    note(f"{nodes} strips of {len(houses)} houses, {len(classes)} classes, {updates} updates")
-    done, began = 0, time.monotonic()
-    smooth: dict[str, float] = {}
-    for epoch in range(config.epochs):
-        rng = stream(config.seed, "vision", "epoch", epoch)
-        for batch in batches(houses, classes, config.batch, config.cameras, rng=rng):
-            loss, parts = vision_loss(network, heads, batch)
+    strips = strips_of(houses)
+    training = _Training(config, len(classes), strips // config.batch)
+    if checkpoint is not None and checkpoint.exists():
+        training.load(checkpoint)
+        note(f"going on after epoch {training.epoch} of {config.epochs}")
+    note(f"{strips} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
+    while training.epoch < config.epochs:
+        training.pass_over(houses, classes, note)
+        if checkpoint is not None:
+            training.save(checkpoint)
+    training.network.eval()
+    training.heads.eval()
+    return Encoder(training.network, config.network), training.heads, [houses[0].classes[i] for i in classes]
+
+
+class _Training:
+    """Owns what changes while an encoder learns."""
+
+    def __init__(self, config: VisionConfig, classes: int, updates: int) -> None:
+        """Args:
+        updates: per epoch.
+        """
+        self.config, self.epoch = config, 0
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(config.seed)
+            self.network = build(config.network)
+            self.heads = Heads(self.network.size, classes)
+        if config.begin == "imagenet":
+            begin_as_imagenet(self.network)
+        if config.frozen:
+            body_of(self.network).requires_grad_(False)
+        parameters = [p for p in (*self.network.parameters(), *self.heads.parameters()) if p.requires_grad]
+        self._optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self._optimizer, config.learning_rate, total_steps=max(config.epochs * updates, 1)
+        )
+        self._updates = updates
+
+    def pass_over(self, houses: Sequence[HouseStrips], classes: Sequence[int], note: Callable[[str], None]) -> None:
+        """Learn once from every strip."""
+        # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
+        self.network.train()
+        if self.config.frozen:
+            body_of(self.network).eval()
+        began, smooth = time.monotonic(), dict[str, float]()
+        rng = stream(self.config.seed, "vision", "epoch", self.epoch)
+        drawn = batches(houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng)
+        for done, batch in enumerate(drawn, 1):
+            loss, parts = vision_loss(self.network, self.heads, batch)
             if not torch.isfinite(loss):
-                raise FloatingPointError(f"vision loss became {float(loss)} at update {done}; lower the learning rate")
-            optimizer.zero_grad(set_to_none=True)
+                raise FloatingPointError(
+                    f"vision loss became {float(loss)} in epoch {self.epoch + 1}; lower the learning rate"
+                )
+            self._optimizer.zero_grad(set_to_none=True)
             loss.backward()
-            optimizer.step()
-            schedule.step()
-            done += 1
+            self._optimizer.step()
+            self._schedule.step()
             smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
-            if done % 25 == 0 or done == updates:
-                rate = done * config.batch / (time.monotonic() - began)
+            if done % 25 == 0 or done == self._updates:
+                rate = done * self.config.batch / (time.monotonic() - began)
                 terms = ", ".join(f"{k} {v:.3f}" for k, v in smooth.items())
-                note(f"update {done}/{updates} (epoch {epoch + 1}), {rate:.1f} strips/s: {terms}")
-    network.eval()
-    heads.eval()
-    return Encoder(network, config.network), heads, [houses[0].classes[i] for i in classes]
+                note(f"epoch {self.epoch + 1}, update {done}/{self._updates}, {rate:.1f} strips/s: {terms}")
+        self.epoch += 1
+
+    def save(self, path: Path) -> None:
+        owners = {name: getattr(self, name).state_dict() for name in STATEFUL}
+        settings = {k: list(v) if isinstance(v, tuple) else v for k, v in dataclasses.asdict(self.config).items()}
+        write_checkpoint(path, CHECKPOINT, {"config": settings, "epoch": self.epoch, **owners})
+
+    def load(self, path: Path) -> None:
+        """
+        Raises:
+          CheckpointError: damaged, or of other settings.
+        """
+        body = read_checkpoint(path, CHECKPOINT, ("config", "epoch", *STATEFUL))
+        refuse_changes(path, vars(from_plain(VisionConfig, body["config"], f"{path}: config")), vars(self.config))
+        for name in STATEFUL:
+            getattr(self, name).load_state_dict(body[name])
+        self.epoch = int(body["epoch"])
 
 
 def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Encoder:

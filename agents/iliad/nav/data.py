@@ -11,8 +11,8 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.student import NavEyes
 from agents.iliad.nav.world import Trip, trips_of
 from agents.vision.config import drawing
+from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_bank
-from agents.vision.run import pictures_of
 from assets.cache import digest
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest

@@ -1,0 +1,217 @@
+"""Encoders on equal terms: the same pictures, as many passes, judged on the same houses (no counterpart in the
+dissertation, whose features are a ResNet-152's).
+
+    embodied study vision encoders --data DATA --out STUDY
+    embodied study vision pictures --data DATA --out STUDY --split test_unseen
+
+A run is a folder of the study that goes on where it stopped. Readers are fitted on training houses, in the pictures
+that the encoder learned from.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import statistics
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from agents.imitation.loop import Note
+from agents.imitation.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
+from agents.vision.config import VisionConfig
+from agents.vision.drawn import StripSource, houses_of
+from agents.vision.encoder import Encoder
+from agents.vision.labels import HouseStrips
+from agents.vision.probe import read
+from agents.vision.reading import as_numbers, labelled
+from agents.vision.run import taught, training_houses
+from assets.cache import write_json
+from embodied.datasets.store import Dataset
+from embodied.evaluation.tables import Estimate, across_seeds
+from embodied.locks import locked
+from embodied.records import read_json
+
+ENCODERS: Mapping[str, Mapping[str, Any]] = {
+    "compact": {"network": "compact"},
+    "keen": {"network": "keen"},
+    "lite0, frozen": {"network": "lite0", "begin": "imagenet", "frozen": True},
+    "lite0, fine-tuned": {"network": "lite0", "begin": "imagenet"},
+}
+"""What differs from the chosen settings, by encoder."""
+COLUMNS: Mapping[str, tuple[str, int, float]] = {
+    "mean_ap": ("AP", 3, 1),
+    "room_accuracy": ("room, %", 1, 100),
+    "depth_r2": ("depth, R²", 3, 1),
+    "place_auc": ("place, AUC", 3, 1),
+    "milliseconds": ("ms a node", 1, 1),
+    "megabytes": ("MB", 1, 1),
+}
+"""A number of a reading: its heading, digits and scale."""
+PICTURES = ("unlit", "fast", "normal", "glossy", "reference")
+STUDIES = ("encoders", "pictures")
+STRIPS = 8
+"""Strips at once when an encoder's price is measured."""
+
+
+@dataclass(frozen=True)
+class EncoderStudySetting:
+    """What all encoders of a study share."""
+
+    source: StripSource
+    out: Path
+    config: VisionConfig
+    """Where the encoders start from; its seed is the first one."""
+    seeds: int = 1
+    """Encoders of each kind."""
+    split: str = "val_unseen"
+    """Whose houses they are judged on; choose on validation houses."""
+    threads: int = 1
+    """Of PyTorch, per encoder."""
+
+    def folder(self, encoder: str, seed: int) -> Path:
+        return self.out / encoder.replace(",", "").replace(" ", "_") / f"seed_{seed}"
+
+    def reading(self, encoder: str, seed: int, quality: str | None = None) -> Path:
+        """Where the numbers are that an encoder reaches on pictures drawn so."""
+        return self.folder(encoder, seed) / f"reading_{self.split}{'_' + quality if quality else ''}.json"
+
+    def repeats(self) -> range:
+        return range(self.config.seed, self.config.seed + self.seeds)
+
+
+def run_study(
+    setting: EncoderStudySetting,
+    names: Sequence[str],
+    *,
+    rows: Sequence[str] | None = None,
+    pictures: Sequence[str] = PICTURES,
+    workers: int = 1,
+    note: Note = print,
+) -> dict[str, Path]:
+    """Train and judge what is missing and write the tables; returns the Markdown files.
+
+    Args:
+      rows: train and judge these encoders only.
+      pictures: qualities that 'pictures' judges on.
+
+    Raises:
+      ValueError: an unknown table or encoder.
+    """
+    refuse_unknown(names, STUDIES)
+    refuse_unknown(rows or (), ENCODERS)
+    data, ways = Dataset(setting.source.data), tuple(pictures) if "pictures" in names else ()
+    for quality in (None, *ways):  # drawn before encoders share the cores
+        houses = houses_of(data, (setting.split,))
+        source = dataclasses.replace(setting.source, quality=quality or setting.source.quality)
+        source.strips(houses + (training_houses(data, setting.config) if quality is None else []), workers=workers)
+    work = functools.partial(_run, setting, ways, note)
+    run_all(rows or ENCODERS, setting.repeats(), work, workers=workers, note=note)
+    writers = {"encoders": lambda: _encoders(setting), "pictures": lambda: _pictures(setting, ways)}
+    return {name: writers[name]() for name in names}
+
+
+def _run(setting: EncoderStudySetting, ways: Sequence[str], note: Note, seed: int, name: str) -> str:
+    """Train one encoder and judge it, unless that is done."""
+    torch.set_num_threads(setting.threads)
+    data, folder = Dataset(setting.source.data), setting.folder(name, seed)
+    config = dataclasses.replace(setting.config, seed=seed, **ENCODERS[name])
+    missing = [q for q in (None, *ways) if not setting.reading(name, seed, q).exists()]
+    if not missing:
+        return f"{name}, seed {seed}: done before"
+    with locked(folder):
+        seen = setting.source.strips(training_houses(data, config))
+        encoder, classes = taught(seen, config, folder, lambda line: note(f"{name}, seed {seed}: {line}"))
+        known = labelled(data, seen, encoder, classes)
+        for quality in missing:
+            source = dataclasses.replace(setting.source, quality=quality or setting.source.quality)
+            unseen = source.strips(houses_of(data, (setting.split,)))
+            numbers = as_numbers(read(known, labelled(data, unseen, encoder, classes), seed=seed), classes)
+            facts = {"milliseconds": price(encoder, unseen), "megabytes": _megabytes(folder), "houses": len(unseen)}
+            write_json(setting.reading(name, seed, quality), numbers | facts | {"strips": len(known.room)}, indent=1)
+    return f"{name}, seed {seed}: trained and judged"
+
+
+def price(encoder: Encoder, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
+    """Milliseconds of processor time per viewpoint, the median of some looks at several strips."""
+    strips, times = houses[0].rgb[:STRIPS], []
+    for _ in range(rounds + 1):
+        began = time.process_time()
+        encoder.encode_strips(strips)
+        times.append((time.process_time() - began) / len(strips) * 1000)
+    return statistics.median(times[1:])
+
+
+def _megabytes(folder: Path) -> float:
+    return (folder / "encoder.safetensors").stat().st_size / 1e6
+
+
+def _encoders(setting: EncoderStudySetting) -> Path:
+    judged = {name: _judged(setting, name, None) for name in ENCODERS}
+    lines = table(_heads("encoder"), [_cells(setting, name, None) for name, seeds in judged.items() if seeds])
+    return write_markdown(
+        setting.out / "table_encoders.md",
+        "Encoders: what linear readers make of them",
+        lines,
+        _made_with(setting, judged, None),
+        [name for name, seeds in judged.items() if not seeds],
+    )
+
+
+def _pictures(setting: EncoderStudySetting, ways: Sequence[str]) -> Path:
+    rows, missing = [], []
+    for name in ENCODERS:
+        for quality in ways:
+            if _judged(setting, name, quality):
+                rows.append([f"{name}, {quality}", *_cells(setting, name, quality)[1:]])
+            elif _judged(setting, name, None):
+                missing.append(f"{name} on {quality}")
+    judged = {name: _judged(setting, name, None) for name in ENCODERS}
+    how = _made_with(setting, judged, None) + " Readers were fitted in the pictures that the encoders learned from."
+    return write_markdown(
+        setting.out / "table_pictures.md",
+        "Encoders, judged on other pictures",
+        table(_heads("encoder, pictures"), rows),
+        how,
+        missing,
+    )
+
+
+def _heads(first: str) -> list[str]:
+    return [first, "seeds", *(heading for heading, _, _ in COLUMNS.values())]
+
+
+def _cells(setting: EncoderStudySetting, name: str, quality: str | None) -> list[str]:
+    seeds = _judged(setting, name, quality)
+    found = [read_json(setting.reading(name, seed, quality)) for seed in seeds]
+    cells = [name, str(len(seeds))]
+    for column, (_, digits, scale) in COLUMNS.items():
+        values = [float(body[column]) for body in found]
+        one = Estimate(values[0], math.nan, 1) if len(values) == 1 else across_seeds(values)
+        cells.append(shown(one, digits, scale))
+    return cells
+
+
+def _judged(setting: EncoderStudySetting, name: str, quality: str | None) -> list[int]:
+    """The seeds of an encoder that were judged on such pictures."""
+    return seeds_with(setting.repeats(), lambda seed: setting.reading(name, seed, quality).exists())
+
+
+def _made_with(setting: EncoderStudySetting, judged: Mapping[str, Sequence[int]], quality: str | None) -> str:
+    """The sentences below a table."""
+    first = next(((name, seeds[0]) for name, seeds in judged.items() if seeds), None)
+    if first is None:
+        return "No encoder was trained."
+    body = read_json(setting.reading(*first, quality))
+    return (
+        f"Readers fitted on {body['strips']} strips of training houses, judged on {body['nodes']} viewpoints of "
+        f"{body['houses']} lightings of houses of {setting.split}; AP over {body['classes']} classes (chance "
+        f"{body['chance_ap']:.3f}), the commonest room {100 * body['common_room']:.0f} %. {setting.config.epochs} "
+        "passes. Mean and Student's 95 % interval over training seeds, where there are several; prices in processor "
+        "time of one core."
+    )

@@ -1,0 +1,73 @@
+"""Every network that an encoder may be, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from agents.vision.lite import LiteBody, imagenet_weights
+from agents.vision.network import Network
+from agents.vision.resnet import ARCHITECTURES, ResNet
+
+
+@dataclass(frozen=True)
+class Design:
+    """A body, and what is done with its map."""
+
+    body: str
+    """'lite0' or a key of resnet.ARCHITECTURES."""
+    neck: int = 0
+    """Channels that a 1x1 convolution makes of the body's; 0: the map is the body's."""
+    peaks: int = 0
+    """So many of them are the largest of what a view shows: small things drown in a mean."""
+
+
+DESIGNS: Mapping[str, Design] = {
+    "compact": Design("compact"),
+    "keen": Design("compact", 256, 128),
+    "lite0": Design("lite0", 256, 128),
+    **{name: Design(name) for name in ARCHITECTURES if name.startswith("resnet")},
+}
+
+
+class Necked(Network):
+    """A body whose map a 1x1 convolution mixes."""
+
+    def __init__(self, body: Network, size: int, peaks: int) -> None:
+        super().__init__()
+        self.size, self.stride, self.peaks = size, body.stride, peaks
+        self.mean, self.deviation = body.mean, body.deviation
+        self.body = body
+        self.neck = nn.Conv2d(body.size, size, 1, bias=False)
+        self.norm = nn.BatchNorm2d(size)
+
+    def feature_map(self, images: Tensor) -> Tensor:
+        return F.relu(self.norm(self.neck(self.body.feature_map(images))))
+
+
+def build(name: str) -> Network:
+    """The network `name` with random weights."""
+    design = DESIGNS[name]
+    body = LiteBody() if design.body == "lite0" else ResNet(ARCHITECTURES[design.body])
+    return Necked(body, design.neck, design.peaks) if design.neck else body
+
+
+def body_of(network: Network) -> Network:
+    """The network without its neck."""
+    return network.body if isinstance(network, Necked) else network
+
+
+def begin_as_imagenet(network: Network) -> None:
+    """Put what ImageNet taught into the body of a network 'lite0'.
+
+    Raises:
+      ValueError: no other network's weights come in a package.
+      UnableError: the package is not installed.
+    """
+    body = body_of(network)
+    if not isinstance(body, LiteBody):
+        raise ValueError("only 'lite0' can begin with ImageNet weights, which come in a package; use network 'lite0'")
+    body.load_state_dict(imagenet_weights())

@@ -1,0 +1,99 @@
+"""The pictures of a data set's houses as encoders look at them: how they are drawn, and strips with labels."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import joblib
+
+from agents.vision.config import PLAIN, drawing
+from agents.vision.labels import HouseStrips, all_classes, look
+from assets.catalogue import load_catalogue
+from embodied.datasets.store import Dataset
+from embodied.house.house import House
+from embodied.light import bake_all, lightings_of
+from embodied.render.pictures import PictureSettings
+from embodied.world import World, open_world
+
+
+def houses_of(data: Dataset, splits: Sequence[str]) -> list[str]:
+    """Names of the houses of several splits, each once."""
+    return list(dict.fromkeys(n for s in splits for n in data.names(s)))
+
+
+def pictures_of(data: Dataset, name: str, quality: str | None = None) -> PictureSettings:
+    """How the pictures of a house are drawn that features are made from.
+
+    Args:
+      quality: None takes the panoramas that the data set holds, and plain ones where it holds none.
+    """
+    drawn = data.drawn_pictures(name)
+    if drawn is None or quality not in (None, drawn.quality):
+        return dataclasses.replace(PLAIN, quality=quality or PLAIN.quality)
+    return drawn
+
+
+def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings) -> World:
+    """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone."""
+    place, catalogue = data.place(name), load_catalogue(cache)
+    if pictures == data.drawn_pictures(name):
+        return data.open_world(name, catalogue, cache, pictures)
+    return open_world(place.house, catalogue, cache, pictures, graph=place.graph)
+
+
+@dataclass(frozen=True)
+class StripSource:
+    """The strips of a data set's houses, drawn so, kept in a folder."""
+
+    data: Path
+    """Folder of the data set."""
+    folder: Path
+    cache: Path
+    quality: str | None = None
+    """As `pictures_of` takes it."""
+    lights: int = 1
+    """Lightings that every house is seen in; the first is its own."""
+
+    def strips(
+        self, names: Sequence[str], *, workers: int = 1, note: Callable[[str], None] = print
+    ) -> list[HouseStrips]:
+        """The strips of houses, those of one house's lightings together, drawn where they are missing.
+
+        Raises:
+          ValueError: several lightings of pictures without light.
+        """
+        data = Dataset(self.data)
+        missing = [n for n in names if not all(p.exists() for p in self._paths(data, n))]
+        jobs = (joblib.delayed(self._draw)(n) for n in missing)
+        for name in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+            note(f"drawn: {name}")
+        return [HouseStrips.load(p) for n in names for p in self._paths(data, n)]
+
+    def _paths(self, data: Dataset, name: str) -> list[Path]:
+        """Where the strips of a house are, in its own light and in others."""
+        folder = self.folder / drawing(pictures_of(data, name, self.quality))
+        return [folder / (f"{name}@{k}.npz" if k else f"{name}.npz") for k in range(self.lights)]
+
+    def _draw(self, name: str) -> str:
+        data = Dataset(self.data)
+        place, pictures, catalogue = data.place(name), pictures_of(data, name, self.quality), load_catalogue(self.cache)
+        lightings = lightings_of(place.house, self.lights)
+        if self.lights > 1:
+            if pictures.lit_by is None:
+                raise ValueError(
+                    f"{self.lights} lightings want pictures with light, not {pictures.quality!r}: say --quality fast"
+                )
+            bake_all(lightings, catalogue, self.cache, pictures.lit_by)  # together, which costs less
+        for k, path in enumerate(self._paths(data, name)):
+            if not path.exists():
+                with self._world(data, name, lightings[k] if k else None, pictures) as world:
+                    look(world, all_classes(catalogue)).save(path)
+        return name
+
+    def _world(self, data: Dataset, name: str, lit: House | None, pictures: PictureSettings) -> World:
+        if lit is None:
+            return drawn_world(data, name, self.cache, pictures)
+        return open_world(lit, load_catalogue(self.cache), self.cache, pictures, graph=data.place(name).graph)

@@ -1,0 +1,48 @@
+"""What linear readers make of an encoder's features of a data set's houses."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from agents.vision.encoder import Encoder
+from agents.vision.labels import HouseStrips, mean_log_depth_of_views, visible_in_views
+from agents.vision.probe import Labelled, ReadingScores
+from agents.vision.strip import view_of_strip
+from embodied.datasets.store import Dataset
+from embodied.interface import VIEWS
+
+
+def labelled(
+    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str], *, alone: bool = False
+) -> Labelled:
+    """Features of houses and what a linear reader should read from them.
+
+    Args:
+      alone: the network looks at each of the 36 views by itself, four times the work, instead of
+        once at the strip that they overlap in.
+    """
+    columns = [houses[0].classes.index(c) for c in classes]
+    encode = encoder.encode_strips
+    if alone:
+        encode = lambda strips: encoder.encode_views(
+            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips])
+        )
+    features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
+    return Labelled(
+        np.concatenate(features),
+        np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
+        np.concatenate([h.room for h in houses]).astype(np.int64),
+        np.concatenate([mean_log_depth_of_views(h.log_depth) for h in houses]),
+        np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
+        np.concatenate([data.place(h.name).graph.positions for h in houses]),
+    )
+
+
+def as_numbers(reading: ReadingScores, classes: Sequence[str]) -> dict[str, Any]:
+    """A reading for JSON."""
+    numbers = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
+    return numbers | {"ap by class": dict(zip(classes, reading.ap, strict=True))}
