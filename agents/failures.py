@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.hanna.agent import HannaAgent
-from agents.hanna.asking import RULES
+from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_with
 from agents.hanna.policy import PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
@@ -37,6 +37,21 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
         "learned, target image only": dataclasses.replace(learned, read_assistance=False, _encoded={}),
         "learned, perfect interpretation": PerfectInterpretation(learned),
     }
+
+
+PRICED: Mapping[str, Mapping[str, HannaAskRule]] = {
+    "learned": {f"learned, above {x:g}": ask_above(x) for x in (0.9, 0.75, 0.5, 0.35, 0.2, 0.1)},
+    "every k steps": {f"learned, every {k}": ask_every(k) for k in (20, 12, 8, 5, 3, 2)},
+    "at random": {f"learned, with {p:g}": ask_with(p) for p in (0.03, 0.06, 0.12, 0.2, 0.35, 0.6)},
+}
+"""Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
+
+
+def priced_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+    """A learned agent that asks by each rule of PRICED."""
+    learned = agent.policy(bank)
+    rules = {name: rule for kind in PRICED.values() for name, rule in kind.items()}
+    return {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,34 @@ def houses_figure(curves: Mapping[str, Sequence[tuple[int, Estimate]]], path: Pa
     _save(figure, path)
 
 
+def requests_curves(curves: Mapping[str, Sequence[tuple[Estimate, Estimate]]], path: Path) -> None:
+    """Success against requests per task with 95 % intervals, one curve per kind of rule.
+
+    Args:
+      curves: kind of rule to (requests, success) of each of its settings.
+    """
+    figure = Figure(figsize=(5, 3.4), layout="constrained")
+    axes = figure.subplots()
+    for kind, points in curves.items():
+        axes.errorbar(
+            [r.mean for r, _ in points],
+            [100 * s.mean for _, s in points],
+            [100 * s.half for _, s in points],
+            [r.half for r, _ in points],
+            marker="o",
+            markersize=4,
+            capsize=2,
+            label=kind,
+        )
+    axes.set_xlabel("requests per task")
+    axes.set_ylabel("success (%)")
+    axes.set_xlim(left=0)
+    axes.set_ylim(0, 100)
+    axes.legend()
+    axes.grid(alpha=0.3)
+    _save(figure, path)
+
+
 def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path: Path) -> None:
     """Validation success and requests against updates, one curve per agent.
 

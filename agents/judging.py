@@ -15,7 +15,8 @@ from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent
 from agents.imitation.lessons import split_of
 from agents.vision.config import Looked
-from agents.vision.run import encoder_of, pictures_of
+from agents.vision.drawn import pictures_of
+from agents.vision.run import encoder_of
 from assets.cache import digest, write_json
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning

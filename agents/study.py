@@ -18,9 +18,9 @@ from typing import Any
 import joblib
 import torch
 
-from agents.failures import hanna_policies
-from agents.figures import conditions_figure, curves_figure, houses_figure, requests_figure
-from agents.hanna.agent import HannaAgent, load_agent
+from agents.failures import PRICED, hanna_policies, priced_policies
+from agents.figures import conditions_figure, curves_figure, houses_figure, requests_curves, requests_figure
+from agents.hanna.agent import load_agent
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import TrainingConfig
 from agents.imitation.lessons import Lessons, split_of
@@ -32,9 +32,10 @@ from assets.cache import write_bytes, write_json
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
-from embodied.evaluation.tables import Row, save, shown
+from embodied.evaluation.tables import Estimate, Row, difference, row, save, shown
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
+from embodied.navigation.graph import NavGraph
 from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
@@ -53,8 +54,12 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "8 houses": {"training_houses": 8},
     "32 houses": {"training_houses": 32},
     "128 houses": {"training_houses": 128},
+    "half curiosity": {"alpha": 0.5},
+    "no curiosity, no conditions": {"alpha": 0.0, "predict_reasons": False},
 }
-"""What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note)."""
+"""What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note). The last two
+are in no printed row: learned asking with the alpha of heuristic askers, and our model without what the LSTM lacks, so
+that agents that are compared differ in one thing."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,8 @@ class Table:
     splits: tuple[str, ...]
     columns: tuple[str, ...]
     lines: tuple[Line, ...]
+    compared: tuple[tuple[str, str], ...] = ()
+    """Pairs of VARIANTS that differ in one thing, whose difference is told task by task."""
 
 
 def _line(label: str, variant: str, played: str = "learned", **printed: Sequence[float]) -> Line:
@@ -89,6 +96,8 @@ def _line(label: str, variant: str, played: str = "learned", **printed: Sequence
 
 
 TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
+COMPARED = ("success", "requests")
+"""What pairs of agents are compared by."""
 FULL = ("success", "spl", "navigation error", "requests")
 TABLES: Mapping[str, Table] = {
     "4.3": Table(
@@ -152,6 +161,7 @@ TABLES: Mapping[str, Table] = {
             _line("Target image only", "target image only", success=(84.29, 29.91)),
             _line("+ language instruction", "final", success=(86.67, 45.43)),
         ),
+        (("final", "target image only"),),
     ),
     "4.5": Table(
         "Help-request policies",
@@ -163,6 +173,7 @@ TABLES: Mapping[str, Table] = {
             _line("Ask every 5", "ask every 5", success=(86.63, 33.62), requests=(3.5, 7.1)),
             _line("Learned", "final", success=(86.67, 45.43), requests=(2.7, 4.4)),
         ),
+        (("half curiosity", "no ask"), ("half curiosity", "random ask"), ("half curiosity", "ask every 5")),
     ),
     "4.6": Table(
         "Model and curiosity",
@@ -179,6 +190,7 @@ TABLES: Mapping[str, Table] = {
             ),
             _line("Our model, alpha = 1", "final", success=(45.43,), mistake_repeat=(20.53,), request_repeat=(10.80,)),
         ),
+        (("no curiosity, no conditions", "lstm"), ("final", "no curiosity")),
     ),
     "D.2": Table(
         "Ablations",
@@ -226,12 +238,19 @@ TABLES: Mapping[str, Table] = {
                 requests=(2.0, 7.7),
             ),
         ),
+        tuple(("final", other) for other in ("no reset", "no conditions", "no similarity", "no curiosity")),
     ),
     "houses": Table(
         "Success and the number of training houses (no counterpart in the dissertation)",
         TEST,
         FULL,
         (*(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)), _line("all houses", "final")),
+    ),
+    "requests": Table(
+        "Success and the number of requests (no counterpart in the dissertation)",
+        ("test_unseen",),
+        ("success", "spl", "requests"),
+        tuple(_line(name.removeprefix("learned, "), "final", name) for kind in PRICED.values() for name in kind),
     ),
 }
 """The studies by name. D.2 is on the validation splits, as in the dissertation."""
@@ -253,12 +272,21 @@ class StudySetting:
     device: str = "cpu"
     threads: int = 1
     """Of PyTorch, per agent in training."""
+    quality: str | None = None
+    """Of the pictures that features come from; as the data set holds them where not given."""
+    seeds: int = 1
+    """Agents per row, from the seed of `config` on."""
 
-    def config_of(self, variant: str) -> TrainingConfig:
-        return dataclasses.replace(self.config, **VARIANTS[variant])
+    def config_of(self, variant: str, seed: int | None = None) -> TrainingConfig:
+        return dataclasses.replace(self.config, seed=self.config.seed if seed is None else seed, **VARIANTS[variant])
 
-    def folder_of(self, variant: str) -> Path:
-        return self.out / "agents" / variant.replace(" ", "_")
+    def folder_of(self, variant: str, seed: int | None = None) -> Path:
+        name = variant.replace(",", "").replace(" ", "_")
+        return self.out / "agents" / name / f"seed_{self.config.seed if seed is None else seed}"
+
+    def repeats(self) -> range:
+        """Training seeds."""
+        return range(self.config.seed, self.config.seed + self.seeds)
 
 
 def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
@@ -277,7 +305,12 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
     data = dataset_of(setting.data, "hanna")
     tables = {n: _possible(TABLES[n], setting, len(data.names("train"))) for n in names}
     wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
-    jobs = (joblib.delayed(_train)(setting, v, note if workers == 1 else None) for v in wanted)
+    wanted |= dict.fromkeys(name for table in tables.values() for pair in table.compared for name in pair)
+    jobs = (
+        joblib.delayed(_train)(setting, v, seed, note if workers == 1 else None)
+        for seed in setting.repeats()
+        for v in wanted
+    )
     with locked(setting.out):
         for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
             note(line)
@@ -294,18 +327,19 @@ def _possible(table: Table, setting: StudySetting, houses: int) -> Table:
     return dataclasses.replace(table, lines=fewer)
 
 
-def _train(setting: StudySetting, variant: str, note: Note | None) -> str:
+def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> str:
     torch.set_num_threads(setting.threads)
-    data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant)
-    config = setting.config_of(variant)
+    data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant, seed)
+    config = setting.config_of(variant, seed)
     with contextlib.ExitStack() as stack:
         if note is None:
             folder.mkdir(parents=True, exist_ok=True)
             log = stack.enter_context(open(folder / "log.txt", "a", buffering=1, encoding="utf-8"))
             note = lambda line: print(line, file=log)
-        progress = train_agent(Lessons(data, encoder, device=setting.device), config, folder, note=note)
+        lessons = Lessons(data, encoder, setting.quality, device=setting.device)
+        progress = train_agent(lessons, config, folder, note=note)
     best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
-    return f"{variant}: {progress.update} updates, {best}"
+    return f"{variant}, seed {seed}: {progress.update} updates, {best}"
 
 
 def _validations(folder: Path) -> list[dict[str, float]]:
@@ -320,44 +354,60 @@ def _validations(folder: Path) -> list[dict[str, float]]:
 
 
 class _Judge:
-    """Plays each (agent, split) once, however many tables ask for it."""
+    """Plays each (agent, split) once, with all of its training seeds, however many tables ask for it."""
 
     def __init__(self, setting: StudySetting, data: Dataset, note: Note) -> None:
         self.setting, self.data, self.note = setting, data, note
         self.encoder: Encoder = load_encoder(setting.encoder)
         self.behaviour: dict[tuple[str, str], dict] = {}
-        self._agents: dict[str, HannaAgent] = {}
         self._banks: dict[str, FeatureBank] = {}
-        self._rows: dict[tuple[str, str], Row] = {}
+        self._episodes: dict[tuple[str, str], list[Episode]] = {}
 
     def row(self, line: Line, split: str) -> Row:
-        if (line.key, split) not in self._rows:
+        episodes = self.episodes(line, split)
+        return row(line.key, split, episodes, self._graphs(split), seed=self.setting.seed)
 
-            def keep(name: str, episodes: Sequence[Episode]) -> None:
-                save_lines(self.setting.out / "episodes" / episodes_file(split, line.key), episodes)
-                if line.variant and line.played == "learned":
-                    self.behaviour[line.key, split] = about(episodes, self.data.places(split))
+    def difference(self, first: str, second: str, split: str, column: str) -> Estimate:
+        """How far agent `first` lies above `second`, task by task."""
+        pair = [self.episodes(Line(name, name), split) for name in (first, second)]
+        return difference(pair[0], pair[1], column, self._graphs(split))
 
-            (row,) = evaluate(
-                self.data.split(split),
-                {line.key: self._policy(line, split)},
-                seed=self.setting.seed,
-                limit=self.setting.tasks,
-                batch=32,
-                keep=keep,
-            )
-            self._rows[line.key, split] = row
-            self.note(f"{line.key} on {split}: success {shown('success', row.values['success'])} %")
-        return self._rows[line.key, split]
+    def episodes(self, line: Line, split: str) -> list[Episode]:
+        """Those of all training seeds, one seed after the other."""
+        if (line.key, split) not in self._episodes:
+            seeds = self.setting.repeats() if line.variant else [self.setting.config.seed]
+            found = [e for seed in seeds for e in self._played(line, split, seed)]
+            save_lines(self.setting.out / "episodes" / episodes_file(split, line.key), found)
+            if line.variant and line.played == "learned":
+                self.behaviour[line.key, split] = about(found, self.data.places(split))
+            self._episodes[line.key, split] = found
+            success = self.row(line, split).values["success"]
+            self.note(f"{line.key} on {split}: success {shown('success', success)} %")
+        return self._episodes[line.key, split]
 
-    def _policy(self, line: Line, split: str) -> Agent:
+    def _played(self, line: Line, split: str, seed: int) -> list[Episode]:
+        out: list[Episode] = []
+        evaluate(
+            self.data.split(split),
+            {line.key: self._policy(line, split, seed)},
+            seed=self.setting.seed,
+            limit=self.setting.tasks,
+            batch=32,
+            keep=lambda name, episodes: out.extend(episodes),
+        )
+        return out
+
+    def _graphs(self, split: str) -> dict[str, NavGraph]:
+        return {name: place.graph for name, place in self.data.places(split).items()}
+
+    def _policy(self, line: Line, split: str, seed: int) -> Agent:
         if not line.variant:
             return agent_without_learning("hanna", line.played)
-        if line.variant not in self._agents:
-            self._agents[line.variant] = load_agent(self.setting.folder_of(line.variant) / "best.safetensors")
+        agent = load_agent(self.setting.folder_of(line.variant, seed) / "best.safetensors")
         if split not in self._banks:
-            self._banks[split] = split_of(self.data, split, self.encoder).bank
-        return hanna_policies(self._agents[line.variant], self._banks[split])[line.played]
+            self._banks[split] = split_of(self.data, split, self.encoder, quality=self.setting.quality).bank
+        bank = self._banks[split]
+        return {**hanna_policies(agent, bank), **priced_policies(agent, bank)}[line.played]
 
 
 def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Path:
@@ -370,13 +420,19 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
     stem = f"table_{name}"
     save(rows, setting.out, stem)
     path = setting.out / f"{stem}.md"
-    write_bytes(path, side_by_side(setting, name, table, rows).encode())
+    write_bytes(path, side_by_side(setting, name, table, rows, judged).encode())
     if name == "4.5":
         line, split = table.lines[-1], "test_unseen"
         behaviour = judged.behaviour[line.key, split]
         write_json(setting.out / "behaviour.json", behaviour, indent=1)
         requests_figure(behaviour, setting.out / "figure_D.1.png")
         conditions_figure(behaviour, setting.out / "figure_D.2.png")
+    if name == "requests":
+        by = {line.played: r.values for line, r in zip(table.lines, rows, strict=False)}
+        requests_curves(
+            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules] for kind, rules in PRICED.items()},
+            setting.out / "figure_requests.png",
+        )
     if name == "houses":
         there = len(judged.data.names("train"))
         counts = [setting.config_of(line.variant).training_houses or there for line in table.lines]
@@ -390,18 +446,28 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
     return path
 
 
-def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row]) -> str:
+def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row], judged: _Judge) -> str:
     """The table with the dissertation's numbers in brackets, and what it was made with."""
     by = {(r.agent, r.split): r for r in rows}
     first = {r.split: r for r in rows}
-    counts = "; ".join(f"{s}: {first[s].episodes} episodes in {first[s].houses} houses" for s in table.splits)
+    tasks = {s: len({e.task.id for e in judged.episodes(table.lines[0], s)}) for s in table.splits}
+    counts = "; ".join(f"{s}: {tasks[s]} tasks in {first[s].houses} houses" for s in table.splits)
     c = setting.config
     how = (
-        f"{counts}. Mean and 95 % interval clustered by house; in brackets the dissertation's numbers. "
-        f"Trained {c.iterations} updates of {c.batch} episodes, seed {c.seed}; judged with seed {setting.seed}, "
-        f"temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per cent."
+        f"{counts}. Mean and 95 % interval clustered by house{' and training seed' if setting.seeds > 1 else ''}; in "
+        f"brackets the dissertation's numbers. Trained {c.iterations} updates of {c.batch} episodes, "
+        f"{'seeds' if setting.seeds > 1 else 'seed'} {', '.join(map(str, setting.repeats()))}; judged with seed "
+        f"{setting.seed}, temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per "
+        "cent."
     )
-    title = f"{name}: {table.title}" if name == "houses" else f"Table {name}: {table.title}"
+    title = f"{name}: {table.title}" if name in ("houses", "requests") else f"Table {name}: {table.title}"
     lines = [(line.label, line.printed) for line in table.lines]
     value = lambda label, split, column: by[label, split].values[column]
-    return beside(title, table.splits, table.columns, lines, value, how)
+    pairs = [
+        f"- {first} less {second}, {split}: "
+        + ", ".join(f"{column} {shown(column, judged.difference(first, second, split, column))}" for column in COMPARED)
+        for first, second in table.compared
+        for split in table.splits
+    ]
+    told = ["", "Task by task, between agents that differ in one thing:", "", *pairs, ""] if pairs else []
+    return beside(title, table.splits, table.columns, lines, value, how) + "\n".join(told)

@@ -57,7 +57,7 @@ ARROWS = """
 assets.rows <-
 assets.materials <- assets.closure assets.rows
 assets.built <- assets.materials assets.rows
-assets.importing <- assets.rows
+assets.importing <- assets.materials assets.rows
 assets.catalogue <- assets.materials assets.rows assets.built assets.importing
 assets.attribution <- assets.rows assets.catalogue
 embodied.gl <-
@@ -70,7 +70,8 @@ embodied.interface <- assets.catalogue embodied.house embodied.navigation
 embodied.action_spaces <- embodied.navigation embodied.interface
 embodied.language <- assets.catalogue embodied.interface
 embodied.records <- embodied.interface
-embodied.render <- embodied.gl assets.catalogue embodied.house embodied.navigation embodied.scene embodied.interface
+embodied.render <- embodied.gl assets.catalogue assets.materials embodied.house embodied.navigation embodied.scene
+    embodied.interface
 embodied.light <- assets.catalogue embodied.house embodied.scene embodied.render
 embodied.mattersim <- embodied.render
 embodied.teachers <- embodied.navigation embodied.interface embodied.action_spaces
@@ -97,35 +98,40 @@ embodied.cli <- agents.shipped embodied.locks embodied.gl viz.sinks agents.imita
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
     embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.iliad agents.failures
-    agents.judging agents.study
+    agents.judging agents.study agents.encoder_study
 embodied.__main__ <- embodied.cli
 agents.shipped <-
 agents.device <-
 agents.tensor_file <-
-agents.imitation <- agents.device agents.tensor_file agents.vision embodied.interface embodied.records embodied.locks
-    embodied.envs embodied.datasets embodied.evaluation
+agents.checkpoint_file <-
+agents.imitation <- agents.device agents.checkpoint_file agents.tensor_file agents.vision embodied.interface
+    embodied.records embodied.locks embodied.envs embodied.datasets embodied.evaluation
 agents.figures <- embodied.evaluation
 agents.tables <- embodied.evaluation
 agents.vision <- agents.shipped agents.device assets.catalogue embodied.house embodied.scene embodied.interface
-    embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file embodied.locks embodied.records
+    embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file
+    agents.checkpoint_file embodied.locks embodied.records
+agents.encoder_study <- agents.imitation agents.vision embodied.datasets embodied.evaluation embodied.locks
+    embodied.records
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.records
-agents.hari <- agents.imitation embodied.interface embodied.action_spaces embodied.records embodied.teachers
-    embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file agents.vision
-    embodied.render embodied.locks
+agents.hari <- agents.imitation agents.checkpoint_file embodied.interface embodied.action_spaces embodied.records
+    embodied.teachers embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
+    agents.vision embodied.render embodied.locks
 agents.iliad <- agents.imitation embodied.action_spaces embodied.assistants embodied.interface embodied.navigation
     embodied.teachers assets.catalogue embodied.language embodied.tasks embodied.envs embodied.datasets
     embodied.evaluation embodied.records agents.vision agents.hanna agents.tensor_file embodied.locks
-agents.bandit <- embodied.locks agents.imitation embodied.navigation embodied.interface embodied.records
-    embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
+agents.bandit <- embodied.locks agents.imitation agents.checkpoint_file embodied.navigation embodied.interface
+    embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
 agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface
     embodied.action_spaces embodied.language embodied.records embodied.teachers embodied.policies embodied.assistants
     embodied.envs embodied.datasets embodied.evaluation
 agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.vision agents.hanna
 agents.judging <- agents.imitation embodied.interface embodied.records embodied.datasets embodied.evaluation
     agents.vision agents.hanna agents.failures embodied.locks
-agents.study <- agents.imitation agents.tables embodied.interface embodied.records embodied.datasets
-    embodied.evaluation agents.figures agents.vision agents.hanna agents.failures agents.judging embodied.locks
+agents.study <- embodied.navigation agents.imitation agents.tables embodied.interface embodied.records
+    embodied.datasets embodied.evaluation agents.figures agents.vision agents.hanna agents.failures agents.judging
+    embodied.locks
 viz.sinks <-
 viz.house3d <- embodied.scene
 viz.blueprint <- embodied.house embodied.interface embodied.render

@@ -26,11 +26,11 @@ from agents.bandit.navigation import (
 from agents.bandit.navigation_study import NavigationSetting, gain, raters, rise, run_navigation_study, run_raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
+from agents.checkpoint_file import CheckpointError, read_checkpoint
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
 from agents.hanna.training_config import SCALES
 from agents.hanna.vocabulary import build_vocabulary
 from agents.imitation.actor_critic import advantages
-from agents.imitation.checkpoint import CheckpointError, read_checkpoint
 from agents.imitation.lessons import Split
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves

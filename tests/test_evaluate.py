@@ -32,6 +32,15 @@ def test_few_houses_widen_the_interval_as_students_t_does():
     assert e.half == pytest.approx(2.093024 * math.sqrt(20 / 19 * 20 / 4) / 20)
 
 
+def test_houses_and_training_seeds_both_widen_the_interval():
+    """Two houses in two seeds, one success of four: each clustering has a variance of 1/16, their crossing, too;
+    1/16 + 1/16 - 1/16 with (2/16)^2 / (1/16^2 + 1/16^2) = 2 degrees of freedom, Student's t 4.302653."""
+    e = tables.estimate([1, 0, 0, 0], ["a", "b", "a", "b"], [0, 0, 1, 1])
+    assert e.mean == 0.25 and e.half == pytest.approx(4.302653 * 0.25)
+    alike = tables.estimate([1, 0, 1, 0], ["a", "b", "a", "b"], [0, 0, 1, 1])
+    assert alike.half == pytest.approx(tables.estimate([1, 0, 1, 0], ["a", "b", "a", "b"]).half), "seeds that agree"
+
+
 def test_missing_values_do_not_count():
     e = tables.estimate([1.0, float("nan")], ["a", "b"])
     assert (e.mean, e.n) == (1.0, 1)

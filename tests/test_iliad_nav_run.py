@@ -10,6 +10,7 @@ import pytest
 import torch
 from hand_data import build, small_house
 
+from agents.checkpoint_file import CheckpointError
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.network import Follower
@@ -20,7 +21,6 @@ from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import NavWorld, walk_along
 from agents.iliad.study import IliadStudySetting, report, run_study
 from agents.iliad.subjects import NavSubject
-from agents.imitation.checkpoint import CheckpointError
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features
 from embodied.cli import main

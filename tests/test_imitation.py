@@ -19,6 +19,7 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
+from agents.checkpoint_file import CheckpointError
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
@@ -35,7 +36,6 @@ from agents.hanna.policy import for_training
 from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
-from agents.imitation.checkpoint import CheckpointError
 from agents.imitation.choosing import choose_at, choose_likeliest, choose_sampled
 from agents.imitation.lessons import Split
 from agents.imitation.loop import Clock, TrainingError, as_good, falling_rate, tasks_of_update
@@ -200,11 +200,36 @@ def test_every_pass_of_training_takes_every_task_once():
 # Play --------------------------------------------------------------------------------------------
 
 
+def test_what_was_tried_at_a_place_weighs_less_there():
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, ask_rule="never"))
+    tasks = [dataclasses.replace(t, horizon=20) for t in split.tasks[::5]]
+
+    def repeated(again: float) -> int:
+        """Moves that were made before at the same place under the same words."""
+        policy = dataclasses.replace(agent.policy(split.bank), again=again)
+        policy.network.eval()
+        with torch.inference_mode():
+            played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
+        moves = lambda e: [
+            (s.pose.node, s.instruction, s.next_pose.node) for s in e.steps if isinstance(s.action, Move)
+        ]
+        return sum(len(moves(e)) - len(set(moves(e))) for e in played)
+
+    assert repeated(1.0) > 3 * repeated(0.2) and repeated(0.0) == 0
+    policy = dataclasses.replace(agent.policy(split.bank), again=0.5)
+    seen = split.make_env().reset(tasks[0])
+    (action,), memory = policy.act([seen], None, rngs=[np.random.default_rng(0)])
+    assert isinstance(action, Move)
+    weights = policy._fresh(seen, memory.tried[0])
+    assert weights[action.candidate + 1] == 0.5 and sorted(weights)[1:] == [1.0] * (len(weights) - 1)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("model", ["hanna", "lstm"])
-def test_an_episode_does_not_depend_on_the_batch_around_it(model):
+@pytest.mark.parametrize("model, again", [("hanna", 1.0), ("hanna", 0.3), ("lstm", 1.0)])
+def test_an_episode_does_not_depend_on_the_batch_around_it(model, again):
     split = setting(houses=2)
-    policy = agent_for(split, dataclasses.replace(TINY, model=model)).policy(split.bank)
+    policy = agent_for(split, dataclasses.replace(TINY, model=model, again=again)).policy(split.bank)
     policy.network.eval()
     policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)
     tasks = [dataclasses.replace(t, horizon=12) for t in split.tasks[::5]]

@@ -129,6 +129,10 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
         is looked_at(tmp_path).by("learned", "")
         is None
     )
+    old = {"looking": ["learned"], "pictures": {name: {"size": 8, "quality": "fast"}}}
+    (tmp_path / "run.json").write_text(json.dumps(old))
+    seen = looked_at(tmp_path).by("learned", name)
+    assert seen is not None and seen.shown_with == "matte", "runs that name no look are older than gloss"
 
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
@@ -176,9 +180,11 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     assert sorted(p.name for p in (study.out / "agents").iterdir()) == [
         "ask_every_5",
         "final",
+        "half_curiosity",
         "lstm",
         "no_ask",
         "no_curiosity",
+        "no_curiosity_no_conditions",
         "random_ask",
     ]
     settings = json.loads((study.folder_of("ask every 5") / "settings.json").read_text())
@@ -191,13 +197,44 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
         for a in ("No ask", "Random ask", "Ask every 5", "Learned")
     ]
     assert rows[0]["values"]["requests"]["mean"] == 0.0
-    assert "(86.67)" in table and "(45.43)" in table and "3 episodes in 1 houses" in table
+    assert "(86.67)" in table and "(45.43)" in table and "3 tasks in 1 houses" in table
+    assert "- half curiosity less no ask, test_unseen: success " in table
     assert "success test_ood" in table
     assert (study.out / "figure_D.1.png").stat().st_size > 5_000 and (study.out / "figure_D.2.png").exists()
     once = {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in ("final", "lstm")}
     again = run_study(study, ["4.6"], note=lines.append)
     assert again["4.6"].read_text() == written["4.6"].read_text()
     assert {v: (study.folder_of(v) / "validation.jsonl").read_text() for v in once} == once, "nothing was trained twice"
+
+
+def test_agents_that_are_compared_differ_in_one_setting(study):
+    settings = lambda name: dataclasses.asdict(study.config_of(name))
+    for table in module.TABLES.values():
+        for pair in table.compared:
+            a, b = map(settings, pair)
+            assert len([k for k in a if a[k] != b[k]]) == 1, pair
+
+
+def test_a_row_of_several_seeds_is_the_mean_of_their_agents(study):
+    several = dataclasses.replace(study, seeds=2)
+    written = run_study(several, ["4.4"])
+    assert (several.folder_of("final", 0) / "best.safetensors").exists()
+    assert (several.folder_of("final", 1) / "best.safetensors").exists()
+    rows = json.loads((several.out / "table_4.4.json").read_text())
+    learned = next(r for r in rows if r["agent"].startswith("+") and r["split"] == "test_unseen")
+    assert learned["episodes"] == 6 and "seeds 0, 1" in written["4.4"].read_text()
+
+
+def test_requests_are_bought_by_three_kinds_of_rule(study):
+    written = run_study(study, ["requests"])
+    rows = {
+        r["agent"]: r["values"]["requests"]["mean"] for r in json.loads((study.out / "table_requests.json").read_text())
+    }
+    assert len(rows) == 18 and rows["every 2"] > rows["every 20"] and rows["with 0.6"] > rows["with 0.03"]
+    assert (
+        rows["above 0.1"] >= rows["above 0.9"] and "requests: Success and the number" in written["requests"].read_text()
+    )
+    assert (study.out / "figure_requests.png").stat().st_size > 5_000
 
 
 def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):

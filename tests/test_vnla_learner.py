@@ -10,7 +10,7 @@ import pytest
 import torch
 from hand_vnla import TINY, lesson, split_under
 
-from agents.imitation.checkpoint import CheckpointError
+from agents.checkpoint_file import CheckpointError
 from agents.imitation.loop import Clock
 from agents.imitation.playing import play_remembering
 from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent

@@ -54,6 +54,7 @@ class HannaAgent:
             instruction_length=config.instruction_length,
             turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
+            again=config.again,
         )
 
 

@@ -43,6 +43,16 @@ def heuristic(rule: baselines.AskRule) -> HannaAskRule:
     return lambda probability, observation, last_asked, *, rng: rule(observation, last_asked, rng=rng)
 
 
+def ask_every(steps: int) -> HannaAskRule:
+    """Ask as soon as so many steps have passed since the last request."""
+    return lambda probability, observation, last_asked, *, rng: observation.time - last_asked >= steps
+
+
+def ask_with(share: float) -> HannaAskRule:
+    """Ask with this probability, whatever the network says."""
+    return lambda probability, observation, last_asked, *, rng: bool(rng.random() < share)
+
+
 RULES: dict[str, tuple[HannaAskRule, HannaAskRule]] = {
     "learned": (ask_sampled, ask_greedily),
     "never": (heuristic(baselines.never_ask),) * 2,

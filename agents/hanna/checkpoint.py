@@ -21,4 +21,4 @@ def save_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
 
 def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimizer) -> Progress:
     """Put a run back into `agent` and `optimizer` and say where it was; raises CheckpointError."""
-    return load_run(path, FORMAT, agent, optimizer, MAY_CHANGE)
+    return load_run(path, FORMAT, agent, optimizer, (*MAY_CHANGE, "again"))

@@ -140,7 +140,7 @@ def _record(
 ) -> None:
     """The first episode as a Rerun recording, with what the student saw."""
     from agents.iliad.nav.showing import episode_of
-    from agents.vision.run import drawn_world, pictures_of
+    from agents.vision.drawn import drawn_world, pictures_of
     from viz.recording import record_episode
     from viz.sinks import Sinks
 

@@ -76,7 +76,8 @@ def run_vnla(args: argparse.Namespace) -> int:
     from agents.imitation.lessons import Lessons
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT, SHIPPED_VNLA
-    from agents.vision.run import encoder_of, pictures_of
+    from agents.vision.drawn import pictures_of
+    from agents.vision.run import encoder_of
     from agents.vnla.agent import load_agent
     from agents.vnla.judging import COLUMNS, WITHOUT_LEARNING, judge
     from agents.vnla.run import vnla_data
@@ -112,7 +113,7 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.run import with_eyes
     from agents.imitation.parallel import use_threads
     from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
-    from agents.vision.run import pictures_of
+    from agents.vision.drawn import pictures_of
     from embodied.datasets.store import Dataset
 
     file = SHIPPED_HARI if args.agent == SHIPPED_AGENT else args.agent

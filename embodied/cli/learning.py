@@ -19,7 +19,7 @@ from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
-from agents.vision.config import NETWORKS, VisionConfig
+from agents.vision.config import TORCHVISIONS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
@@ -48,7 +48,7 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--network",
-        choices=(*NETWORKS[1:], "random"),
+        choices=(*TORCHVISIONS, "random"),
         help="torchvision network of --encoder; 'random' for an untrained compact one",
     )
     add_quality(parser)
@@ -100,13 +100,58 @@ def add_agents_side_by_side(parser: argparse.ArgumentParser) -> None:
 
 def add_train_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
-    parser.add_argument(
-        "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
-    )
+    _add_strips(parser)
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="houses drawn side by side (default: %(default)s)"
     )
     add_fields(parser, VisionConfig)
+
+
+def _add_strips(parser: argparse.ArgumentParser) -> None:
+    """Where an encoder is made, and from which pictures."""
+    parser.add_argument(
+        "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
+    )
+    parser.add_argument(
+        "--lights",
+        type=whole(),
+        default=1,
+        metavar="K",
+        help="lightings that every house is seen in: as it is, and with hour, weather and lamps drawn from its seed "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--strips", type=folder_to_write, metavar="DIR", help="where strips go, to share them (default: OUT/strips)"
+    )
+    add_quality(parser)
+
+
+def add_study_vision(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "tables", nargs="+", choices=("encoders", "pictures"), metavar="TABLE", help="encoders, pictures"
+    )
+    add_common(parser)
+    parser.set_defaults(threads=1)  # per encoder; they are trained side by side
+    _add_strips(parser)
+    parser.add_argument("--rows", nargs="+", metavar="NAME", help="train and judge these encoders only (default: all)")
+    parser.add_argument(
+        "--pictures",
+        nargs="+",
+        choices=QUALITIES[1:],
+        default=QUALITIES[1:],
+        metavar="QUALITY",
+        help="what the table of pictures judges on (default: all)",
+    )
+    parser.add_argument(
+        "--split", default="val_unseen", help="whose houses encoders are judged on (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seeds", type=whole(), default=1, metavar="N", help="encoders per row, from --seed on (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", type=whole(), default=1, metavar="N", help="encoders trained side by side (default: %(default)s)"
+    )
+    add_fields(parser, VisionConfig, skip=("network", "begin", "frozen"))
 
 
 def add_features(parser: argparse.ArgumentParser) -> None:
@@ -230,7 +275,7 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2 or houses")
+    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses or requests")
     add_common(parser)
     parser.add_argument(
         "--encoder",
@@ -251,6 +296,10 @@ def add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
+    parser.add_argument(
+        "--seeds", type=whole(), default=1, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+    )
+    add_quality(parser)
     add_agents_side_by_side(parser)
     add_device(parser)
     parser.set_defaults(threads=1)  # per agent; they are trained side by side

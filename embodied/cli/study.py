@@ -1,6 +1,7 @@
 """Train agents for each row of a table of the dissertation, judge them, and print the table.
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
+    embodied study vision encoders pictures --data DATA --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
@@ -8,13 +9,14 @@
     embodied study iliad 3.4 3.5 C.1 --out STUDY
     embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and `houses`: success against the
-number of training houses. HARI's are 4.7, 4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and
+HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and success against the number of training
+`houses` and of `requests`. HARI's are 4.7, 4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and
 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (wants --without-rooms) and `rules`.
 `bandit` is a translator that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5;
 `stars` lets a HANNA agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it
 did: Tables 3.4, 3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions, `speakers`: one that
-was never heard. Rows that tables share are trained once. Interrupt it whenever you like: the same command goes on.
+was never heard. `vision` compares encoders, and what one sees in other pictures. Rows that tables share are trained
+once. Interrupt it whenever you like: the same command goes on.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     learning.add_study(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
+    learning.add_study_vision(kinds.add_parser("vision", help="encoders that turn pictures into features"))
     learning.add_study_hari(kinds.add_parser("hari", help="agents that learn which question to ask"))
     learning.add_study_vnla(kinds.add_parser("vnla", help="agents that ask an advisor within a budget"))
     learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
@@ -40,6 +43,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     runs = {
         "hanna": run_hanna,
+        "vision": run_vision,
         "hari": run_hari,
         "vnla": run_vnla,
         "bandit": run_bandit,
@@ -65,8 +69,24 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
         args.judge_seed,
         args.device,
         args.threads,
+        args.quality,
+        args.seeds,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def run_vision(args: argparse.Namespace) -> list[Path]:
+    from agents.encoder_study import EncoderStudySetting, run_study
+    from agents.vision.config import VisionConfig
+    from agents.vision.drawn import StripSource
+    from embodied.cli.options import chosen
+
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
+    setting = EncoderStudySetting(
+        source, args.out, chosen(args, VisionConfig()), seeds=args.seeds, split=args.split, threads=args.threads
+    )
+    made = run_study(setting, args.tables, rows=args.rows, pictures=args.pictures, workers=args.workers, note=note)
+    return list(made.values())
 
 
 def run_hari(args: argparse.Namespace) -> list[Path]:

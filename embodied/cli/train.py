@@ -153,7 +153,7 @@ def run_nav(args: argparse.Namespace) -> int:
 
 def _recorder(args: argparse.Namespace, *, sees: bool = True) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
-    from agents.vision.run import drawn_world, pictures_of
+    from agents.vision.drawn import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
     from viz.recording import record_episode
     from viz.sinks import Sinks

@@ -59,27 +59,81 @@ class Row:
     values: Mapping[str, Estimate]
 
 
-def estimate(values: Sequence[float], groups: Sequence[str]) -> Estimate:
+def estimate(values: Sequence[float], groups: Sequence[str], repeats: Sequence[int] | None = None) -> Estimate:
     """Mean with a 95 % interval by Student's t, whose standard error is clustered by house.
 
     The t of k houses has k - 1 degrees of freedom (2.09 for 20 houses, 3.18 for 4): the standard
     error is itself estimated from so many independent values (Cameron and Miller 2015, section VI).
     Episodes of one house share its rooms and its routes, so they are not independent; with a
     single house the interval treats them as if they were. NaN values do not count.
+
+    Args:
+      repeats: the training seed behind each value. Where there are several, values of one seed are not independent
+        either: the variances of both clusterings are added and that of their crossing subtracted (Cameron, Gelbach
+        and Miller 2011), never below the larger of the two; degrees of freedom by Satterthwaite.
     """
-    kept = [(v, g) for v, g in zip(values, groups, strict=True) if not math.isnan(v)]
+    seeds = repeats if repeats is not None else [0] * len(groups)
+    kept = [(v, g, r) for v, g, r in zip(values, groups, seeds, strict=True) if not math.isnan(v)]
     n = len(kept)
     if n == 0:
         return Estimate(float("nan"), float("nan"), 0)
-    mean = math.fsum(v for v, _ in kept) / n
+    mean = math.fsum(v for v, _, _ in kept) / n
+    alone = len(set(groups)) == 1
+    houses = [str(i) if alone else g for i, (_, g, _) in enumerate(kept)]
+    off = [v - mean for v, _, _ in kept]
+    by_house, k = _clustered(off, houses)
+    if len(set(seeds)) == 1:
+        return Estimate(mean, _t(k - 1) * math.sqrt(by_house), n)
+    by_seed, m = _clustered(off, [str(r) for _, _, r in kept])
+    crossed, _ = _clustered(off, [f"{h} {r}" for h, (_, _, r) in zip(houses, kept, strict=True)])
+    variance = max(by_house + by_seed - crossed, by_house, by_seed)
+    parts = by_house**2 / max(k - 1, 1) + by_seed**2 / max(m - 1, 1)
+    freedom = (by_house + by_seed) ** 2 / parts if parts else 1.0
+    return Estimate(mean, _t(freedom) * math.sqrt(variance), n)
+
+
+def _clustered(off: Sequence[float], clusters: Sequence[str]) -> tuple[float, int]:
+    """The variance of a mean from which values are `off`, and how many clusters there are."""
     sums: dict[str, float] = {}
-    for i, (v, g) in enumerate(kept):
-        key = g if len(set(groups)) > 1 else str(i)
-        sums[key] = sums.get(key, 0.0) + (v - mean)
+    for value, cluster in zip(off, clusters, strict=True):
+        sums[cluster] = sums.get(cluster, 0.0) + value
     k = len(sums)
-    variance = math.fsum(s * s for s in sums.values()) / n**2 * (k / (k - 1) if k > 1 else 0.0)
-    t = float(stdtrit(k - 1, 0.975)) if k > 1 else 0.0
-    return Estimate(mean, t * math.sqrt(variance), n)
+    return math.fsum(s * s for s in sums.values()) / len(off) ** 2 * (k / (k - 1) if k > 1 else 0.0), k
+
+
+def _t(freedom: float) -> float:
+    return float(stdtrit(freedom, 0.975)) if freedom > 0 else 0.0
+
+
+def difference(
+    first: Sequence[Episode], second: Sequence[Episode], name: str, graphs: Mapping[str, NavGraph]
+) -> Estimate:
+    """How far the metric `name` of `first` lies above that of `second`, task by task, clustered by house and seed.
+
+    Args:
+      first, second: the same tasks as often, by agents that were trained from as many seeds: each seed's episodes
+        follow each other.
+
+    Raises:
+      ValueError: the tasks are not the same.
+    """
+    if [e.task.id for e in first] != [e.task.id for e in second]:
+        raise ValueError("only agents that were given the same tasks in the same order can be compared task by task")
+    metric = {**metrics.PER_EPISODE, **metrics.PER_KIND.get(first[0].task.kind, {})}[name]
+    off = [
+        metric(a, graphs[a.task.world]) - metric(b, graphs[b.task.world]) for a, b in zip(first, second, strict=True)
+    ]
+    return estimate(off, [e.task.world for e in first], repeats_of(first))
+
+
+def repeats_of(episodes: Sequence[Episode]) -> list[int]:
+    """Which pass over the tasks each episode belongs to: a task that comes again begins another seed's."""
+    seen: dict[str, int] = {}
+    out = []
+    for e in episodes:
+        out.append(seen.get(e.task.id, 0))
+        seen[e.task.id] = out[-1] + 1
+    return out
 
 
 def across_seeds(values: Sequence[float]) -> Estimate:
@@ -89,35 +143,38 @@ def across_seeds(values: Sequence[float]) -> Estimate:
     return Estimate(float(np.mean(values)), half, n)
 
 
-def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str]) -> Estimate:
+def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str], repeats: Sequence[int] | None = None) -> Estimate:
     """Sum of firsts over sum of seconds (the repeat rates of Table 4.6), clustered likewise."""
     total = sum(b for _, b in pairs)
     if total == 0:
         return Estimate(float("nan"), float("nan"), 0)
     mean = sum(a for a, _ in pairs) / total
     scale = len(pairs) / total
-    residuals = estimate([(a - mean * b) * scale for a, b in pairs], groups)
+    residuals = estimate([(a - mean * b) * scale for a, b in pairs], groups, repeats)
     return Estimate(mean, residuals.half, total)
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
     """Every metric of the kind of task and the repeat rates, over the episodes of one agent.
 
+    Args:
+      episodes: those of several training seeds follow each other, over the same tasks.
+
     Raises:
       ValueError: no episodes.
     """
     if not episodes:
         raise ValueError(f"{agent!r} played no episodes of {split!r}; a table needs at least one")
-    groups = [e.task.world for e in episodes]
+    groups, passes = [e.task.world for e in episodes], repeats_of(episodes)
     values = {
-        name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups)
+        name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
         for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
     }
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
     if episodes[0].task.kind == "vnla":  # where turning on the spot is no mistake
         del repeats["mistake repeat"]
     for name, f in repeats.items():
-        values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups)
+        values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
     return Row(agent, split, seed, len(episodes), len(set(groups)), values)
 
 
