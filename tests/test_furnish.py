@@ -305,6 +305,15 @@ def test_worktops_of_all_kitchens_are_in_use(some):
                 assert len(things) >= 4, (house.seed, room.id, things)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [7406, 7414])
+def test_small_kitchens_have_a_worktop_besides_sink_and_cooker(seed):
+    house = furnished(seed, (40.0, 55.0))
+    for room in house.rooms:
+        if room.kind == "kitchen":
+            assert any(p.room == room.id for p in of_class(house, "base cabinet", "drawer cabinet")), room.id
+
+
 def test_no_picture_hangs_twice_while_there_are_others(some):
     """The framed print and the poster of one image are the same picture."""
     for house in some:

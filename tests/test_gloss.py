@@ -12,6 +12,7 @@ from handmade import HandCatalogue, furnished
 
 from assets.records import Finish
 from embodied.light.rays import embree_among, mitsuba_among, rays_among
+from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
 from embodied.render.gloss import Gloss, Shine, interleaved, schlick
@@ -45,13 +46,14 @@ def quad(name: str, corners, page: int) -> LitMesh:
     return LitMesh(name, "floor", "room", page, np.array(corners, np.float32), faces, uv)
 
 
-def house(rough: float, specular: float = 0.5, metal: float = 0.0, gains=(1.0, 1.0)) -> Gloss:
-    """A grey floor and, behind it, a wall whose lower half is grey and whose upper half is red."""
+def house(rough: float, specular: float = 0.5, metal: float = 0.0, gains=(1.0, 1.0), wide: float = 8.0) -> Gloss:
+    """A grey floor, so `wide`, and, behind it, a wall whose lower half is grey and whose upper half is red."""
     pytest.importorskip("embreex")
     wall = np.zeros((64, 64, 3), np.uint8)
     wall[:32], wall[32:] = RED, GREY
     pages = (np.full((64, 64, 3), GREY, np.uint8), wall)
-    floor = quad("floor", [(-1, -4, 0), (4, -4, 0), (4, 4, 0), (-1, 4, 0)], 0)
+    left, right = wide / 2, -wide / 2
+    floor = quad("floor", [(-1, right, 0), (4, right, 0), (4, left, 0), (-1, left, 0)], 0)
     back = quad("wall", [(4, 4, 4), (4, -4, 4), (4, -4, 0), (4, 4, 0)], 1)
     shine = np.tile(np.round(255 * np.array([rough, specular, metal])).astype(np.uint8), (2, 1))
     tint = np.full((2, 3), 0.9, np.float32) if metal else None
@@ -113,6 +115,25 @@ def test_rough_reflections_are_smooth_and_the_same_for_any_size_of_picture():
     assert np.array_equal(out, rough.over(drawn(97), LOOKING_DOWN)), "and the same every time"
 
 
+@pytest.mark.parametrize("metal", [0.0, 1.0])
+def test_thin_bars_do_not_flicker_while_the_camera_turns(metal, monkeypatch):
+    def flicker() -> float:
+        bar = house(0.35, 1.0, metal, gains=(1.0, 0.1), wide=0.09)
+        seen = []
+        for turn in np.linspace(0, 0.08, 9):
+            ahead = math.cos(turn) * math.sqrt(0.5), math.sin(turn) * math.sqrt(0.5), -math.sqrt(0.5)
+            camera = Camera((0.0, 0.0, 1.5), ahead, (ahead[0], ahead[1], math.sqrt(0.5)))
+            rgb = bar.over(drawn(), camera).astype(int)
+            there = (rgb != GREY).any(-1)
+            seen.append([rgb[row, there[row], 0].mean() for row in range(50, 80)])
+        return float(np.std(seen, axis=0).mean())
+
+    many = flicker()
+    monkeypatch.setattr(gloss, "LONELY", 0)
+    monkeypatch.setattr(gloss, "BRUSHED", 1)
+    assert many < 0.7 * flicker()
+
+
 def test_directions_of_a_tile_are_numbered_so_that_small_squares_have_neighbours_in_the_sequence():
     number = interleaved(8)
     assert sorted(number.ravel().tolist()) == list(range(64))
@@ -129,14 +150,14 @@ def test_every_direction_of_a_tile_counts_the_same_wherever_the_surface_goes_on(
         grid = Mirrored((h, w), pixel, np.zeros(h * w, np.int32), up)
         row, column = np.divmod(pixel, w)
         light = ((row % 8 == lone[0]) & (column % 8 == lone[1])).astype(np.float32)
-        grid.smooth(light, light[:, None].repeat(3, 1))
+        grid.smooth(light, light[:, None].repeat(3, 1), np.ones_like(light))
         assert np.allclose(grid.values[:, 8:-8, 8:-8], 1 / 64, atol=1e-6)
 
 
 def test_single_rays_from_thin_bars_are_no_dots_of_light():
     middle = np.array([8 * 16 + 8])
     grid = Mirrored((16, 16), middle, np.ones(1, np.int32), np.float32([[0, 0, 1]]))
-    grid.smooth(np.ones(1, np.float32), np.full((1, 3), 9.0, np.float32))
+    grid.smooth(np.ones(1, np.float32), np.full((1, 3), 9.0, np.float32), np.ones(1, np.float32))
     assert 0 < grid.values[1, 8, 8] < 0.3
 
 

@@ -14,6 +14,7 @@ from assets.built.primitives import (
     lathe,
     moved,
     quads,
+    reversed_shape,
     scaled,
     sheet,
     shifted_uv,
@@ -256,8 +257,29 @@ def thrown_clothes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.G
 
 
 def duvet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
-    """A duvet pushed back in the morning: thick folds over the bed."""
-    return parts_of((material(look, "cloth", finish, "cotton/0"), _crumpled(size, 30, 0.25, rng=rng)))
+    """A duvet pushed back in the morning: feathers in cotton, in a few long, round folds across the bed."""
+    w, d, h = size
+    cells = 34
+    t = np.linspace(-1, 1, cells + 1)
+    t = np.sign(t) * (1 - (1 - np.abs(t)) ** 1.5)  # close together at the rim, which is round
+    x, y = np.meshgrid(t, t)
+    lie = np.zeros_like(x)  # what lies higher: folds as they follow one another from the foot to the head
+    for at in np.linspace(-0.75, 0.8, 5) + rng.uniform(-0.1, 0.1, 5):
+        line = at + rng.uniform(-0.3, 0.3) * x + rng.uniform(-0.16, 0.16) * np.sin(2.3 * x + rng.uniform(0, 6))
+        ends = rng.uniform(0.55, 1.0) * (0.75 + 0.25 * np.cos(1.8 * (x - rng.uniform(-0.8, 0.8))))
+        lie = np.maximum(lie, ends * np.exp(-(((y - line) / rng.uniform(0.11, 0.17)) ** 2)))
+    for _ in range(6):  # and short dents, where the cotton is pulled
+        turn, (cx, cy) = rng.uniform(0, np.pi), rng.uniform(-0.8, 0.8, 2)
+        along = (x - cx) * np.cos(turn) + (y - cy) * np.sin(turn)
+        across = (y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)
+        lie = lie - 0.16 * np.exp(-((along / 0.4) ** 2) - (across / 0.07) ** 2)
+    wander = 1 - 0.05 * (1 + np.sin(3.1 * np.roll(np.stack([x, y]), 1, 0) + rng.uniform(0, 6, (2, 1, 1))))
+    px, py = x * wander[0] * w / 2, y * wander[1] * d / 2
+    puff = ((1 - x**4) * (1 - y**4)) ** 0.45
+    rise = puff * h * (0.36 + 0.64 * lie.clip(-0.2, 1.0)) + 0.004
+    top, low = sheet(np.stack([px, py, rise], -1)), sheet(np.stack([px, py, 0 * rise], -1))
+    cloth = shifted_uv(joined(top, reversed_shape(low)), *rng.random(2))
+    return parts_of((material(look, "cloth", finish, "cotton/0"), cloth))
 
 
 # ------------------------------------------------------------------ kitchen and bath

@@ -50,6 +50,14 @@ LIFT = 1e-3
 """Metres that a ray begins above its surface."""
 ROOKS = ((-0.25, -0.25), (0.25, 0.25))
 """Where in a pixel smooth surfaces are looked at, from its centre: no two in a row or column."""
+LONELY = 24.0
+"""Rays averaged on a surface below which each of its pixels sends MORE: on thin bars what few rays find would jump from
+frame to frame of a video, as the pattern of directions lies still in the picture."""
+NOTED = 0.02
+"""Mirrored light, of that of a white sheet, below which that goes unnoticed."""
+MORE = 8
+BRUSHED = 4
+"""Rays of each pixel of polished metal that is not smooth, in each of ROOKS."""
 WHITE = 5.0
 """Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
 GLASS = 0.81
@@ -255,6 +263,8 @@ class Gloss:
     def _fine(self, page: np.ndarray, at: np.ndarray) -> np.ndarray:
         """(n, 3) exposed light at places (n, 2) of whole pages, between texels."""
         out, order = np.empty((len(page), 3), np.float32), np.argsort(page, kind="stable")
+        if not len(page):
+            return out
         ends = np.flatnonzero(np.diff(page[order], append=-1)) + 1
         for i in np.split(order, ends[:-1]):
             picture = self._pages[page[i[0]]]
@@ -272,11 +282,30 @@ class Gloss:
         surface; what they lose is the mean of the colours."""
         row, column = np.divmod(seen.pixel, size[1])
         k = interleaved(TILE)[row % TILE, column % TILE]
-        half = _half_vectors(seen.normal, seen.rough, _lobe(TILE * TILE)[k])
-        lost, mirrored = self._mirrored(camera, seen, half, sharp=False)
         grid = Mirrored(size, seen.pixel, self._faces.owner[seen.face], seen.normal)
-        grid.smooth(lost.mean(1), mirrored)
+        values = self._averaged(camera, seen, k, TILE * TILE, 1, sharp=False)
+        rays = np.ones(len(k), np.float32)
+        grid.smooth(values[:, :3].mean(1), values[:, 3:], rays)
+        lonely = (grid.averaged < LONELY) & (grid.values[1:].reshape(3, -1)[:, seen.pixel].max(0) > NOTED)
+        if lonely.any():
+            values[lonely] = self._averaged(camera, seen.of(lonely), k[lonely], TILE * TILE, MORE, sharp=False)
+            rays[lonely] = MORE
+            grid.smooth(values[:, :3].mean(1), values[:, 3:], rays)
         return grid
+
+    def _averaged(
+        self, camera: Camera, seen: _Seen, k: np.ndarray, count: int, rays: int, *, sharp: bool
+    ) -> np.ndarray:
+        """(n, 6) `_mirrored`, both side by side, as the mean of so many rays of each pixel.
+
+        Args:
+          k: (n,) which of `count` parts of the lobe each pixel looks into.
+        """
+        several = seen.of(np.repeat(np.arange(len(k)), rays))
+        u = _lobe(count * rays)[(k[:, None] * rays + np.arange(rays)).ravel()]
+        half = _half_vectors(several.normal, several.rough, u)
+        values = np.concatenate(self._mirrored(camera, several, half, sharp=sharp), axis=1)
+        return values.reshape(len(k), rays, 6).mean(1)
 
     def _enlarged(self, camera: Camera, grid: Mirrored, size: tuple[int, int]) -> np.ndarray:
         """(4, h, w) what is lost and mirrored, in full size: between surfaces every pixel asks whose it is."""
@@ -305,12 +334,17 @@ class Gloss:
         row, column = np.divmod(all_pixels, rgb.shape[1])
         rows, columns = FINE_TILE
         k = ((row % rows) * columns + column % columns) * len(ROOKS) + turn
-        u = _lobe(rows * columns * len(ROOKS))[k[seen.which[seen.sharp]]]
+        k = k[seen.which[seen.sharp]]
         seen = seen.of(seen.sharp)
         if not len(seen.pixel):
             return
-        half = np.where((seen.rough < SMOOTH)[:, None], seen.normal, _half_vectors(seen.normal, seen.rough, u))
-        lost, mirrored = self._mirrored(camera, seen, half, sharp=True)
+        polished = seen.rough < SMOOTH
+        both = np.empty((len(k), 6), np.float32)
+        clear = seen.of(polished)
+        both[polished] = np.concatenate(self._mirrored(camera, clear, clear.normal, sharp=True), axis=1)
+        count = rows * columns * len(ROOKS)
+        both[~polished] = self._averaged(camera, seen.of(~polished), k[~polished], count, BRUSHED, sharp=True)
+        lost, mirrored = both[:, :3], both[:, 3:]
         which = seen.which % len(pixels)
         there = np.bincount(which, minlength=len(pixels)) > 0
         mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(ROOKS)

@@ -34,19 +34,29 @@ class Mirrored:
         self._normal = np.zeros((3, *shape), np.float32)
         self._normal.reshape(3, -1)[:, pixel] = normal.T
         self.values = np.zeros((4, *shape), np.float32)
+        self.averaged = np.zeros(len(pixel), np.float32)
+        """(n,) how many of these pixels each value was averaged over."""
 
-    def smooth(self, lost: np.ndarray, mirrored: np.ndarray) -> None:
+    def smooth(self, lost: np.ndarray, mirrored: np.ndarray, rays: np.ndarray) -> None:
         """Fill `values` with the share of its own light that the surface loses and what it sends for it, averaged on
-        the same surface so that every direction of a tile counts the same: over four pixels along rows and columns,
-        then over three of those sums, TILE / 2 apart.
+        the same surface so that every direction of a tile counts the same.
 
         Args:
           lost: (n,) of the pixels that mirror.
           mirrored: (n, 3).
+          rays: (n,) how many found it.
         """
-        sums = np.zeros((5, *self.shape), np.float32)
-        flat = sums.reshape(5, -1)
-        flat[0, self._pixel], flat[1:4, self._pixel], flat[4, self._pixel] = lost, mirrored.T, 1
+        sums = self._summed(np.stack([lost, *mirrored.T, np.ones_like(lost), rays]))
+        self.averaged = sums[4].ravel()[self._pixel]
+        self.values = sums[:4] / np.maximum(sums[4], 1e-6)
+        most = GLINT * np.sqrt(sums[5] / np.float32(TILE * TILE))
+        np.minimum(self.values[1:], most, out=self.values[1:])
+
+    def _summed(self, values: np.ndarray) -> np.ndarray:
+        """(k, h, w) sums of values (k, n) over neighbours on the same surface: over four pixels along rows and columns,
+        then over three of those sums, TILE / 2 apart."""
+        sums = np.zeros((len(values), *self.shape), np.float32)
+        sums.reshape(len(values), -1)[:, self._pixel] = values
         for axis, step, reach in ((1, 1, 2), (0, 1, 2), (1, TILE // 2, 1), (0, TILE // 2, 1)):
             total = sums.copy()
             for k in range(1, reach + 1):
@@ -55,9 +65,7 @@ class Mirrored:
                 total[:, *near] += sums[:, *far] * same
                 total[:, *far] += sums[:, *near] * same
             sums = total
-        self.values = sums[:4] / np.maximum(sums[4], 1e-6)
-        most = GLINT * np.sqrt(sums[4] / np.float32(TILE * TILE))
-        np.minimum(self.values[1:], most, out=self.values[1:])
+        return sums
 
     def edges(self) -> np.ndarray:
         """(h, w) uint8: pixels beside another surface of which one mirrors."""

@@ -204,7 +204,9 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing]
     line = next((t for t in kit.sink.tags if t.startswith("line_")), "")
     tall = [a for a in ctx.stock.of_role("tall cabinet") if line in a.tags] or list(ctx.stock.of_role("tall cabinet"))
     low = [a for a in kit.base if kit.units(a) == 1]
-    blocks = [(tall[:1], tall[:1]), (tall[:1], []), (low[:1], []), ([], low[:1])] if tall else [(low[:1], [])]
+    beside_low: list[tuple[list[Asset], list[Asset]]] = [(low[:1], []), ([], low[:1])]
+    beside_tall: list[tuple[list[Asset], list[Asset]]] = [(tall[:1], tall[:1]), (tall[:1], [])] if tall else []
+    blocks = beside_tall + beside_low if _has_worktop(done) else beside_low + beside_tall
     for left, right in blocks:
         row = [*left, fridge, *right]
         width = sum(a.size[0] for a in row) + 0.004 * (len(row) - 1)
@@ -231,6 +233,10 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing]
         if found:
             return found
     return None
+
+
+def _has_worktop(done: list[Thing]) -> bool:
+    return any(t.role == "counter" for t in done)
 
 
 def _darkens(pose: ScoredPose, width: float) -> bool:
@@ -455,7 +461,7 @@ def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
                     near = min(_gap(wall.point(s), t) for t in done if _on_floor(ctx, t) for s in (a, b))
                     runs.append((near > 0.35, -min(b - a, want), a, b, wall))
         for far, _, a, b, wall in sorted(runs, key=lambda r: r[:2]):
-            length = _add_run(ctx, kit, wall, a, b, want, done, least=2 if far else 1)
+            length = _add_run(ctx, kit, wall, a, b, want, done, least=2 if far and _has_worktop(done) else 1)
             if length:
                 want -= length
                 break
