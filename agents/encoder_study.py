@@ -24,7 +24,7 @@ import torch
 
 from agents.imitation.loop import Note
 from agents.imitation.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
-from agents.vision.config import VisionConfig
+from agents.vision.config import WAYS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import Encoder
 from agents.vision.labels import HouseStrips
@@ -53,7 +53,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "megabytes": ("MB", 1, 1),
 }
 """A number of a reading: its heading, digits and scale."""
-PICTURES = ("unlit", "fast", "normal", "glossy", "reference")
+PICTURES = tuple(WAYS)
 STUDIES = ("encoders", "pictures")
 STRIPS = 8
 """Strips at once when an encoder's price is measured."""

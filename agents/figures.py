@@ -92,6 +92,23 @@ def requests_curves(curves: Mapping[str, Sequence[tuple[Estimate, Estimate]]], p
     _save(figure, path)
 
 
+def realism_figure(arms: Mapping[str, Sequence[Estimate]], ways: Sequence[str], path: Path) -> None:
+    """Success with 95 % intervals in houses drawn in several `ways`, one line per kind of agent."""
+    figure = Figure(figsize=(5, 3.4), layout="constrained")
+    axes = figure.subplots()
+    for k, (arm, points) in enumerate(arms.items()):
+        at = [i + 0.06 * (k - (len(arms) - 1) / 2) for i in range(len(ways))]
+        heights, halves = [100 * e.mean for e in points], [100 * e.half for e in points]
+        axes.errorbar(at, heights, halves, marker="o", markersize=4, capsize=2, label=arm)
+    axes.set_xticks(range(len(ways)), ways)
+    axes.set_xlabel("pictures of the houses it is judged in")
+    axes.set_ylabel("success (%)")
+    axes.set_ylim(0, 100)
+    axes.legend(title="learned from", fontsize=8)
+    axes.grid(alpha=0.3)
+    _save(figure, path)
+
+
 def curves_figure(validations: Mapping[str, Sequence[Mapping[str, float]]], path: Path) -> None:
     """Validation success and requests against updates, one curve per agent.
 

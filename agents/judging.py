@@ -55,7 +55,7 @@ def run_eval(
     looked = Looked()
     with locked(args.out) if args.out else contextlib.nullcontext():
         for split in args.split or ("test_unseen",):
-            whole, bank = data.split(split), split_of(data, split, encoder, quality=args.quality).bank
+            whole, bank = data.split(split), split_of(data, split, encoder.digest, quality=args.quality).bank
             learned = hanna_policies(agent, bank)
             judged = _asked_for({**_without_learning(), **learned}, args.only)
             drawn = {n: pictures_of(data, n, args.quality) for n in whole.worlds}

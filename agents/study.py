@@ -405,7 +405,7 @@ class _Judge:
             return agent_without_learning("hanna", line.played)
         agent = load_agent(self.setting.folder_of(line.variant, seed) / "best.safetensors")
         if split not in self._banks:
-            self._banks[split] = split_of(self.data, split, self.encoder, quality=self.setting.quality).bank
+            self._banks[split] = split_of(self.data, split, self.encoder.digest, quality=self.setting.quality).bank
         bank = self._banks[split]
         return {**hanna_policies(agent, bank), **priced_policies(agent, bank)}[line.played]
 

@@ -97,8 +97,9 @@ class World:
         """All that the panoramas depend on, and what draws them."""
         return (
             self._origin
-            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k != "look"}
+            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k not in ("look", "rays")}
             | ({"look": "gloss"} if self.pictures.shown_with == "gloss" else {})  # matte ones are older than the word
+            | ({} if self.pictures.rays is None else {"rays": self.pictures.rays})
             | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
         )
 
@@ -169,7 +170,8 @@ class World:
         if self._tracer is None:
             from embodied.light.reference import Tracer  # late: loads the path tracer
 
-            self._tracer = Tracer(self._baked(), self.house, quality=self.pictures.quality, size=self.pictures.size)
+            p = self.pictures
+            self._tracer = Tracer(self._baked(), self.house, quality=p.quality, size=p.size, rays=p.rays)
         return self._tracer
 
     def panorama(self, node: int) -> Panorama:

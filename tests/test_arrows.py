@@ -98,7 +98,7 @@ embodied.cli <- agents.shipped embodied.locks embodied.gl viz.sinks agents.imita
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
     embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.iliad agents.failures
-    agents.judging agents.study agents.encoder_study
+    agents.judging agents.study agents.encoder_study agents.realism_study
 embodied.__main__ <- embodied.cli
 agents.shipped <-
 agents.device <-
@@ -132,6 +132,8 @@ agents.judging <- agents.imitation embodied.interface embodied.records embodied.
 agents.study <- embodied.navigation agents.imitation agents.tables embodied.interface embodied.records
     embodied.datasets embodied.evaluation agents.figures agents.vision agents.hanna agents.failures agents.judging
     embodied.locks
+agents.realism_study <- agents.imitation agents.figures agents.hanna agents.vision embodied.datasets embodied.evaluation
+    embodied.interface embodied.locks embodied.records
 viz.sinks <-
 viz.house3d <- embodied.scene
 viz.blueprint <- embodied.house embodied.interface embodied.render

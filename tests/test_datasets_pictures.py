@@ -16,7 +16,7 @@ from test_cluster import FakeRay
 
 from agents.vision import drawn
 from agents.vision import run as vision
-from agents.vision.config import PLAIN
+from agents.vision.config import PLAIN, WAYS
 from agents.vision.encoder import random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features
 from agents.vision.resnet import ARCHITECTURES
@@ -145,7 +145,7 @@ def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_an
 @pytest.mark.gl
 def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     """An unlit run must not pass for a lit one."""
-    monkeypatch.setattr(drawn, "PLAIN", SMALL)
+    monkeypatch.setitem(WAYS, "unlit", SMALL)
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     encoder = random_encoder(seed=0)
@@ -155,7 +155,7 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     def features(quality: str | None, ray: str | None = None) -> str:
         lines: list[str] = []
         args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
-        args.threads, args.device, args.network, args.encoder = 1, "cpu", "random", None
+        args.threads, args.device, args.network, args.encoder, args.split = 1, "cpu", "random", None, None
         assert vision.run_features(args, lines.append) == 0
         return lines[-1]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -18,9 +19,11 @@ from agents.hanna.run import run_train_hanna, vocabulary_of
 from agents.hanna.training_config import SCALES
 from agents.imitation.lessons import split_of
 from agents.judging import run_eval
+from agents.realism_study import RealismSetting, rank_correlation
+from agents.realism_study import run_study as realism
 from agents.shipped import WEIGHTS
 from agents.study import StudySetting, run_study
-from agents.vision.config import PLAIN
+from agents.vision.config import PLAIN, WAYS
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
@@ -138,7 +141,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path):
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
     config = chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
-    bank = split_of(data, "test_unseen", random_encoder(seed=0)).bank
+    bank = split_of(data, "test_unseen", random_encoder(seed=0).digest).bank
     agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
@@ -225,6 +228,33 @@ def test_a_row_of_several_seeds_is_the_mean_of_their_agents(study):
     assert learned["episodes"] == 6 and "seeds 0, 1" in written["4.4"].read_text()
 
 
+def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data):
+    run_study(study, ["4.4"])
+    arms = {"all": [study.folder_of("final") / "best.safetensors"] * 2}
+    arms["pictures only"] = [study.folder_of("target image only") / "best.safetensors"]
+    setting = RealismSetting(data.folder, study.out / "realism", arms, ("unlit", "matte"), "test_unseen", tasks=3)
+    with pytest.raises(FileNotFoundError, match="embodied features --quality matte"):
+        realism(setting)
+    encoder, (name,) = load_encoder(study.encoder), data.names("test_unseen")
+    place = data.place(name)
+    features = stream(1, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
+    path = feature_path(data.folder / "features", encoder.digest, name, WAYS["matte"])
+    save_features(path, features, encoder, place.house.digest, WAYS["matte"])
+    text = realism(setting).read_text()
+    assert "| all | 2 | " in text and "rank correlation with matte | 3 |" in text and "fast_192" in text
+    assert "3 tasks in 1 houses" in text
+    kept = {p: p.stat().st_mtime_ns for p in (setting.out / "episodes").iterdir()}
+    assert len(kept) == 4 and (setting.out / "figure_realism.png").exists()
+    path.unlink()
+    assert realism(setting).read_text() == text, "what was played is not played again"
+    assert {p: p.stat().st_mtime_ns for p in (setting.out / "episodes").iterdir()} == kept
+
+
+def test_rank_correlation_is_spearmans():
+    assert rank_correlation([0.1, 0.5, 0.3, 0.4], [0.2, 0.3, 0.1, 0.6]) == pytest.approx(1 - 6 * 4 / (4 * 15))
+    assert math.isnan(rank_correlation([0.1, 0.5], [0.2, 0.3])) and math.isnan(rank_correlation([1] * 3, [1, 2, 3]))
+
+
 def test_requests_are_bought_by_three_kinds_of_rule(study):
     written = run_study(study, ["requests"])
     rows = {
@@ -253,7 +283,7 @@ def test_an_unknown_study_is_refused_before_anything_is_trained(study):
 
 def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     encoder = random_encoder(seed=0)
-    some, every = (split_of(data, "train", encoder, houses=n) for n in (1, None))
+    some, every = (split_of(data, "train", encoder.digest, houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
     assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)

@@ -17,7 +17,7 @@ from agents.checkpoint_file import CheckpointError
 from agents.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
-from agents.vision.config import NETWORKS, PLAIN, VisionConfig, drawing
+from agents.vision.config import NETWORKS, PLAIN, WAYS, VisionConfig, drawing, way_of
 from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
@@ -407,6 +407,8 @@ def test_every_way_of_drawing_has_its_own_features():
     paths = {feature_path(Path("f"), "d" * 64, "house", PictureSettings(192, *way)) for way in ways}
     assert len(paths) == len(ways) and feature_path(Path("f"), "d" * 64, "house", PLAIN) in paths
     assert drawing(PLAIN) == "unlit_192" != drawing(PictureSettings(256, "unlit"))
+    assert len({drawing(p) for p in WAYS.values()}) == len(WAYS) and all(way_of(p) == k for k, p in WAYS.items())
+    assert drawing(WAYS["reference"]) == "reference_fast_96_8rays"
 
 
 def test_the_settings_name_the_networks_that_there_are():

@@ -89,7 +89,7 @@ def run_navigation_study(setting: NavigationSetting, only: Sequence[str] | None 
         raise ValueError(
             f"{len(both)} houses of {setting.split!r} are rated in, too ({setting.rated!r}); judge in others"
         )
-    rated, judged = (split_of(data, name, setting.encoder) for name in (setting.rated, setting.split))
+    rated, judged = (split_of(data, name, setting.encoder.digest) for name in (setting.rated, setting.split))
     return run_raters(setting, rated, judged, list(only or raters()), note=note)
 
 

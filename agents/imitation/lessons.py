@@ -41,7 +41,7 @@ class Lessons:
         self, name: str, *, limit: int | None = None, houses: int | None = None, vnla: str = AS_PUBLISHED
     ) -> Split:
         """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split."""
-        return split_of(self.data, name, self.encoder, self.device, limit, houses, self.quality, vnla)
+        return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla)
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
@@ -52,7 +52,7 @@ class Lessons:
 def split_of(
     data: Dataset,
     name: str,
-    encoder: Encoder,
+    encoder: str,
     device: str = "cpu",
     limit: int | None = None,
     houses: int | None = None,
@@ -62,12 +62,13 @@ def split_of(
     """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
 
     Args:
+      encoder: its digest.
       quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
       vnla: VNLA's rule of play, as in Dataset.split.
     """
     split = data.split(name, houses=houses, vnla=vnla)
     pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
-    paths = {n: feature_path(data.folder / "features", encoder.digest, n, pictures[n]) for n in split.worlds}
+    paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
     tasks = split.tasks if limit is None else spread(split.tasks, limit)
-    bank = load_bank(paths, encoder.digest, split.worlds, pictures)
+    bank = load_bank(paths, encoder, split.worlds, pictures)
     return Split(split.worlds, tasks, split.make_env, bank.to(device))

@@ -18,12 +18,31 @@ PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
 
+WAYS: Mapping[str, PictureSettings] = {
+    "unlit": PLAIN,
+    "matte": PictureSettings(192, "fast", look="matte"),
+    "fast": PictureSettings(192, "fast"),
+    "normal": PictureSettings(192, "normal"),
+    "glossy": PictureSettings(96, "glossy", light="fast", rays=4),
+    "reference": PictureSettings(96, "reference", light="fast", rays=8),
+}
+"""Ways in which encoders and agents may be shown houses, besides as a data set holds them, by the names of --quality:
+those of pictures, and 'matte', which is 'fast' without reflections. Traced ones are coarse and of few rays, evened by
+the tracer, or a house would take hours; their exposure is that of 'fast' light."""
+
+
 def drawing(pictures: PictureSettings) -> str:
     """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
     lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
     other = () if pictures.backend == "classic" else (pictures.backend,)
     look = () if pictures.shown_with == "matte" else (pictures.shown_with,)
-    return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size)])
+    rays = () if pictures.rays is None else (f"{pictures.rays}rays",)
+    return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
+
+
+def way_of(pictures: PictureSettings) -> str:
+    """The name in WAYS of what pictures are drawn like."""
+    return "matte" if pictures.quality == "fast" and pictures.shown_with == "matte" else pictures.quality
 
 
 @dataclass(frozen=True)

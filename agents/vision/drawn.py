@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import joblib
 
-from agents.vision.config import PLAIN, drawing
+from agents.vision.config import WAYS, drawing, way_of
 from agents.vision.labels import HouseStrips, all_classes, look
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
@@ -28,11 +27,11 @@ def pictures_of(data: Dataset, name: str, quality: str | None = None) -> Picture
     """How the pictures of a house are drawn that features are made from.
 
     Args:
-      quality: None takes the panoramas that the data set holds, and plain ones where it holds none.
+      quality: one of WAYS; None takes the panoramas that the data set holds, and plain ones where it holds none.
     """
     drawn = data.drawn_pictures(name)
-    if drawn is None or quality not in (None, drawn.quality):
-        return dataclasses.replace(PLAIN, quality=quality or PLAIN.quality)
+    if drawn is None or quality not in (None, drawn.quality, way_of(drawn)):
+        return WAYS[quality or "unlit"]
     return drawn
 
 

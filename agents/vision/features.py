@@ -15,7 +15,7 @@ import torch
 
 from agents.tensor_file import load_tensors, save_tensors
 from agents.vision.bank import FeatureBank
-from agents.vision.config import PLAIN, drawing
+from agents.vision.config import PLAIN, drawing, way_of
 from agents.vision.encoder import Encoder
 from agents.vision.strip import HEIGHT, VFOV
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
@@ -110,7 +110,7 @@ def load_features(
 
 
 def _option(pictures: PictureSettings | None) -> str:
-    return "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {pictures.quality}"
+    return "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {way_of(pictures)}"
 
 
 def load_bank(

@@ -91,7 +91,7 @@ def run_features(args: argparse.Namespace, note: Note = print) -> int:
     """Features of every house of a data set; houses that have them, from pictures drawn so, are skipped."""
     check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
-    wanted = {n: pictures_of(data, n, args.quality) for n in houses_of(data, data.splits)}
+    wanted = {n: pictures_of(data, n, args.quality) for n in houses_of(data, args.split or data.splits)}
     missing = [(n, pictures) for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:

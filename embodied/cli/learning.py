@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
@@ -19,12 +20,11 @@ from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
-from agents.vision.config import TORCHVISIONS, VisionConfig
+from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
 from embodied.cli.options import add_fields, any_path, folder_to_write, positive, whole
-from embodied.render.pictures import QUALITIES
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +57,9 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
 def add_quality(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quality",
-        choices=QUALITIES[1:],
-        help="how the houses are drawn that features come from (default: as the panoramas that the data set holds, "
-        "else unlit)",
+        choices=tuple(WAYS),
+        help="how the houses are drawn that features come from; matte is fast without reflections, glossy and "
+        "reference are traced at 96 pixels by few rays (default: as the panoramas that the data set holds, else unlit)",
     )
 
 
@@ -137,8 +137,8 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pictures",
         nargs="+",
-        choices=QUALITIES[1:],
-        default=QUALITIES[1:],
+        choices=tuple(WAYS),
+        default=tuple(WAYS),
         metavar="QUALITY",
         help="what the table of pictures judges on (default: all)",
     )
@@ -160,6 +160,7 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
+    parser.add_argument("--split", nargs="+", metavar="SPLIT", help="of the houses of these splits (default: all)")
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_device(parser)
 
@@ -304,6 +305,46 @@ def add_study(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     parser.set_defaults(threads=1)  # per agent; they are trained side by side
     add_fields(parser, TrainingConfig, skip=("training_houses",), scales=SCALES)
+
+
+def add_study_realism(parser: argparse.ArgumentParser) -> None:
+    add_common(parser)
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        required=True,
+        metavar="DIR",
+        help="episodes, table and figure; the same command goes on",
+    )
+    parser.add_argument(
+        "--agents",
+        type=_named_file,
+        nargs="+",
+        required=True,
+        metavar="NAME=FILE",
+        help="trained agents; those of one name are training seeds of one kind",
+    )
+    parser.add_argument(
+        "--pictures",
+        nargs="+",
+        choices=tuple(WAYS),
+        default=("unlit", "matte", "fast", "reference"),
+        metavar="QUALITY",
+        help="how the houses are drawn that they are judged in, of which `embodied features --quality` made "
+        "features; the last is what the others are ranked against (default: %(default)s)",
+    )
+    parser.add_argument("--split", default="test_unseen", help="whose tasks (default: %(default)s)")
+    add_judged_tasks(parser)
+    parser.add_argument(
+        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
+    )
+
+
+def _named_file(text: str) -> tuple[str, Path]:
+    name, _, path = text.partition("=")
+    if not name or not path:
+        raise argparse.ArgumentTypeError(f"{text!r} should be NAME=FILE, as in unlit=RUN/best.safetensors")
+    return name, any_path(path)
 
 
 def add_eval(parser: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
     embodied study vision encoders pictures --data DATA --out STUDY
+    embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
@@ -10,8 +11,9 @@
     embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and success against the number of training
-`houses` and of `requests`. HARI's are 4.7, 4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and
-'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (wants --without-rooms) and `rules`.
+`houses` and of `requests`. `realism` judges trained HANNA agents in houses drawn in other ways. HARI's tables are 4.7,
+4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's:
+`askers`, `interventions`, `rooms` (wants --without-rooms) and `rules`.
 `bandit` is a translator that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5;
 `stars` lets a HANNA agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it
 did: Tables 3.4, 3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions, `speakers`: one that
@@ -32,6 +34,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     learning.add_study(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
+    learning.add_study_realism(
+        kinds.add_parser("realism", help="HANNA agents that learned from some pictures, in others")
+    )
     learning.add_study_vision(kinds.add_parser("vision", help="encoders that turn pictures into features"))
     learning.add_study_hari(kinds.add_parser("hari", help="agents that learn which question to ask"))
     learning.add_study_vnla(kinds.add_parser("vnla", help="agents that ask an advisor within a budget"))
@@ -43,6 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     runs = {
         "hanna": run_hanna,
+        "realism": run_realism,
         "vision": run_vision,
         "hari": run_hari,
         "vnla": run_vnla,
@@ -73,6 +79,16 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
         args.seeds,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+
+
+def run_realism(args: argparse.Namespace) -> list[Path]:
+    from agents.realism_study import RealismSetting, run_study
+
+    arms: dict[str, list[Path]] = {}
+    for name, path in args.agents:
+        arms.setdefault(name, []).append(path)
+    setting = RealismSetting(args.data, args.out, arms, tuple(args.pictures), args.split, args.tasks, args.judge_seed)
+    return [run_study(setting, threads=args.threads, note=note)]
 
 
 def run_vision(args: argparse.Namespace) -> list[Path]:

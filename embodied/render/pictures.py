@@ -34,6 +34,8 @@ class PictureSettings:
     look: str | None = None
     """One of LOOKS; 'gloss' is for the qualities 'fast' and 'normal' of the classic renderer, and what None stands for
     there; elsewhere it stands for 'matte'."""
+    rays: int | None = None
+    """Per pixel, of qualities in TRACED; None: as many as embodied.light.reference.RAYS has for the quality."""
 
     def __post_init__(self) -> None:
         if self.quality not in QUALITIES:
@@ -54,6 +56,12 @@ class PictureSettings:
             )
         if self.light is not None and not self.lit:
             raise ValueError(f"quality {self.quality!r} is without light, so light={self.light!r} means nothing")
+
+        if self.rays is not None and (self.quality not in TRACED or self.rays < 1):
+            raise ValueError(
+                f"rays={self.rays} should be at least 1, and quality one of {TRACED}, which are traced; it is "
+                f"{self.quality!r}"
+            )
 
     @property
     def lit(self) -> bool:

@@ -1,0 +1,142 @@
+"""Success against realism: agents that learned from one kind of pictures, judged in houses drawn in others (no
+counterpart in the dissertation).
+
+    embodied features --data DATA --encoder ENCODER --quality reference --split test_unseen
+    embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
+
+Each agent looks through the encoder it learned with. Which way of drawing ranks agents as path-traced pictures do is
+told by Spearman's rank correlation over all agents.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import scipy.stats
+import torch
+
+from agents.figures import realism_figure
+from agents.hanna.agent import load_agent
+from agents.imitation.lessons import split_of
+from agents.imitation.loop import Note
+from agents.imitation.studies import table, write_markdown
+from agents.vision.config import drawing
+from agents.vision.drawn import pictures_of
+from assets.cache import digest
+from embodied.datasets.store import Dataset, dataset_of
+from embodied.evaluation.evaluate import evaluate
+from embodied.evaluation.tables import Row, row, save, shown
+from embodied.interface import Episode
+from embodied.locks import locked
+from embodied.records import load_lines, save_lines
+
+LEAST = 3
+"""Agents of which a rank correlation is told."""
+
+
+@dataclass(frozen=True)
+class RealismSetting:
+    """Who is judged, where, and how that is drawn."""
+
+    data: Path
+    out: Path
+    arms: Mapping[str, Sequence[Path]]
+    """Kind of agent to the files of its training seeds."""
+    pictures: tuple[str, ...]
+    """Keys of agents.vision.config.WAYS; the last is what the others are ranked against."""
+    split: str = "test_unseen"
+    tasks: int | None = None
+    """At most so many, from all houses alike."""
+    seed: int = 0
+    """Of judging."""
+
+
+def run_study(setting: RealismSetting, *, threads: int = 1, note: Note = print) -> Path:
+    """Judge what has not been judged yet, write table and figure; returns the Markdown file.
+
+    Raises:
+      FileNotFoundError: an agent, or features that it needs; says the command that makes them.
+      LockedError: another process writes to the study's folder.
+    """
+    torch.set_num_threads(threads)
+    data = dataset_of(setting.data, "hanna")
+    graphs = {name: place.graph for name, place in data.places(setting.split).items()}
+    rows: dict[tuple[str, str], Row] = {}
+    successes: dict[str, list[float]] = {way: [] for way in setting.pictures}
+    with locked(setting.out):
+        for way in setting.pictures:
+            for arm, paths in setting.arms.items():
+                seeds = [_episodes(setting, data, path, way) for path in paths]
+                alone = [row(arm, way, episodes, graphs, seed=setting.seed) for episodes in seeds]
+                successes[way] += [r.values["success"].mean for r in alone]
+                everybody = [e for episodes in seeds for e in episodes]
+                rows[arm, way] = row(arm, way, everybody, graphs, seed=setting.seed)
+                note(f"{arm} in {way} pictures: success {shown('success', rows[arm, way].values['success'])} %")
+        save(list(rows.values()), setting.out, "table_realism")
+        lines = {arm: [rows[arm, way].values["success"] for way in setting.pictures] for arm in setting.arms}
+        realism_figure(lines, setting.pictures, setting.out / "figure_realism.png")
+        return _page(setting, data, rows, successes)
+
+
+def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float:
+    """Spearman's, ties sharing their ranks; NaN for fewer than LEAST agents, or where all are equal."""
+    if len(first) < LEAST or len({*first}) == 1 or len({*second}) == 1:
+        return math.nan
+    return float(scipy.stats.spearmanr(first, second).statistic)
+
+
+def _episodes(setting: RealismSetting, data: Dataset, path: Path, way: str) -> list[Episode]:
+    """Those of one agent in houses drawn so, from the study's folder if it played them before."""
+    drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in data.names(setting.split)}
+    key = digest(data.digest, path, setting.split, setting.tasks or 0, setting.seed, drawn)
+    kept = setting.out / "episodes" / f"{key[:24]}.jsonl"
+    if kept.exists():
+        return list(load_lines(kept, Episode))
+    agent = load_agent(path)
+    policy = agent.policy(split_of(data, setting.split, agent.encoder_digest, quality=way).bank)
+    found: list[Episode] = []
+    evaluate(
+        data.split(setting.split),
+        {way: policy},
+        seed=setting.seed,
+        limit=setting.tasks,
+        batch=32,
+        keep=lambda name, episodes: found.extend(episodes),
+    )
+    save_lines(kept, found)
+    return found
+
+
+def _page(
+    setting: RealismSetting, data: Dataset, rows: Mapping[tuple[str, str], Row], successes: Mapping[str, list[float]]
+) -> Path:
+    best = setting.pictures[-1]
+    cells = [
+        [arm, str(len(paths)), *(_cell(rows[arm, way]) for way in setting.pictures)]
+        for arm, paths in setting.arms.items()
+    ]
+    agents = len(successes[best])
+    ranks = [rank_correlation(successes[way], successes[best]) for way in setting.pictures[:-1]]
+    told = ["–" if math.isnan(r) else f"{r:.2f}" for r in ranks]
+    cells.append([f"rank correlation with {best}", str(agents), *told, ""])
+    (arm, paths), *_ = setting.arms.items()
+    first = rows[arm, best]
+    drawn = "; ".join(
+        f"{way}: " + ", ".join(sorted({drawing(pictures_of(data, n, way)) for n in data.names(setting.split)}))
+        for way in setting.pictures
+    )
+    how = (
+        f"Success in per cent and, in brackets, requests, on {setting.split}: {first.episodes // len(paths)} tasks in "
+        f"{first.houses} houses, judged with seed {setting.seed}; 95 % intervals clustered by house and, where there "
+        f"are several, training seed. Spearman's rank correlation over all agents. Drawn {drawn}."
+    )
+    heads = ["learned from", "agents", *setting.pictures]
+    return write_markdown(setting.out / "table_realism.md", "Success against realism", table(heads, cells), how)
+
+
+def _cell(r: Row) -> str:
+    return f"{shown('success', r.values['success'])} ({shown('requests', r.values['requests'])})"
