@@ -19,6 +19,10 @@ from embodied.light.unwrap import Unwrapped, areas_of, cached_model, pack, unwra
 SHELL = ("wall", "floor", "ceiling")
 
 
+PRINT_AREA, PRINT_THICKNESS = 1.5, 0.06
+"""The most that prints measure: square metres of a side, and metres along the world's axis that is nearest to none."""
+
+
 @dataclass(frozen=True, eq=False)
 class UnwrappedThing:
     """Everything of one owner, unwrapped, in world coordinates."""
@@ -188,7 +192,7 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     small.
 
     Floors get 200 texels per metre, patterned walls and ceilings 120 and 80, patterned furniture 180 where
-    its luxels are not too coarse, mirrors 400; all times `sharpness`.
+    its luxels are not too coarse, prints twice that, mirrors 400; all times `sharpness`.
     """
     used = np.bincount(flat.part, weights=areas_of(flat.corners), minlength=len(finishes))
     patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
@@ -200,12 +204,17 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     if patterned:
         return int(
             np.clip(
-                round(180 * sharpness / side),
+                round((360 if _is_print(flat, used) else 180) * sharpness / side),
                 1 if side > 80 * sharpness else 2,
-                max(4, round(160 * sharpness / density)),
+                max(8 if _is_print(flat, used) else 4, round(160 * sharpness / density)),
             )
         )
     return 1 if side > 80 * sharpness else 2
+
+
+def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
+    """Whether a patterned thing is flat and small enough to be looked at as a picture is: posters, paintings, covers."""
+    return areas.sum() < 2 * PRINT_AREA and np.ptp(flat.corners.reshape(-1, 3), axis=0).min() < PRINT_THICKNESS
 
 
 def _page(

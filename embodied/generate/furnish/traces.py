@@ -314,11 +314,7 @@ SUNNING = (
     Trace("cushion", ("rattan sofa", "rattan armchair", *SEATS), 1.0, spot="back"),
     Trace("slippers", (), 0.5, mess=True),
 )
-PASSING = (
-    Trace(SHELF, (), 0.5, wall=1.6, most=1),
-    *(t for t in ARRIVING if t.on and t.role != "shoes"),
-    Trace("child's drawing", (), 0.4, "child", wall=1.6),
-)
+PASSING = (*(t for t in ARRIVING if t.on and t.role != "shoes"), Trace("child's drawing", (), 0.4, "child", wall=1.6))
 GROWN_UP = ("candle", "vase", "perfume bottle", "lotion bottle", "medicine bottle", "handbag", "watch", "glass")
 """What children's rooms lack."""
 TRACES: Mapping[str, tuple[Trace, ...]] = {
