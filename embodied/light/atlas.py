@@ -213,7 +213,7 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
 
 
 def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
-    """Whether a patterned thing is flat and small enough to be looked at as pictures are: posters, paintings, covers."""
+    """Whether a patterned thing is flat and small enough to be looked at as pictures are: posters, paintings, books."""
     return areas.sum() < 2 * PRINT_AREA and np.ptp(flat.corners.reshape(-1, 3), axis=0).min() < PRINT_THICKNESS
 
 
