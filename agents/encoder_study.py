@@ -22,6 +22,7 @@ from typing import Any
 
 import torch
 
+from agents.device import check_device
 from agents.imitation.loop import Note
 from agents.imitation.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
 from agents.vision.config import WAYS, VisionConfig
@@ -73,6 +74,7 @@ class EncoderStudySetting:
     """Whose houses they are judged on; choose on validation houses."""
     threads: int = 1
     """Of PyTorch, per encoder."""
+    device: str = "cpu"
 
     def folder(self, encoder: str, seed: int) -> Path:
         return self.out / encoder.replace(",", "").replace(" ", "_") / f"seed_{seed}"
@@ -105,6 +107,7 @@ def run_study(
     """
     refuse_unknown(names, STUDIES)
     refuse_unknown(rows or (), ENCODERS)
+    check_device(setting.device)
     data, ways = Dataset(setting.source.data), tuple(pictures) if "pictures" in names else ()
     for quality in (None, *ways):  # drawn before encoders share the cores
         houses = houses_of(data, (setting.split,))
@@ -126,7 +129,9 @@ def _run(setting: EncoderStudySetting, ways: Sequence[str], note: Note, seed: in
         return f"{name}, seed {seed}: done before"
     with locked(folder):
         seen = setting.source.strips(training_houses(data, config))
-        encoder, classes = taught(seen, config, folder, lambda line: note(f"{name}, seed {seed}: {line}"))
+        encoder, classes = taught(
+            seen, config, folder, lambda line: note(f"{name}, seed {seed}: {line}"), device=setting.device
+        )
         known = labelled(data, seen, encoder, classes)
         for quality in missing:
             source = dataclasses.replace(setting.source, quality=quality or setting.source.quality)

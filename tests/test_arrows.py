@@ -111,8 +111,8 @@ agents.tables <- embodied.evaluation
 agents.vision <- agents.shipped agents.device assets.catalogue embodied.house embodied.scene embodied.interface
     embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file
     agents.checkpoint_file embodied.locks embodied.records
-agents.encoder_study <- agents.imitation agents.vision embodied.datasets embodied.evaluation embodied.locks
-    embodied.records
+agents.encoder_study <- agents.device agents.imitation agents.vision embodied.datasets embodied.evaluation
+    embodied.locks embodied.records
 agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
     embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.records
 agents.hari <- agents.imitation agents.checkpoint_file embodied.interface embodied.action_spaces embodied.records

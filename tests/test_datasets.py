@@ -206,6 +206,9 @@ def test_a_house_that_cannot_be_made_is_an_error_after_a_bounded_number_of_seeds
 
 def test_a_size_of_ones_own_is_a_scale():
     assert own_size(40, 4000) == "40x4000"
+    final = scale(own_size(1, 25, 60), "hanna")
+    assert final.houses == {"train": 1, "val": 1, "test": 60}
+    assert {s.name: s.tasks for s in final.splits}["test_unseen"] == 1500
     wanted = scale("40x4000", "hanna")
     assert dict(wanted.houses) == {"train": 40, "val": 4, "test": 8}
     assert {s.name: s.tasks for s in wanted.splits}["test_unseen"] == 800

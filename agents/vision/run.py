@@ -40,12 +40,13 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
       LockedError: another process writes to args.out.
     """
     torch.set_num_threads(args.threads)
+    check_device(args.device)
     data = Dataset(args.data)
     source = StripSource(data.folder, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
     with locked(args.out):
         seen = source.strips(training_houses(data, config), workers=args.workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=args.workers, note=note)
-        encoder, classes = taught(seen, config, args.out, note)
+        encoder, classes = taught(seen, config, args.out, note, device=args.device)
         untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (
@@ -61,12 +62,12 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
 
 
 def taught(
-    seen: Sequence[HouseStrips], config: VisionConfig, folder: Path, note: Note = print
+    seen: Sequence[HouseStrips], config: VisionConfig, folder: Path, note: Note = print, *, device: str = "cpu"
 ) -> tuple[Encoder, list[str]]:
     """The encoder that `config` makes of strips, from `folder` if it is there, and the classes it was taught."""
     classes = trained_classes(folder, config)
     if classes is None:
-        encoder, heads, classes = train_encoder(seen, config, folder / "checkpoint.pt", note=note)
+        encoder, heads, classes = train_encoder(seen, config, folder / "checkpoint.pt", device=device, note=note)
         save_training(whitened(encoder, seen), heads, classes, config, folder)
         (folder / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes

@@ -77,6 +77,9 @@ class StripBatch:
     room: Tensor
     """(n,) int64."""
 
+    def to(self, device: str) -> StripBatch:
+        return StripBatch(**{f.name: getattr(self, f.name).to(device) for f in dataclasses.fields(self)})
+
 
 def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
@@ -187,11 +190,13 @@ def train_encoder(
     config: VisionConfig,
     checkpoint: Path | None = None,
     *,
+    device: str = "cpu",
     note: Callable[[str], None] = print,
 ) -> tuple[Encoder, Heads, list[str]]:
-    """The encoder, its heads, and the names of the classes the heads speak of.
+    """The encoder, its heads, and the names of the classes the heads speak of; both on the CPU in the end.
 
     Args:
+      device: where PyTorch computes.
       checkpoint: where the state after each epoch is kept; training goes on from it.
 
     Raises:
@@ -204,7 +209,7 @@ def train_encoder(
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
     classes = frequent_classes(houses, config.least_views)
     strips = strips_of(houses)
-    training = _Training(config, len(classes), strips // config.batch)
+    training = _Training(config, len(classes), strips // config.batch, device)
     if checkpoint is not None and checkpoint.exists():
         training.load(checkpoint)
         note(f"going on after epoch {training.epoch} of {config.epochs}")
@@ -213,19 +218,18 @@ def train_encoder(
         training.pass_over(houses, classes, note)
         if checkpoint is not None:
             training.save(checkpoint)
-    training.network.eval()
-    training.heads.eval()
-    return Encoder(training.network, config.network), training.heads, [houses[0].classes[i] for i in classes]
+    network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
+    return Encoder(network, config.network), heads, [houses[0].classes[i] for i in classes]
 
 
 class _Training:
     """Owns what changes while an encoder learns."""
 
-    def __init__(self, config: VisionConfig, classes: int, updates: int) -> None:
+    def __init__(self, config: VisionConfig, classes: int, updates: int, device: str) -> None:
         """Args:
         updates: per epoch.
         """
-        self.config, self.epoch = config, 0
+        self.config, self.epoch, self._device = config, 0, device
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
             self.network = build(config.network)
@@ -234,6 +238,8 @@ class _Training:
             begin_as_imagenet(self.network)
         if config.frozen:
             body_of(self.network).requires_grad_(False)
+        self.network.to(device)
+        self.heads.to(device)
         parameters = [p for p in (*self.network.parameters(), *self.heads.parameters()) if p.requires_grad]
         self._optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
@@ -251,7 +257,7 @@ class _Training:
         rng = stream(self.config.seed, "vision", "epoch", self.epoch)
         drawn = batches(houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng)
         for done, batch in enumerate(drawn, 1):
-            loss, parts = vision_loss(self.network, self.heads, batch)
+            loss, parts = vision_loss(self.network, self.heads, batch.to(self._device))
             if not torch.isfinite(loss):
                 raise FloatingPointError(
                     f"vision loss became {float(loss)} in epoch {self.epoch + 1}; lower the learning rate"

@@ -40,6 +40,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tasks", type=whole(), metavar="N", help="with --houses: training tasks (default: 100 per house)"
     )
+    parser.add_argument(
+        "--test-houses", type=whole(), metavar="N", help="with --houses: houses to test in, with as many tasks each"
+    )
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
     parser.add_argument(
         "--area",
@@ -188,9 +191,9 @@ def chosen_scale(args: argparse.Namespace) -> str:
       ValueError: both of them, or --tasks alone.
     """
     if args.houses is None:
-        if args.tasks is not None:
-            raise ValueError("--tasks wants --houses beside it; or choose a --scale")
+        if args.tasks is not None or args.test_houses is not None:
+            raise ValueError("--tasks and --test-houses want --houses beside it; or choose a --scale")
         return args.scale or "mini"
     if args.scale:
         raise ValueError("--scale and --houses say the same thing twice; leave one out")
-    return own_size(args.houses, 100 * args.houses if args.tasks is None else args.tasks)
+    return own_size(args.houses, 100 * args.houses if args.tasks is None else args.tasks, args.test_houses)

@@ -109,6 +109,7 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
 
 def _add_strips(parser: argparse.ArgumentParser) -> None:
     """Where an encoder is made, and from which pictures."""
+    add_device(parser)
     parser.add_argument(
         "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
     )

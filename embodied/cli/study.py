@@ -99,7 +99,13 @@ def run_vision(args: argparse.Namespace) -> list[Path]:
 
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
     setting = EncoderStudySetting(
-        source, args.out, chosen(args, VisionConfig()), seeds=args.seeds, split=args.split, threads=args.threads
+        source,
+        args.out,
+        chosen(args, VisionConfig()),
+        seeds=args.seeds,
+        split=args.split,
+        threads=args.threads,
+        device=args.device,
     )
     made = run_study(setting, args.tables, rows=args.rows, pictures=args.pictures, workers=args.workers, note=note)
     return list(made.values())

@@ -110,18 +110,21 @@ SMALL: Mapping[str, tuple[tuple[int, int, int, int], int, int]] = {
 SCALES = ("paper", *SMALL)
 OOD = "test_ood"
 """The split of houses out of distribution: models, looks, speakers and words that occur in no other split."""
-OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)")
+OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)(?:x([1-9]\d*))?")
 
 
-def own_size(houses: int, tasks: int) -> str:
-    """The name of a scale with so many training houses and tasks: '40x4000'.
+def own_size(houses: int, tasks: int, test: int | None = None) -> str:
+    """The name of a scale with so many training houses and tasks, '40x4000', and so many houses to test in, if that is
+    said: '40x4000x60'.
 
     Raises:
-      ValueError: less than one of either.
+      ValueError: less than one of any.
     """
-    if houses < 1 or tasks < 1:
-        raise ValueError(f"a data set needs at least one house and one task, got {houses} and {tasks}")
-    return f"{houses}x{tasks}"
+    if houses < 1 or tasks < 1 or (test is not None and test < 1):
+        raise ValueError(
+            f"a data set needs at least one house, one task and one house to test in, got {houses}, {tasks} and {test}"
+        )
+    return f"{houses}x{tasks}" + ("" if test is None else f"x{test}")
 
 
 def scale(name: str, kind: str, ood: int = 0) -> Scale:
@@ -132,7 +135,7 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
     learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
     are those of the smaller; 'tiny' is for tests. '40x4000' has 40 houses and 4,000 tasks to learn
     from, a tenth as many houses to validate in, a fifth as many to test in and a fifth as many
-    tasks there. Houses out of distribution have as many tasks each as the others to test in.
+    tasks there; '40x4000x60' has 60 to test in, with as many tasks each. Houses out of distribution have as many tasks each as the others to test in.
 
     Raises:
       ValueError: an unknown scale or kind, or a negative number of houses.
@@ -143,7 +146,9 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
         raise ValueError(f"unknown kind of task {kind!r}; use one of {KINDS}")
     if own := OWN_SIZE.fullmatch(name):
         n, tasks = int(own[1]), int(own[2])
-        houses, splits = _small(kind, (n, max(1, n // 3), max(1, n // 10), max(1, n // 5)), tasks, max(2, tasks // 5))
+        test = int(own[3]) if own[3] else max(1, n // 5)
+        judged = max(2, round(tasks / n * test) if own[3] else tasks // 5)
+        houses, splits = _small(kind, (n, max(1, n // 3), max(1, n // 10), test), tasks, judged)
     elif name == "paper":
         houses, splits = PAPER[kind]
     elif name in SMALL:
@@ -151,8 +156,8 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
     else:
         raise ValueError(f"unknown scale {name!r}; use one of {SCALES}, or a size such as '40x4000' (houses x tasks)")
     if ood:
-        judged = next(s for s in splits if s.group == "test")
-        more = SplitPlan(OOD, "ood", round(judged.tasks / houses["test"] * ood))
+        unseen = next(s for s in splits if s.group == "test")
+        more = SplitPlan(OOD, "ood", round(unseen.tasks / houses["test"] * ood))
         houses, splits = {**houses, "ood": ood}, (*splits, more)
     return Scale(name, dict(houses), splits)
 
