@@ -135,7 +135,8 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
     learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
     are those of the smaller; 'tiny' is for tests. '40x4000' has 40 houses and 4,000 tasks to learn
     from, a tenth as many houses to validate in, a fifth as many to test in and a fifth as many
-    tasks there; '40x4000x60' has 60 to test in, with as many tasks each. Houses out of distribution have as many tasks each as the others to test in.
+    tasks there; '40x4000x60' has 60 to test in, with as many tasks each. Houses out of distribution
+    have as many tasks each as the others to test in.
 
     Raises:
       ValueError: an unknown scale or kind, or a negative number of houses.
