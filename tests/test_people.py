@@ -14,9 +14,10 @@ from hand_worlds import grid_world, thing
 
 from assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
-from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, add_people, meet, sits, stands
+from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, POLITE, add_people, meet, sits, stands
 from embodied.geometry import facing_of, wrap
-from embodied.house.house import House, Placement, check
+from embodied.house.house import House, Opening, Placement, check
+from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import RADIUS, NavGraph, graph_of, unreachable_rooms
 from embodied.tasks.goals import find_instances
 
@@ -86,6 +87,32 @@ def test_nobody_blocks_an_edge_or_stands_in_furniture():
         a.distance(b) >= APART / 2 + max(FIGURE.size[:2]) / 2 - 0.02 for i, a in enumerate(people) for b in people[:i]
     )
     check(house)
+
+
+def test_nobody_stands_in_the_open_leaf_of_a_door():
+    world = grid_world(6, spacing=3.0)
+    wide = [dataclasses.replace(o, b=_farther(o, 2.0), angle=1.4) for o in world.house.openings]
+    house = dataclasses.replace(world.house, openings=tuple(wide))
+    open_leaves = shapely.union_all([leaf for o in wide for leaf in leaves(house, o)])
+    apart = []
+    for seed in range(8):
+        met = meet(house, world.graph, catalogue(FIGURE), seed=seed)
+        apart += [open_leaves.distance(shapely.Point(p.position[:2])) for p in met.values()]
+    assert min(apart) >= max(FIGURE.size[:2]) / 2 - 0.02
+
+
+def _farther(o: Opening, width: float) -> tuple[float, float]:
+    """The other end of an opening that is so wide."""
+    along = np.subtract(o.b, o.a) / math.dist(o.a, o.b)
+    x, y = np.add(o.a, width * along)
+    return float(x), float(y)
+
+
+def test_people_keep_a_metre_from_where_they_are_met_if_there_is_room():
+    for seed in range(8):
+        house, world = populated((14,), seed=seed)
+        far = [math.dist(p.position[:2], world.graph.positions[14, :2]) for p in people_of(house)]
+        assert min(far) >= POLITE - 1e-3
 
 
 def test_somebody_sits_on_a_chair_with_the_back_at_its_back():

@@ -238,6 +238,17 @@ def test_lit_pages_replace_the_materials(house):
         scene.build_spec(house, HandCatalogue(), free=frozenset({"mug_1"}), lit=pages)
 
 
+def test_people_are_seen_from_inside_where_their_models_have_gaps(house):
+    corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], np.float32)
+    faces, uv = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros((4, 2), np.float32)
+    pages = (np.full((8, 8, 3), 77, np.uint8),)
+    rug = LitMesh("rug_1", "object", "living_room_1", 0, corners, faces, uv)
+    count = lambda h: scene.compile_scene(h, HandCatalogue(), collisions=False, lit=LitPages((rug,), pages, "x"))
+    person = [dataclasses.replace(p, object_class="person") if p.id == "rug_1" else p for p in house.placements]
+    lit = count(dataclasses.replace(house, placements=tuple(person)))
+    assert (count(house).model.nmeshface, lit.model.nmeshface) == (2, 4)
+
+
 def test_light_of_another_house_is_refused(house):
     pages = LitPages((), (), "x", owners=("somebody_else",))
     with pytest.raises(ValueError, match="another house"):

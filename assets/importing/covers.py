@@ -65,7 +65,7 @@ def _threads(n: int, rng: np.random.Generator, strength: float) -> np.ndarray:
 
 def _cloth(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
     clouds = 1 + 0.02 * fbm(n, 4, 60, 1.2, rng=rng)
-    return (_threads(n, rng, 0.07) * clouds * folds(n, tile, 0.10, 0.028, rng=rng))[..., None]
+    return (_threads(n, rng, 0.045) * clouds * folds(n, tile, 0.10, 0.028, rng=rng))[..., None]
 
 
 def _bedding(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:

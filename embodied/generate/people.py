@@ -14,6 +14,7 @@ import shapely
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.house.shapes import footprint
+from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 CLASS = "person"
 NEAREST, FARTHEST = 0.5, 2.0
 """How far from their node people may be, metres: within its zone of attention."""
+POLITE = 1.0
+"""How far they are where there is room, metres."""
 APART = 0.9
 """Width of the circle around a person that nobody else's body enters, metres."""
 STANDING = 1.35
@@ -122,16 +125,19 @@ class _Site:
     ) -> None:
         around = _disc(eye, 2 * FARTHEST)
         self.eye, self.room, self.floor = eye, room, house.storey_of(room).elevation
-        self.edges, self.ring = ways.intersection(around), _disc(eye, FARTHEST).difference(_disc(eye, NEAREST))
+        self.edges, far = ways.intersection(around), _disc(eye, FARTHEST)
+        self.ring, self.polite = far.difference(_disc(eye, NEAREST)), far.difference(_disc(eye, POLITE))
         self.others = [
             _disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST
         ]
         self.open = house.floor(room).intersection(around)
         self.things = [p for p in house.placements if p.room == room.id and _in_the_way(p)]
+        doors = [o for o in house.openings if o.kind == "door" and o.rooms[0] == room.id]
+        self.leaves = [leaf for o in doors for leaf in leaves(house, o)]
 
     def stand(self, figures: Sequence[Asset], rng: np.random.Generator) -> Placement | None:
         """The first figure that finds free floor beside the ways; it looks at the node."""
-        free = self.open.difference(shapely.union_all([*map(footprint, self.things), *self.others]))
+        free = self.open.difference(shapely.union_all([*map(footprint, self.things), *self.leaves, *self.others]))
         too_wide = math.inf
         for i in rng.permutation(len(figures)):
             asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
@@ -139,6 +145,8 @@ class _Site:
                 continue
             where = _spots(free, self.edges, self.ring, body)
             if where.area >= ROOM:
+                away = where.intersection(self.polite)
+                where = away if away.area >= ROOM else where
                 break
             too_wide = body
         else:
@@ -162,6 +170,7 @@ class _Site:
             body = shapely.Polygon(rectangle(spot[0], spot[1], asset.size[0], asset.size[1], yaw))
             below = self.floor + asset.size[2]
             taken = [
+                *self.leaves,
                 *self.others,
                 *(footprint(p) for p in self.things if p is not seat.placement and p.position[2] < below),
             ]

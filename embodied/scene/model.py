@@ -9,7 +9,7 @@ import ctypes
 import functools
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +46,8 @@ LOOSE = ("floor", "against_wall", "corner", "surface")
 """Supports under which a freed object can move; what hangs on walls and ceilings stays fixed."""
 LEAVES = ("/leaf", "/leaf_2", "/glass")
 """Ends of the owners of what closes an opening."""
+HOLLOW = ("person",)
+"""Classes whose models are shells with gaps, through which one would see what stands behind them."""
 UNDERFOOT = 0.03
 """Things on the floor that are lower than this (rugs, mats) are cloth to walk on and stop nothing, metres."""
 
@@ -170,7 +172,7 @@ def build_spec(
         _add_parts(spec, parts, bodies)
     else:
         spec.visual.headlight.active = 0
-        _add_pages(spec, lit)
+        _add_pages(spec, lit, {p.id for p in house.placements if p.object_class in HOLLOW})
     if collisions:
         _add_collisions(spec, house, catalogue, bodies)
         _add_leaves(spec, parts or shell_parts(house, catalogue.finish))
@@ -379,7 +381,8 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
-def _add_pages(spec: mujoco.MjSpec, lit: LitPages) -> None:
+def _add_pages(spec: mujoco.MjSpec, lit: LitPages, hollow: Collection[str]) -> None:
+    """The meshes of a lit house; those of owners in `hollow` are seen from inside, too."""
     for i, page in enumerate(lit.pages):
         add_texture(spec, f"page_{i}", page)
         material = spec.add_material(name=f"page_{i}", rgba=[1, 1, 1, 1], emission=1.0, specular=0.0, shininess=0.0)
@@ -389,7 +392,11 @@ def _add_pages(spec: mujoco.MjSpec, lit: LitPages) -> None:
         if len(m.faces):
             k = count[m.owner] = count.get(m.owner, -1) + 1
             name = f"{i:04d}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
-            _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
+            vertices, uv, faces = m.vertices, m.uv, m.faces
+            if m.owner in hollow:
+                faces = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
+                vertices, uv = np.concatenate([vertices, vertices]), np.concatenate([uv, uv])
+            _add_mesh(spec, name, vertices, None, uv, faces)
             spec.worldbody.add_geom(
                 name=f"{m.owner}#{k}",
                 type=mujoco.mjtGeom.mjGEOM_MESH,
