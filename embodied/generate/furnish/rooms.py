@@ -239,7 +239,7 @@ KITCHEN = Programme(
         Need(("kitchen sink",), ("kitchen sink",)),
         Need(("cooker",), ("cooker", "cooktop")),
         Need(("fridge",), ("fridge",)),
-        Need(("counter",)),
+        Need(("counter",), ("base cabinet", "drawer cabinet", "kitchen island")),
     ),
     fill=0.27,
     fillers=(
