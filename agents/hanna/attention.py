@@ -50,9 +50,8 @@ class MultiAttend(nn.Module):
         q_heads = self.query(q).view(b, m, self.heads, d).transpose(1, 2)  # (B, heads, m, d)
         k_heads = keys.view(b, n, self.heads, d).transpose(1, 2)  # (B, heads, n, d)
         v_heads = values.view(b, n, self.heads, d).transpose(1, 2)  # (B, heads, n, d)
-        scores = q_heads @ k_heads.transpose(2, 3) / math.sqrt(d)  # (B, heads, m, n)
-        weights = scores.masked_fill(~mask[:, None, None], -torch.inf).softmax(-1)
-        seen = (weights @ v_heads).transpose(1, 2).reshape(b, m, h)
+        seen = F.scaled_dot_product_attention(q_heads, k_heads, v_heads, mask[:, None, None])  # (B, heads, m, d)
+        seen = seen.transpose(1, 2).reshape(b, m, h)
         out = self.norm(q + self.dropout(self.out(seen)))
         return out if query.dim() == 3 else out[:, 0]
 
