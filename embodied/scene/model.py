@@ -47,7 +47,8 @@ LOOSE = ("floor", "against_wall", "corner", "surface")
 LEAVES = ("/leaf", "/leaf_2", "/glass")
 """Ends of the owners of what closes an opening."""
 HOLLOW = ("person",)
-"""Classes whose models are shells with gaps, through which one would see what stands behind them."""
+"""Classes whose models are shells with gaps, through which one would see what stands behind them. Drawn from both sides
+here instead of by `two_sided` of their import, which would double what is baked of them."""
 UNDERFOOT = 0.03
 """Things on the floor that are lower than this (rugs, mats) are cloth to walk on and stop nothing, metres."""
 
