@@ -39,6 +39,14 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     assert report.facts["by_class"]["red box"] == {"shown": boxes, "recognised": boxes}
     assert report.facts["by_class"]["flag"]["recognised"] == 0 and report.facts["worst"][0] == "flag"
     assert report.facts["classes"] == 0.5
+    assert report.facts["by_time"] == {look.time_of(house.sky.hour): {"shown": len(shown), "recognised": boxes}}
+    assert [look.time_of(hour) for hour in (3.0, 6.0, 12.5, 18.6, 22.0)] == [
+        "night",
+        "morning",
+        "noon",
+        "evening",
+        "night",
+    ]
     assert json.loads((tmp_path / "out" / "look.json").read_text())["crops"] == len(shown)
     assert (tmp_path / "out" / "look_worst.jpg").stat().st_size > 1000
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ HOUSES = 3
 """How many are looked at unless told otherwise."""
 AREA = (35.0, 70.0)
 """Square metres of each, as in `bench light`."""
+TIMES = (("night", 6.0), ("morning", 11.0), ("noon", 16.0), ("evening", 20.0), ("night", math.inf))
+"""Times of the day, each with the hour it ends at."""
 WORST, EACH, SMALL = 30, 4, 168
 """Classes that are shown, crops of each of them, and their pixels."""
 
@@ -154,10 +157,12 @@ def recognised(
       houses: how many, with consecutive seeds.
     """
     crops: list[Crop] = []
+    times: list[str] = []
     for k in range(houses):
         house = generate_house(seed + k, HouseConfig(area=AREA), catalogue=catalogue)
         with open_world(house, catalogue, cache, pictures) as world:
             crops += kept_crops(world, MAPPED, out / "crops")
+        times += [time_of(house.sky.hour)] * (len(crops) - len(times))
         progress(f"house {seed + k}: {len(house.placements)} objects, {len(crops)} crops so far")
     five = judge(np.stack([c.rgb for c in crops])) if crops else np.zeros((0, 5), int)
     right = np.array([bool(set(MAPPED[c.object_class]) & set(map(int, f))) for c, f in zip(crops, five, strict=True)])
@@ -174,6 +179,10 @@ def recognised(
         "objects": float(right.mean()) if len(right) else None,
         "classes": float(np.mean([np.mean(r) for r, _ in by_class.values()])) if by_class else None,
         "by_class": {name: {"shown": len(r), "recognised": int(np.sum(r))} for name, (r, _) in by_class.items()},
+        "by_time": {
+            name: {"shown": times.count(name), "recognised": int(sum(r for r, t in zip(right, times) if t == name))}
+            for name in dict.fromkeys(times)
+        },
         "guesses": [{"object": c.owner, "class": c.object_class, "five": f.tolist()} for c, f in zip(crops, five)],
         "worst": worst,
     }
@@ -184,6 +193,11 @@ def recognised(
         jpeg = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         write_bytes(out / "look_worst.jpg", jpeg.tobytes())
     return LookReport(facts, table(facts))
+
+
+def time_of(hour: float) -> str:
+    """The name in TIMES of an hour of the day."""
+    return next(name for name, end in TIMES if hour < end)
 
 
 def _of(crops: Sequence[Crop], name: str) -> list[int]:
@@ -198,7 +212,10 @@ def table(facts: dict) -> str:
     return (
         f"{facts['objects']:.0%} of {facts['crops']} objects and {facts['classes']:.0%} on average over "
         f"{len(facts['by_class'])} classes are among the judge's first five ({facts['quality']}, {facts['look']}, "
-        f"houses {facts['houses']})\nworst: " + ", ".join(worst)
+        f"houses {facts['houses']})\nby the house's hour: "
+        + ", ".join(f"{n} {t['recognised']}/{t['shown']}" for n, t in facts["by_time"].items())
+        + "\nworst: "
+        + ", ".join(worst)
     )
 
 
