@@ -11,10 +11,18 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.bench import crops, look
+from embodied.bench import crops, look, views
 from embodied.bench.crops import crops_of
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
+
+
+class Judge:
+    def first_five(self, pictures: np.ndarray) -> np.ndarray:
+        return np.tile([1, 478, 2, 3, 4], (len(pictures), 1))
+
+    def features(self, pictures: np.ndarray) -> np.ndarray:
+        return pictures.mean((1, 2))
 
 
 @pytest.mark.slow
@@ -29,12 +37,11 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     box = next(c.rgb.astype(int) for c in shown if c.object_class == "red box")
     assert (box[60:160, 60:160, 0] > 2 * box[60:160, 60:160, 1]).mean() > 0.8, "it fills the middle"
 
-    def judge(pictures: np.ndarray) -> np.ndarray:
-        return np.tile([1, 478, 2, 3, 4], (len(pictures), 1))
-
+    monkeypatch.setattr(views, "SIZE", (32, 48))
+    monkeypatch.setattr(views, "RAYS", 4)
     pictures = PictureSettings(64)
     told = {"seed": 0, "pictures": pictures, "houses": 1}
-    report = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", judge, **told)
+    report = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", Judge(), **told)
     boxes = sum(c.object_class == "red box" for c in shown)
     assert report.facts["by_class"]["red box"] == {"shown": boxes, "recognised": boxes}
     assert report.facts["by_class"]["flag"]["recognised"] == 0 and report.facts["worst"][0] == "flag"
@@ -49,6 +56,28 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     ]
     assert json.loads((tmp_path / "out" / "look.json").read_text())["crops"] == len(shown)
     assert (tmp_path / "out" / "look_worst.jpg").stat().st_size > 1000
+    seen = report.facts["views"]
+    assert seen["views"] == 1 and 0 < seen["own"] < 0.2 and seen["nearest"] is None
+    assert f"{seen['own']:.3f} from the path tracer's" in report.text
+    kept = [p.stat().st_mtime_ns for p in (tmp_path / "out" / "views").iterdir()]
+    told["traced"] = False
+    bare = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", Judge(), **told)
+    assert bare.facts["views"]["views"] == 0 and "path tracer" not in bare.text
+    look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", Judge(), **told | {"traced": True})
+    assert [p.stat().st_mtime_ns for p in (tmp_path / "out" / "views").iterdir()] == kept, "not traced again"
+
+
+def test_views_are_compared_with_their_own_traced_picture_and_those_of_others():
+    def picture(colour: tuple[int, int, int]) -> np.ndarray:
+        return np.full((4, 4, 3), colour, np.uint8)
+
+    red, green, yellow = (255, 0, 0), (0, 255, 0), (255, 255, 0)
+    pairs = [views.Pair("a", picture(red), picture(red)), views.Pair("b", picture(red), picture(green))]
+    told = views.likeness(pairs, Judge().features)
+    assert told["own"] == pytest.approx(0.5) and told["others"] == pytest.approx(1.0) and told["nearest"] == 0.5
+    slanted = views.likeness([views.Pair("a", picture(yellow), picture(red))], Judge().features)
+    assert slanted["own"] == pytest.approx(1 - math.sqrt(0.5)) and slanted["others"] is None
+    assert views.likeness([], Judge().features) == {"views": 0, "own": None, "others": None, "nearest": None}
 
 
 @pytest.mark.slow

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import cv2
 import numpy as np
 
 from assets.cache import write_bytes, write_json
 from embodied.bench.crops import Crop, kept_crops
+from embodied.bench.light import TIMES as SKIES
+from embodied.bench.views import Pair, kept_pair, likeness, write_pairs
 from embodied.generate import HouseConfig, generate_house
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from assets.catalogue import Catalogue
 
 HOUSES = 3
@@ -128,6 +132,18 @@ MAPPED: dict[str, tuple[int, ...]] = {
 ImageNet has no word for is not judged: its "plate" (923) is a main course."""
 
 
+class Judge(Protocol):
+    """A network that knows photographs (agents.vision.stranger)."""
+
+    def first_five(self, pictures: np.ndarray) -> np.ndarray:
+        """(n, 5) classes of ImageNet, the likeliest first, of pictures (n, SIDE, SIDE, 3) uint8."""
+        ...
+
+    def features(self, pictures: np.ndarray) -> np.ndarray:
+        """(n, k) of pictures (n, h, w, 3) uint8."""
+        ...
+
+
 @dataclass(frozen=True)
 class LookReport:
     """What `embodied bench look` shows."""
@@ -140,31 +156,37 @@ def recognised(
     catalogue: Catalogue,
     cache: Path,
     out: Path,
-    judge: Callable[[np.ndarray], np.ndarray],
+    judge: Judge,
     *,
     seed: int,
     pictures: PictureSettings,
     houses: int = HOUSES,
+    traced: bool = True,
     progress: Callable[[str], None] = lambda text: None,
 ) -> LookReport:
-    """Show every mapped object of some houses to a judge; write look.json and the worst crops to look_worst.jpg.
+    """Show every mapped object of some houses to a judge, and a whole view of each beside the path tracer's.
 
-    Crops that `out`/crops already holds, drawn by the same code, are not drawn again.
+    Writes look.json, the worst crops to look_worst.jpg and the views to look_views.jpg. What `out`/crops and
+    `out`/views hold already, drawn by the same code, is not drawn again.
 
     Args:
-      judge: from (n, SIDE, SIDE, 3) uint8 to (n, 5) classes of ImageNet, the likeliest first.
       seed: of the first house.
-      houses: how many, with consecutive seeds.
+      houses: how many, with consecutive seeds, and the times of day of `bench light` in turn.
+      traced: whether views are compared with the path tracer's; it takes a bake and a minute of two cores per house.
     """
     crops: list[Crop] = []
+    pairs: list[Pair] = []
     times: list[str] = []
     for k in range(houses):
-        house = generate_house(seed + k, HouseConfig(area=AREA), catalogue=catalogue)
+        hour, weather = SKIES[k % len(SKIES)]
+        house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
         with open_world(house, catalogue, cache, pictures) as world:
             crops += kept_crops(world, MAPPED, out / "crops")
+            if traced:
+                pairs.append(kept_pair(world, out / "views"))
         times += [time_of(house.sky.hour)] * (len(crops) - len(times))
         progress(f"house {seed + k}: {len(house.placements)} objects, {len(crops)} crops so far")
-    five = judge(np.stack([c.rgb for c in crops])) if crops else np.zeros((0, 5), int)
+    five = judge.first_five(np.stack([c.rgb for c in crops])) if crops else np.zeros((0, 5), int)
     right = np.array([bool(set(MAPPED[c.object_class]) & set(map(int, f))) for c, f in zip(crops, five, strict=True)])
     by_class = {}
     for name in sorted({c.object_class for c in crops}):
@@ -183,10 +205,13 @@ def recognised(
             name: {"shown": times.count(name), "recognised": int(sum(r for r, t in zip(right, times) if t == name))}
             for name in dict.fromkeys(times)
         },
+        "views": likeness(pairs, judge.features),
         "guesses": [{"object": c.owner, "class": c.object_class, "five": f.tolist()} for c, f in zip(crops, five)],
         "worst": worst,
     }
     write_json(out / "look.json", facts, indent=1)
+    if pairs:
+        write_pairs(pairs, out / "look_views.jpg")
     if worst:
         rows = [sorted(by_class[name][1], key=lambda i: bool(right[i]))[:EACH] for name in worst]
         picture = sheet([[crops[i] for i in row] for row in rows], [right[row].tolist() for row in rows])
@@ -214,9 +239,21 @@ def table(facts: dict) -> str:
         f"{len(facts['by_class'])} classes are among the judge's first five ({facts['quality']}, {facts['look']}, "
         f"houses {facts['houses']})\nby the house's hour: "
         + ", ".join(f"{n} {t['recognised']}/{t['shown']}" for n, t in facts["by_time"].items())
-        + "\nworst: "
+        + f"\n{_views(facts['views'])}worst: "
         + ", ".join(worst)
     )
+
+
+def _views(views: dict) -> str:
+    if not views["views"]:
+        return ""
+    text = f"whole views ({views['views']}): {views['own']:.3f} from the path tracer's of the same view"
+    if views["others"] is not None:
+        text += (
+            f", whose pictures of other houses are {views['others']:.3f} apart; {views['nearest']:.0%} are nearest to "
+            "their own (cosine distance of the judge's features)"
+        )
+    return text + "\n"
 
 
 def sheet(rows: Sequence[Sequence[Crop]], right: Sequence[Sequence[bool]], across: int = 3) -> np.ndarray:

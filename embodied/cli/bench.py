@@ -4,8 +4,9 @@ houses, pictures, steps and memory make the table of the main line; plays counts
 seen with pixels, drive a body on wheels with live pictures; bakes lights a flat again and again; light
 compares the ways of drawing with a path tracer, growth lights houses of 40 to 400 m² and fits how the cost
 grows (fast, or --quality normal), codecs compares ways of storing what was drawn (choose --quality fast),
-look asks a network that has seen photographs only what the objects of --houses flats are (--quality, --look;
-optional packages; it goes on where it was stopped). Close other programs first: the numbers are only as good
+look asks a network that has seen photographs only what the objects of --houses flats are, and how far a whole
+view of each is, to it, from the path tracer's (--quality, --look, --no-traced; optional packages; it goes on
+where it was stopped). Close other programs first: the numbers are only as good
 as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features
 in OUT/freeze and writes their digests; with --against it says of every part whether it is the same as in a
 file of them (docs/freeze.json), or differs and why that is meant.
@@ -54,6 +55,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--houses", type=whole(), help="that memory loads and drops (default: 1000), or whose things look shows (3)"
+    )
+    parser.add_argument(
+        "--no-traced", action="store_true", help="look: leave out the comparison with path-traced views"
     )
     parser.add_argument(
         "--out",
@@ -125,10 +129,11 @@ def look(args: argparse.Namespace, catalogue: Catalogue) -> int:
         catalogue,
         args.cache,
         args.out,
-        Stranger().first_five,
+        Stranger(),
         seed=args.seed,
         pictures=PictureSettings(256, args.quality, look=args.look),
         houses=args.houses or HOUSES,
+        traced=not args.no_traced,
         progress=note,
     )
     show(args, report.facts, report.text)
