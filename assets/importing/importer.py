@@ -22,9 +22,10 @@ from PIL import Image, UnidentifiedImageError
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.closure import code_digest
 from assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
-from assets.importing.meshing import crease_normals, decimate, indexed, sound_faces, weld
+from assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import MeshError, MtlMaterial, libraries, parse_mtl, parse_obj
+from assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from assets.importing.sh3f import Pack, PackError
 from assets.records import Finish, ImportRecipe, MeshPart, bounds
 
@@ -39,6 +40,13 @@ MAX_TEXTURE = 512
 MAX_PIXELS = 64_000_000
 FACE_BUDGETS = ((0.3, 3_000), (0.8, 6_000), (30.0, 10_000))
 """Faces a model keeps, by its longest side in metres."""
+ROUNDING = 0.5
+"""Share of that budget by which rounding a model may exceed it."""
+SOFT = ("cloth", "bedding", "leather", "terry")
+SOFT_CREASE = np.radians(62.0)
+"""Covers of what is padded, and the angle at which faces of those share a smooth normal: six faces make a round arm."""
+FOLDS = 9_000
+"""Faces by which the bedding of a model may grow to hold its folds, each part by its area."""
 
 
 Reader = Callable[[str], bytes]
@@ -165,16 +173,32 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
         raise MeshError(f"{recipe.key} has only degenerate faces; the model is damaged")
     total = sum(len(f) for _, _, f, _ in prepared)
     budget = recipe.faces or next(n for side, n in FACE_BUDGETS if max(recipe.size) <= side)
+    bedding = sum(_area(v, f) for p, v, f, _ in prepared if p.cover == "bedding")
     out = []
     for part, points, faces, uv in prepared:
         if total > budget and len(faces) > 40:
             points, faces, uv = decimate(points, faces, uv, max(40, round(len(faces) * budget / total)))
-        if part.name in recipe.two_sided or "*" in recipe.two_sided:
+        sheet = part.name in recipe.two_sided or "*" in recipe.two_sided
+        if part.cover in SOFT or not sheet:  # leaves are flat, and many
+            room = round(ROUNDING * budget * len(faces) / min(total, budget))
+            points, faces, uv = rounded(points, faces, uv, _crease(part), room)
+        if part.cover == "bedding" and is_coarse(points, faces):
+            points, faces, uv = refined(points, faces, uv, FINE, round(FOLDS * _area(points, faces) / bedding))
+            points = folded(points, faces, np.random.default_rng(0))
+        if sheet:
             out.append(
                 _part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe)
             )
         out.append(_part(part, points, faces, uv, recipe))
     return _to_size(out, recipe.size)
+
+
+def _area(points: np.ndarray, faces: np.ndarray) -> float:
+    return float(np.linalg.norm(face_normals(points, faces), axis=1).sum()) / 2
+
+
+def _crease(part: RawPart) -> float:
+    return SOFT_CREASE if part.cover in SOFT else CREASE
 
 
 def _looking(part: RawPart, looks: dict[str, str]) -> RawPart:
@@ -218,7 +242,7 @@ def _part(
         uv, image = laid_on(part.cover, points, faces), picture(part.cover, finish.color)
     elif part.cover in FOLDED and image is not None and uv is not None:
         image = creased(image, part.cover, points, faces, uv)
-    vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces), uv)
+    vertices, triangles, normals, coords = indexed(points, faces, crease_normals(points, faces, _crease(part)), uv)
     return MeshPart(vertices, triangles, normals, coords, finish), image
 
 
