@@ -59,6 +59,7 @@ def test_crops_show_their_object_and_answers_are_counted_by_class(tmp_path, monk
     seen = report.facts["views"]
     assert seen["views"] == 1 and 0 < seen["own"] < 0.2 and seen["nearest"] is None
     assert f"{seen['own']:.3f} from the path tracer's" in report.text
+    assert len(list((tmp_path / "out" / "views").iterdir())) == 2
     kept = [p.stat().st_mtime_ns for p in (tmp_path / "out" / "views").iterdir()]
     told["traced"] = False
     bare = look.recognised(HandCatalogue(), tmp_path / "cache", tmp_path / "out", Judge(), **told)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from assets.cache import atomic_path, digest, write_bytes
+from assets.cache import digest, write_bytes
 from assets.closure import code_digest
 from embodied.bench.light import VFOV, viewpoints
 from embodied.light.baking import bake
@@ -40,20 +40,30 @@ class Pair:
 
 
 def kept_pair(world: World, folder: Path) -> Pair:
-    """The longest view of the largest room of a house, from `folder` if the same code has put it there."""
-    made = digest(world.fingerprint, code_digest(__name__))
-    path = folder / f"{world.house.name}_{made[:16]}.npz"
-    if not path.exists():
-        _, eye, yaw = viewpoints(world.house, world.catalogue, 1)[0]
-        drawn = world.renderer.view(eye, yaw, PITCH, VFOV, SIZE).rgb
-        light = bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "fast")
+    """The longest view of the largest room of a house; each half from `folder` if the same code has put it there."""
+    _, eye, yaw = viewpoints(world.house, world.catalogue, 1)[0]
+    light = bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "fast")
+
+    def drawn() -> np.ndarray:
+        return world.renderer.view(eye, yaw, PITCH, VFOV, SIZE).rgb
+
+    def traced() -> np.ndarray:
         camera = camera_at(eye, yaw, PITCH, VFOV)
         tracer = Tracer(light, world.house, quality="reference", rays=RAYS)
-        traced, _, _ = tracer.picture(eye, camera.forward, camera.up, VFOV, SIZE)
-        with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, drawn=drawn, traced=traced)
-    with np.load(path, allow_pickle=False) as held:
-        return Pair(world.name, held["drawn"], held["traced"])
+        return tracer.picture(eye, camera.forward, camera.up, VFOV, SIZE)[0]
+
+    stem, code = folder / world.house.name, code_digest(__name__)
+    return Pair(
+        world.name,
+        _kept(Path(f"{stem}_drawn_{digest(world.fingerprint, code)[:16]}.png"), drawn),
+        _kept(Path(f"{stem}_traced_{digest(light.manifest['key'], code)[:16]}.png"), traced),
+    )
+
+
+def _kept(path: Path, draw: Callable[[], np.ndarray]) -> np.ndarray:
+    if not path.exists():
+        write_bytes(path, cv2.imencode(".png", draw()[..., ::-1])[1].tobytes())
+    return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
 
 
 def likeness(pairs: Sequence[Pair], features: Callable[[np.ndarray], np.ndarray]) -> dict[str, float | int | None]:
