@@ -21,7 +21,7 @@ LONGEST = 0.15
 """Metres of an edge above which it is straight: bars are, whatever the normals at their bent ends say."""
 COARSE, FINE = 0.08, 0.04
 """Metres: cloth with longer edges than the first has no folds of its own; it is split down to the second for them."""
-DEEP, LONG = 0.006, 0.28
+DEEP, LONG = 0.009, 0.32
 """Metres of folds: how far they rise in the mean, and how far they are apart."""
 HANG = 0.30
 """Metres below its top over which what hangs falls into its full folds."""
