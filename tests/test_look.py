@@ -73,10 +73,10 @@ def test_views_are_compared_with_their_own_traced_picture_and_those_of_others():
         return np.full((4, 4, 3), colour, np.uint8)
 
     red, green, yellow = (255, 0, 0), (0, 255, 0), (255, 255, 0)
-    pairs = [views.Pair("a", picture(red), picture(red)), views.Pair("b", picture(red), picture(green))]
+    pairs = [views.ViewPair("a", picture(red), picture(red)), views.ViewPair("b", picture(red), picture(green))]
     told = views.likeness(pairs, Judge().features)
     assert told["own"] == pytest.approx(0.5) and told["others"] == pytest.approx(1.0) and told["nearest"] == 0.5
-    slanted = views.likeness([views.Pair("a", picture(yellow), picture(red))], Judge().features)
+    slanted = views.likeness([views.ViewPair("a", picture(yellow), picture(red))], Judge().features)
     assert slanted["own"] == pytest.approx(1 - math.sqrt(0.5)) and slanted["others"] is None
     assert views.likeness([], Judge().features) == {"views": 0, "own": None, "others": None, "nearest": None}
 

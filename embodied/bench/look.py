@@ -14,7 +14,7 @@ import numpy as np
 from assets.cache import write_bytes, write_json
 from embodied.bench.crops import Crop, kept_crops
 from embodied.bench.light import TIMES as SKIES
-from embodied.bench.views import Pair, kept_pair, likeness, write_pairs
+from embodied.bench.views import ViewPair, kept_pair, likeness, write_pairs
 from embodied.generate import HouseConfig, generate_house
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
@@ -132,7 +132,7 @@ MAPPED: dict[str, tuple[int, ...]] = {
 ImageNet has no word for is not judged: its "plate" (923) is a main course."""
 
 
-class Judge(Protocol):
+class PhotographJudge(Protocol):
     """A network that knows photographs (agents.vision.stranger)."""
 
     def first_five(self, pictures: np.ndarray) -> np.ndarray:
@@ -156,7 +156,7 @@ def recognised(
     catalogue: Catalogue,
     cache: Path,
     out: Path,
-    judge: Judge,
+    judge: PhotographJudge,
     *,
     seed: int,
     pictures: PictureSettings,
@@ -175,7 +175,7 @@ def recognised(
       traced: whether views are compared with the path tracer's; it takes a bake and a minute of two cores per house.
     """
     crops: list[Crop] = []
-    pairs: list[Pair] = []
+    pairs: list[ViewPair] = []
     times: list[str] = []
     for k in range(houses):
         hour, weather = SKIES[k % len(SKIES)]

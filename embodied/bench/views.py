@@ -29,7 +29,7 @@ PITCH = -0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class ViewPair:
     """One view twice."""
 
     house: str
@@ -39,7 +39,7 @@ class Pair:
     """The same size, by the path tracer alone."""
 
 
-def kept_pair(world: World, folder: Path) -> Pair:
+def kept_pair(world: World, folder: Path) -> ViewPair:
     """The longest view of the largest room of a house; each half from `folder` if the same code has put it there."""
     _, eye, yaw = viewpoints(world.house, world.catalogue, 1)[0]
     light = bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "fast")
@@ -53,7 +53,7 @@ def kept_pair(world: World, folder: Path) -> Pair:
         return tracer.picture(eye, camera.forward, camera.up, VFOV, SIZE)[0]
 
     stem, code = folder / world.house.name, code_digest(__name__)
-    return Pair(
+    return ViewPair(
         world.name,
         _kept(Path(f"{stem}_drawn_{digest(world.fingerprint, code)[:16]}.png"), drawn),
         _kept(Path(f"{stem}_traced_{digest(light.manifest['key'], code)[:16]}.png"), traced),
@@ -66,7 +66,7 @@ def _kept(path: Path, draw: Callable[[], np.ndarray]) -> np.ndarray:
     return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
 
 
-def likeness(pairs: Sequence[Pair], features: Callable[[np.ndarray], np.ndarray]) -> dict[str, float | int | None]:
+def likeness(pairs: Sequence[ViewPair], features: Callable[[np.ndarray], np.ndarray]) -> dict[str, float | int | None]:
     """Cosine distances (0: the same, 1: nothing in common) of a judge's features, means over `pairs`.
 
     Args:
@@ -90,7 +90,7 @@ def likeness(pairs: Sequence[Pair], features: Callable[[np.ndarray], np.ndarray]
     }
 
 
-def write_pairs(pairs: Sequence[Pair], path: Path) -> None:
+def write_pairs(pairs: Sequence[ViewPair], path: Path) -> None:
     """One sheet (JPEG): every view as drawn, and right of it as traced; two of them in a row."""
     cells = [np.concatenate([p.drawn, p.traced], axis=1) for p in pairs]
     cells += [np.full_like(cells[0], 255)] * (-len(cells) % 2)
