@@ -23,7 +23,7 @@ from agents.vision.encoder import Encoder, load_encoder, pool_views, random_enco
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
 from agents.vision.probe import Labelled, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import batches, strips_of, taken, train_encoder, turned
+from agents.vision.training import Example, batches, strips_of, taken, train_encoder, turned, whitened
 from embodied.interface import Sight
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -279,6 +279,36 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
     assert lines[0] == "going on after epoch 2 of 3" and again.digest == whole.digest
     with pytest.raises(CheckpointError, match="epochs 3 -> 5"):
         train_encoder(houses, dataclasses.replace(config, epochs=5), checkpoint)
+
+
+@pytest.mark.slow
+def test_an_encoder_learns_to_see_dark_pictures_as_its_example_sees_bright_ones(tmp_path, monkeypatch):
+    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
+    bright = strips_of_colours(8, seed=0)
+    dark = dataclasses.replace(bright, rgb=(bright.rgb // 5)[..., ::-1].copy())
+    config = VisionConfig(network="compact", epochs=4, batch=2, least_views=1)
+    encoder, _, _ = train_encoder([bright], config, note=lambda line: None)
+    example = Example(whitened(encoder, [bright]), {bright.name: bright})
+    with pytest.raises(ValueError, match="pass that encoder"):
+        train_encoder([dark], config, example=example)
+    config = dataclasses.replace(config, epochs=12, like=example.encoder.digest)
+    with pytest.raises(ValueError, match="not as many for the example"):
+        train_encoder([dark], config, example=dataclasses.replace(example, strips={}))
+    before = {k: v.clone() for k, v in example.encoder.network.state_dict().items()}
+    learned, _, _ = train_encoder([dark], config, example=example, note=lambda line: None)
+    assert all(torch.equal(v, before[k]) for k, v in example.encoder.network.state_dict().items()), "it stays"
+    aim = example.encoder.encode_strips(bright.rgb)
+    off = [np.square(who.encode_strips(dark.rgb) - aim).mean() for who in (example.encoder, learned)]
+    assert off[1] < off[0] / 2
+    save_encoder(learned, tmp_path / "e.safetensors")
+    again = load_encoder(tmp_path / "e.safetensors")
+    assert again.like == again.speaks == example.encoder.digest != again.digest
+    assert example.encoder.speaks == example.encoder.digest
+    save_features(tmp_path / "f.safetensors", aim, again, "house")
+    assert load_features(tmp_path / "f.safetensors", encoder=again.digest)[1] == example.encoder.digest
+    with pytest.raises(ValueError, match="made from encoder"):
+        load_features(tmp_path / "f.safetensors", encoder=example.encoder.digest)
 
 
 def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():

@@ -73,7 +73,7 @@ def train_agent(
     training = lessons.split("train", houses=houses)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else load_agent(begin)
-    agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.digest, encoder.size)
+    agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.speaks, encoder.size)
     if other is not None and begin is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         note(f"new runs begin with the weights of {begin}")

@@ -17,7 +17,7 @@ class FeatureBank:
     def __init__(self, worlds: Mapping[str, np.ndarray], digest: str) -> None:
         """Args:
           worlds: world name -> (nodes, 36, D) features, float16 or float32.
-          digest: names the encoder that made them.
+          digest: of the encoder that agents must have learned from to be shown them.
 
         Raises:
           ValueError: another shape, or no world.

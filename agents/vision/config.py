@@ -87,6 +87,8 @@ class VisionConfig:
     """Of everything that is drawn."""
     cameras: tuple[str, ...] = ("ideal",)
     """Kinds of camera, 'ideal', 'phone' or 'robot', one of which takes each strip, drawn evenly."""
+    like: str = ""
+    """Digest of an encoder to begin with, whose sight of the same places without light is learned; '' for none."""
 
     def __post_init__(self) -> None:
         if not self.cameras:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import json
@@ -42,6 +43,13 @@ class Encoder:
     """(D,) subtracted from features; None leaves them as the network gives them."""
     mix: Tensor | None = None
     """(D, D) that whitens features after the mean is gone: x -> (x - mean) @ mix."""
+    like: str = ""
+    """Digest of the encoder that it was taught to see alike (agents.vision.training.Example); '' for none."""
+
+    @property
+    def speaks(self) -> str:
+        """Digest of the encoder whose features its own stand for: agents that know those may be shown these."""
+        return self.like or self.digest
 
     @property
     def size(self) -> int:
@@ -60,7 +68,7 @@ class Encoder:
     @torch.no_grad()
     def encode_strips(self, strips: np.ndarray) -> np.ndarray:
         """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
-        return self._finish(pool_views(strip_map(self.network, self._send(strips)), self.network.peaks)).cpu().numpy()
+        return self.finish(pool_views(strip_map(self.network, self._send(strips)), self.network.peaks)).cpu().numpy()
 
     @torch.no_grad()
     def encode_views(self, views: np.ndarray) -> np.ndarray:
@@ -68,14 +76,16 @@ class Encoder:
         n = len(views)
         flat = self._send(views.reshape(-1, *views.shape[2:]))
         out = torch.cat([self.network.features(self.network.normalise(part)) for part in flat.split(36)])
-        return self._finish(out.view(n, views.shape[1], -1)).cpu().numpy()
+        return self.finish(out.view(n, views.shape[1], -1)).cpu().numpy()
 
     def to(self, device: torch.device | str) -> Encoder:
         """The encoder on another device (the network moves with it)."""
         move = lambda t: None if t is None else t.to(device)
-        return Encoder(self.network.to(device), self.name, self.sharing, move(self.mean), move(self.mix))
+        moved = self.network.to(device)
+        return dataclasses.replace(self, network=moved, mean=move(self.mean), mix=move(self.mix))
 
-    def _finish(self, features: Tensor) -> Tensor:
+    def finish(self, features: Tensor) -> Tensor:
+        """Pooled features (..., D) of the network without the mean, mixed."""
         if self.mean is not None:
             features = features - self.mean
         return features if self.mix is None else features @ self.mix
@@ -134,6 +144,8 @@ def imagenet_encoder(name: str, weights: Path) -> Encoder:
 def save_encoder(encoder: Encoder, path: Path) -> None:
     """Write half-precision weights and settings atomically."""
     settings = {"format": FORMAT, "name": encoder.name, "sharing": encoder.sharing, "digest": encoder.digest}
+    if encoder.like:
+        settings["like"] = encoder.like
     save_tensors(Path(path), {k: v.detach().half() for k, v in _tensors(encoder).items()}, settings)
 
 
@@ -151,7 +163,7 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     network = build(settings["name"])
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     put(network, {**counters, **tensors}, path)
-    encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix)
+    encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix, settings.get("like", ""))
     if encoder.digest != settings.get("digest"):
         raise ValueError(f"{path}: contents do not fit the digest {settings.get('digest', '')[:12]}; it was changed")
     return encoder

@@ -79,6 +79,8 @@ def save_features(
 ) -> None:
     """Write (n, 36, D) features; `source` is the digest of what they were computed from (the house)."""
     about = {"format": FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
+    if encoder.like:
+        about["speaks"] = encoder.speaks
     tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
     save_tensors(Path(path), {"features": tensor}, about)
 
@@ -86,7 +88,7 @@ def save_features(
 def load_features(
     path: Path, *, encoder: str | None = None, source: str | None = None, pictures: PictureSettings | None = None
 ) -> tuple[np.ndarray, str]:
-    """(n, 36, D) float16 features and the digest of their encoder.
+    """(n, 36, D) float16 features and the digest that their encoder speaks.
 
     Args:
       encoder, source, pictures: what is expected, if anything.
@@ -106,7 +108,7 @@ def load_features(
     for name, expected in zip(KEYS, (encoder, source, drawn), strict=True):
         if expected is not None and about[name] != expected:
             raise ValueError(f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; {remedy}")
-    return features.numpy(), about["encoder"]
+    return features.numpy(), about.get("speaks", about["encoder"])
 
 
 def _option(pictures: PictureSettings | None) -> str:

@@ -6,6 +6,7 @@ What belongs to viz, such as recordings, is passed in from the console command a
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ from agents.vision.features import encode_panoramas, feature_path, load_features
 from agents.vision.labels import HouseStrips
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
-from agents.vision.training import save_training, train_encoder, trained_classes, whitened
+from agents.vision.training import Example, save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
@@ -43,10 +44,16 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
     check_device(args.device)
     data = Dataset(args.data)
     source = StripSource(data.folder, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
+    other = None if args.example is None else load_encoder(args.example)
+    if other is not None:
+        config = dataclasses.replace(config, like=other.digest)
     with locked(args.out):
         seen = source.strips(training_houses(data, config), workers=args.workers, note=note)
+        example = None
+        if other is not None:
+            example = example_of(other, source, training_houses(data, config), workers=args.workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=args.workers, note=note)
-        encoder, classes = taught(seen, config, args.out, note, device=args.device)
+        encoder, classes = taught(seen, config, args.out, note, example=example, device=args.device)
         untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (
@@ -61,14 +68,29 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
     return 0
 
 
+def example_of(
+    encoder: Encoder, source: StripSource, names: Sequence[str], *, workers: int = 1, note: Note = print
+) -> Example:
+    """What an encoder sees in houses when they are drawn without light."""
+    plain = dataclasses.replace(source, quality="unlit", lights=1)
+    return Example(encoder, {h.name: h for h in plain.strips(names, workers=workers, note=note)})
+
+
 def taught(
-    seen: Sequence[HouseStrips], config: VisionConfig, folder: Path, note: Note = print, *, device: str = "cpu"
+    seen: Sequence[HouseStrips],
+    config: VisionConfig,
+    folder: Path,
+    note: Note = print,
+    *,
+    example: Example | None = None,
+    device: str = "cpu",
 ) -> tuple[Encoder, list[str]]:
     """The encoder that `config` makes of strips, from `folder` if it is there, and the classes it was taught."""
     classes = trained_classes(folder, config)
     if classes is None:
-        encoder, heads, classes = train_encoder(seen, config, folder / "checkpoint.pt", device=device, note=note)
-        save_training(whitened(encoder, seen), heads, classes, config, folder)
+        checkpoint = folder / "checkpoint.pt"
+        encoder, heads, classes = train_encoder(seen, config, checkpoint, example=example, device=device, note=note)
+        save_training(encoder if example else whitened(encoder, seen), heads, classes, config, folder)
         (folder / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes
 

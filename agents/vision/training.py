@@ -11,7 +11,7 @@ import dataclasses
 import functools
 import operator
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,15 +76,36 @@ class StripBatch:
     """(n, 12, 36) float32."""
     room: Tensor
     """(n,) int64."""
+    plain: Tensor | None = None
+    """(n, 192, 576, 3) uint8, the same places as an example sees them."""
 
     def to(self, device: str) -> StripBatch:
-        return StripBatch(**{f.name: getattr(self, f.name).to(device) for f in dataclasses.fields(self)})
+        held = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return StripBatch(**{name: value.to(device) for name, value in held.items() if value is not None})
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """What an encoder is taught to see alike: another one's features of the same places, drawn without light.
+
+    Houses without light are cheap, so an agent can learn in many of them; an encoder that sees a lit house as the
+    agent's own sees the unlit one opens lit houses to it. It begins with that encoder's weights, and the labels teach
+    the heads alone.
+    """
+
+    encoder: Encoder
+    strips: Mapping[str, HouseStrips]
+    """By house, as many nodes as in the lit ones."""
 
 
 def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
     maps = strip_map(network, batch.rgb)  # (n, D, 12, 36)
-    views = pool_views(maps, network.peaks)  # (n, 36, D)
+    return head_losses(heads, maps, pool_views(maps, network.peaks), batch)
+
+
+def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+    """As `vision_loss`, of feature maps (n, D, 12, 36) and pooled features (n, 36, D)."""
     cells = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # (n, C, 12, 36): covers 3 % of the cell
     parts = {
         "cell objects": F.binary_cross_entropy_with_logits(heads.cell_objects(maps), cells) * 10,
@@ -99,6 +120,20 @@ def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tens
     }
 
 
+def alike_loss(network: Network, heads: Heads, batch: StripBatch, example: Encoder) -> tuple[Tensor, dict[str, float]]:
+    """Mean square between the finished features of `network` and those of `example` in plain strips, and the losses
+    of the heads, which leave the network alone."""
+    if batch.plain is None:
+        raise ValueError("the batch holds no strips for the example")
+    maps = strip_map(network, batch.rgb)
+    views = example.finish(pool_views(maps, network.peaks))
+    with torch.no_grad():
+        aim = example.finish(pool_views(strip_map(example.network, batch.plain), example.network.peaks))
+    alike = F.mse_loss(views, aim)
+    told, parts = head_losses(heads, maps.detach(), pool_views(maps.detach(), network.peaks), batch)
+    return alike + told, {"alike": float(alike.detach()), **parts}
+
+
 def batches(
     houses: Sequence[HouseStrips],
     classes: Sequence[int],
@@ -107,16 +142,17 @@ def batches(
     shade: float = 0.0,
     *,
     rng: np.random.Generator,
+    plain: Mapping[str, HouseStrips] | None = None,
 ) -> Iterator[StripBatch]:
     """One pass over all nodes in random order, each in one of its house's lightings, rolled, perhaps mirrored,
-    recoloured, and photographed by one of `cameras`."""
+    recoloured, and photographed by one of `cameras`; those of `plain`, by house, as they are."""
     lightings = _by_name(houses)
     where = [(name, i) for name, several in lightings.items() for i in range(len(several[0].rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
-        rgb, share, rooms, depth, room = [], [], [], [], []
+        rgb, share, rooms, depth, room, bare = [], [], [], [], [], []
         for name, i in chosen:
             several = lightings[name]
             house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
@@ -127,6 +163,8 @@ def batches(
             rooms.append(turned(house.rooms[i], turn, mirror))
             depth.append(turned(house.log_depth[i], turn, mirror))
             room.append(house.room[i])
+            if plain is not None:
+                bare.append(turned(plain[name].rgb[i], turn * CELL, mirror))
         shares = np.stack(share)
         yield StripBatch(
             torch.from_numpy(np.stack(rgb)),
@@ -135,6 +173,7 @@ def batches(
             torch.from_numpy(np.stack(rooms).astype(np.int64)),
             torch.from_numpy(np.stack(depth).astype(np.float32)),
             torch.from_numpy(np.array(room, dtype=np.int64)),
+            torch.from_numpy(np.stack(bare)) if bare else None,
         )
 
 
@@ -190,12 +229,14 @@ def train_encoder(
     config: VisionConfig,
     checkpoint: Path | None = None,
     *,
+    example: Example | None = None,
     device: str = "cpu",
     note: Callable[[str], None] = print,
 ) -> tuple[Encoder, Heads, list[str]]:
     """The encoder, its heads, and the names of the classes the heads speak of; both on the CPU in the end.
 
     Args:
+      example: what it is to see alike; `config.like` names it.
       device: where PyTorch computes.
       checkpoint: where the state after each epoch is kept; training goes on from it.
 
@@ -207,9 +248,10 @@ def train_encoder(
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
+    _refuse_example(houses, config, example)
     classes = frequent_classes(houses, config.least_views)
     strips = strips_of(houses)
-    training = _Training(config, len(classes), strips // config.batch, device)
+    training = _Training(config, len(classes), strips // config.batch, device, example)
     if checkpoint is not None and checkpoint.exists():
         training.load(checkpoint)
         note(f"going on after epoch {training.epoch} of {config.epochs}")
@@ -219,23 +261,45 @@ def train_encoder(
         if checkpoint is not None:
             training.save(checkpoint)
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
-    return Encoder(network, config.network), heads, [houses[0].classes[i] for i in classes]
+    names = [houses[0].classes[i] for i in classes]
+    if example is None:
+        return Encoder(network, config.network), heads, names
+    return dataclasses.replace(example.encoder, network=network, like=example.encoder.speaks), heads, names
+
+
+def _refuse_example(houses: Sequence[HouseStrips], config: VisionConfig, example: Example | None) -> None:
+    if (example.encoder.digest if example else "") != config.like:
+        raise ValueError(f"the settings name the example {config.like[:12]!r}; pass that encoder, or none")
+    if example is None:
+        return
+    if (example.encoder.name, example.encoder.sharing) != (config.network, "strip"):
+        raise ValueError(
+            f"the example is a {example.encoder.name!r} that looks at {example.encoder.sharing}, training one of "
+            f"{config.network!r} on strips; say --network {example.encoder.name}"
+        )
+    for house in houses:
+        if house.name not in example.strips or len(example.strips[house.name].rgb) != len(house.rgb):
+            raise ValueError(f"house {house.name!r} has {len(house.rgb)} strips, and not as many for the example")
 
 
 class _Training:
     """Owns what changes while an encoder learns."""
 
-    def __init__(self, config: VisionConfig, classes: int, updates: int, device: str) -> None:
+    def __init__(
+        self, config: VisionConfig, classes: int, updates: int, device: str, example: Example | None = None
+    ) -> None:
         """Args:
         updates: per epoch.
         """
-        self.config, self.epoch, self._device = config, 0, device
+        self.config, self.epoch, self._device, self._example = config, 0, device, example
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
             self.network = build(config.network)
             self.heads = Heads(self.network.size, classes)
         if config.begin == "imagenet":
             begin_as_imagenet(self.network)
+        if example is not None:
+            self.network.load_state_dict(example.encoder.network.state_dict())
         if config.frozen:
             body_of(self.network).requires_grad_(False)
         self.network.to(device)
@@ -255,9 +319,17 @@ class _Training:
             body_of(self.network).eval()
         began, smooth = time.monotonic(), dict[str, float]()
         rng = stream(self.config.seed, "vision", "epoch", self.epoch)
-        drawn = batches(houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng)
+        example = None if self._example is None else self._example.encoder.to(self._device)
+        plain = None if self._example is None else self._example.strips
+        drawn = batches(
+            houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng, plain=plain
+        )
         for done, batch in enumerate(drawn, 1):
-            loss, parts = vision_loss(self.network, self.heads, batch.to(self._device))
+            batch = batch.to(self._device)
+            if example is None:
+                loss, parts = vision_loss(self.network, self.heads, batch)
+            else:
+                loss, parts = alike_loss(self.network, self.heads, batch, example)
             if not torch.isfinite(loss):
                 raise FloatingPointError(
                     f"vision loss became {float(loss)} in epoch {self.epoch + 1}; lower the learning rate"

@@ -52,7 +52,7 @@ def train_agent(
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules])
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
-    agent = new_agent(config, words, encoder.digest, encoder.size, lessons.pictures("train"))
+    agent = new_agent(config, words, encoder.speaks, encoder.size, lessons.pictures("train"))
     agent.network.to(lessons.device)
     size = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})

@@ -156,7 +156,7 @@ def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route]
     with open_world(world.house, world.catalogue, args.cache, PLAIN, graph=world.graph) as eyes:
         nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
         features = encode_panoramas(encoder, (eyes.panorama(n) for n in nodes))
-        bank = FeatureBank({world.name: features}, encoder.digest)
+        bank = FeatureBank({world.name: features}, encoder.speaks)
         pool = hanna_pool(world, seed=args.seed)
         task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
         make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})

@@ -104,7 +104,15 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="houses drawn side by side (default: %(default)s)"
     )
-    add_fields(parser, VisionConfig)
+    parser.add_argument(
+        "--like",
+        type=any_path,
+        dest="example",
+        metavar="FILE",
+        help="begin with this encoder, and learn to see these pictures as it sees the same places drawn without light: "
+        "agents that know its features may then be shown these pictures (no labels but for probes)",
+    )
+    add_fields(parser, VisionConfig, skip=("like",))
 
 
 def _add_strips(parser: argparse.ArgumentParser) -> None:
@@ -152,7 +160,7 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="encoders trained side by side (default: %(default)s)"
     )
-    add_fields(parser, VisionConfig, skip=("network", "begin", "frozen"))
+    add_fields(parser, VisionConfig, skip=("network", "begin", "frozen", "like"))
 
 
 def add_features(parser: argparse.ArgumentParser) -> None:
