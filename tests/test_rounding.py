@@ -76,33 +76,42 @@ def test_no_more_faces_than_are_allowed_come_on_top():
         assert len(refined(vertices, faces, None, 0.01, most)[1]) <= len(faces) + most
 
 
+def hanging(side: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """A flat square that hangs with its front towards -y."""
+    vertices, faces = sheet(side, cells)
+    return (vertices - [0, 0, 0.5])[:, [0, 2, 1]], faces
+
+
 def test_texture_coordinates_follow_their_points():
-    vertices, faces = sheet(1.0, 2)
-    points, triangles, uv = refined(vertices, faces, vertices[faces][..., :2], 0.1, 10_000)
-    assert np.allclose(uv, points[triangles][..., :2])
+    vertices, faces = hanging(1.0, 2)
+    points, triangles, uv = refined(vertices, faces, vertices[faces][..., [0, 2]], 0.1, 10_000)
+    assert np.allclose(uv, points[triangles][..., [0, 2]])
     along = points[triangles] - points[np.roll(triangles, -1, axis=1)]
     assert np.linalg.norm(along, axis=-1).max() <= 0.1
     assert np.abs(face_normals(points, triangles)).sum() == pytest.approx(2.0), "twice the area of the square"
 
 
-def test_cloth_is_folded_upwards_only_and_neighbours_stay_together():
+def test_cloth_stays_as_it_lies_and_is_folded_outwards_where_it_hangs():
     vertices, faces = sheet(1.6, 4)
     assert is_coarse(vertices, faces) and not is_coarse(*sheet(1.0, round(2 / COARSE)))
     points, triangles, _ = refined(vertices, faces, None, FINE, 20_000)
-    raised = folded(points, triangles, np.random.default_rng(0))
-    rise = raised[:, 2] - 0.5
-    assert np.allclose(raised[:, :2], points[:, :2]) and rise.min() >= 0 and rise.max() <= 2 * DEEP
-    assert rise.max() - rise.min() > DEEP, "it is not merely thicker"
-    assert np.array_equal(raised, folded(points, triangles, np.random.default_rng(0)))
+    assert len(points) == len(vertices) and np.allclose(folded(points, triangles, np.random.default_rng(0)), points)
+    points, triangles, _ = refined(*hanging(1.6, 4), None, FINE, 20_000)
+    out = folded(points, triangles, np.random.default_rng(0)) - points
+    assert np.allclose(out[:, [0, 2]], 0) and out[:, 1].max() <= 1e-12 and out[:, 1].min() >= -DEEP
+    hem, top = points[:, 2] < 0.5, points[:, 2] > 1.55
+    assert np.ptp(out[hem, 1]) > 0.8 * DEEP > 4 * np.ptp(out[top, 1]), "deeper towards the hem"
+    assert np.array_equal(out, folded(points, triangles, np.random.default_rng(0)) - points)
 
 
 def test_imported_bedding_is_folded_and_boards_are_not():
-    flat, faces = sheet(2.0, 4)
-    low = (flat + [0, 0, -0.5])[:, [0, 2, 1]] * [1, 1, -1]  # y up, as models come
-    cover, board = (RawPart(n, low + [0, y, 0], faces, None, Finish()) for n, y in (("cover", 0.3), ("board", 0.0)))
-    recipe = ImportRecipe("test/bed", (2.0, 2.0, 0.3), looks=(("cover", "bedding"), ("board", "wood")))
+    front, faces = hanging(2.0, 4)
+    turned = front[:, [0, 2, 1]] * [1, 1, -1]  # y up, as models come
+    cover, board = (RawPart(n, turned + [0, 0, z], faces, None, Finish()) for n, z in (("cover", 0.3), ("board", 0.0)))
+    recipe = ImportRecipe("test/bed", (2.0, 0.3, 2.0), looks=(("cover", "bedding"), ("board", "wood")))
     parts = [part for part, _ in finish_parts((cover, board), recipe)]
-    lying, under = sorted(parts, key=lambda p: -p.vertices[:, 2].max())
-    assert len(faces) < len(lying.faces) <= len(faces) + FOLDS and len(under.faces) == len(faces)
-    assert np.ptp(lying.vertices[:, 2]) > DEEP and np.ptp(under.vertices[:, 2]) < 1e-6
-    assert (lying.normals[:, 2] > 0.8).all() and np.ptp(lying.normals[:, 2]) > 0.01, "light will show the folds"
+    hung, plain = sorted(parts, key=lambda p: -len(p.faces))
+    assert len(faces) < len(hung.faces) <= len(faces) + FOLDS and len(plain.faces) == len(faces)
+    assert np.ptp(hung.vertices[:, 1]) > 0.8 * DEEP and np.ptp(plain.vertices[:, 1]) < 1e-6
+    lean = np.degrees(np.arccos(np.clip(-hung.normals[:, 1], -1, 1)))
+    assert 8 < lean.max() < 45, "light will show the folds"

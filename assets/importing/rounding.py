@@ -21,12 +21,13 @@ LONGEST = 0.15
 """Metres of an edge above which it is straight: bars are, whatever the normals at their bent ends say."""
 COARSE, FINE = 0.08, 0.04
 """Metres: cloth with longer edges than the first has no folds of its own; it is split down to the second for them."""
-DEEP, LONG = 0.009, 0.32
-"""Metres of folds: how far they rise in the mean, and how far they are apart."""
+DEEP, APART = 0.018, 0.26
+"""Metres that folds rise at most, and from one to the next."""
 HANG = 0.30
 """Metres below its top over which what hangs falls into its full folds."""
-WAVES = 7
-"""Directions that the folds of what lies are summed over."""
+LIES = 0.9
+"""Upward part of a normal from which on cloth lies. It stays smooth: things lie on it, and neither sink nor float (a
+surface is touched within 5 mm, assets.importing.support_surfaces)."""
 
 
 def rounded(
@@ -57,11 +58,16 @@ def rounded(
 def refined(
     vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, longest: float, most: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """The mesh with edges halved until none is longer than `longest`, longer ones first, with `most` faces on top."""
+    """The mesh with the edges of what hangs halved until none is longer than `longest`, longer ones first.
+
+    Args:
+      most: faces that may come on top.
+    """
     limit = len(faces) + most
     while True:
         number, pairs = _edges(faces)
-        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+        hangs = (_vertex_normals(vertices, faces)[:, 2] < LIES)[pairs].any(1)
+        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1) * hangs
         wanted = np.flatnonzero(length > max(longest, 0.6 * float(length.max())))
         chosen = wanted[np.argsort(-length[wanted], kind="stable")[: max((limit - len(faces)) // 2, 0)]]
         if not len(chosen):
@@ -76,28 +82,17 @@ def is_coarse(vertices: np.ndarray, faces: np.ndarray) -> bool:
 
 
 def folded(vertices: np.ndarray, faces: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(n, 3) the vertices of bedding (metres, z up, fine) raised into folds.
+    """(n, 3) the vertices of bedding (metres, z up, fine) in upright folds where it hangs, deeper towards the hem.
 
-    Long soft ones where it lies; upright ones, deeper towards the hem, where it hangs. Nothing sinks, lest what is
-    under it should show.
+    They go outwards and level, so that it is as high as before.
     """
     normal = _vertex_normals(vertices, faces)
-    lies = np.clip(normal[:, 2], 0.0, 1.0) ** 2
-    across = vertices[:, :2] @ _directions(WAVES, rng).T / LONG
-    across *= rng.uniform(0.6, 1.7, WAVES)
-    bend = 0.25 * np.sin(2 * np.pi * (vertices[:, [1, 0]] / (3.1 * LONG)) + rng.uniform(0, 6.3, 2)).sum(1)
-    waves = np.sin(2 * np.pi * (across + bend[:, None]) + rng.uniform(0, 6.3, WAVES))
-    top = 0.5 + 0.5 * np.tanh(1.1 * waves.sum(1) / np.sqrt(WAVES))
     along = vertices[:, 0] + vertices[:, 1] + 0.06 * np.sin(2 * np.pi * vertices[:, 2] / 0.7 + rng.uniform(0, 6.3))
-    phase = along / (0.8 * LONG) + 0.35 * np.sin(2 * np.pi * along / (2.7 * LONG) + rng.uniform(0, 6.3))
+    phase = along / APART + 0.35 * np.sin(2 * np.pi * along / (3.4 * APART) + rng.uniform(0, 6.3))
     depth = np.clip((vertices[:, 2].max() - vertices[:, 2]) / HANG, 0.0, 1.0)
-    side = depth * (0.5 + 0.5 * np.sin(2 * np.pi * phase))
-    return vertices + normal * (2 * DEEP * (lies * top + (1 - lies) * side))[:, None]
-
-
-def _directions(count: int, rng: np.random.Generator) -> np.ndarray:
-    angle = np.pi * (np.arange(count) + rng.uniform(0, 1, count)) / count
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    hangs = 1 - np.clip(normal[:, 2] / LIES, 0.0, 1.0) ** 2
+    out = normal[:, :2] * (DEEP * hangs * depth * (0.5 + 0.5 * np.sin(2 * np.pi * phase)))[:, None]
+    return vertices + np.column_stack([out, np.zeros(len(out))])
 
 
 def _vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
