@@ -179,12 +179,12 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
         if total > budget and len(faces) > 40:
             points, faces, uv = decimate(points, faces, uv, max(40, round(len(faces) * budget / total)))
         sheet = part.name in recipe.two_sided or "*" in recipe.two_sided
-        if part.cover in SOFT or not sheet:  # leaves are flat, and many
-            room = round(ROUNDING * budget * len(faces) / min(total, budget))
-            points, faces, uv = rounded(points, faces, uv, _crease(part), room)
         if part.cover == "bedding" and is_coarse(points, faces):
             points, faces, uv = refined(points, faces, uv, FINE, round(FOLDS * _area(points, faces) / bedding))
             points = folded(points, faces, np.random.default_rng(0))
+        elif part.cover in SOFT or not sheet:  # leaves are flat, and many
+            room = round(ROUNDING * budget * len(faces) / min(total, budget))
+            points, faces, uv = rounded(points, faces, uv, _crease(part), room)
         if sheet:
             out.append(
                 _part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe)

@@ -33,14 +33,14 @@ surface is touched within 5 mm, assets.importing.support_surfaces)."""
 def rounded(
     vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, crease: float, most: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """The mesh with its curved edges split, those that are farthest from their curve first.
+    """The mesh with its curved edges split, those that are farthest from their curve first; its box stays.
 
     Args:
       vertices: (n, 3), metres, welded; faces: (m, 3); uv: (m, 3, 2) of the corners, or None.
       crease: radians between faces from which on their edge is meant.
       most: faces that may come on top.
     """
-    limit = len(faces) + most
+    limit, low, high = len(faces) + most, vertices[faces].min((0, 1)), vertices[faces].max((0, 1))
     for _ in range(ROUNDS):
         number, pairs = _edges(faces)
         rise = _rises(vertices, faces, number, len(pairs), crease)
@@ -50,7 +50,7 @@ def rounded(
         chosen = wanted[np.argsort(-sag[wanted], kind="stable")[: max(room, 0)]]
         if not len(chosen):
             break
-        middles = vertices[pairs[chosen]].mean(1) + rise[chosen]
+        middles = np.clip(vertices[pairs[chosen]].mean(1) + rise[chosen], low, high)
         vertices, faces, uv = _split(vertices, faces, uv, number, chosen, middles)
     return vertices, faces, uv
 
