@@ -185,6 +185,8 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
         elif part.cover in SOFT or not sheet:  # leaves are flat, and many
             room = round(ROUNDING * budget * len(faces) / min(total, budget))
             points, faces, uv = rounded(points, faces, uv, _crease(part), room)
+        keep = sound_faces(points, faces)  # folding and clipping may flatten a sliver
+        faces, uv = faces[keep], None if uv is None else uv[keep]
         if sheet:
             out.append(
                 _part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe)
