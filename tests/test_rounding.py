@@ -102,6 +102,8 @@ def test_cloth_stays_as_it_lies_and_is_folded_outwards_where_it_hangs():
     hem, top = points[:, 2] < 0.5, points[:, 2] > 1.55
     assert np.ptp(out[hem, 1]) > 0.8 * DEEP > 4 * np.ptp(out[top, 1]), "deeper towards the hem"
     assert np.array_equal(out, folded(points, triangles, np.random.default_rng(0)) - points)
+    beside = np.concatenate([points, [[0.0, 1.0, 5.0]]])  # a headboard, which no triangle of the cloth uses
+    assert np.array_equal(out, (folded(beside, triangles, np.random.default_rng(0)) - beside)[:-1])
 
 
 def test_imported_bedding_is_folded_and_boards_are_not():

@@ -89,7 +89,8 @@ def folded(vertices: np.ndarray, faces: np.ndarray, rng: np.random.Generator) ->
     normal = _vertex_normals(vertices, faces)
     along = vertices[:, 0] + vertices[:, 1] + 0.06 * np.sin(2 * np.pi * vertices[:, 2] / 0.7 + rng.uniform(0, 6.3))
     phase = along / APART + 0.35 * np.sin(2 * np.pi * along / (3.4 * APART) + rng.uniform(0, 6.3))
-    depth = np.clip((vertices[:, 2].max() - vertices[:, 2]) / HANG, 0.0, 1.0)
+    top = float(vertices[faces, 2].max())  # of the cloth: `vertices` may hold the rest of the model, too
+    depth = np.clip((top - vertices[:, 2]) / HANG, 0.0, 1.0)
     hangs = 1 - np.clip(normal[:, 2] / LIES, 0.0, 1.0) ** 2
     out = normal[:, :2] * (DEEP * hangs * depth * (0.5 + 0.5 * np.sin(2 * np.pi * phase)))[:, None]
     return vertices + np.column_stack([out, np.zeros(len(out))])
