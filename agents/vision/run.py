@@ -53,7 +53,8 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
         if other is not None:
             example = example_of(other, source, training_houses(data, config), workers=args.workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=args.workers, note=note)
-        encoder, classes = taught(seen, config, args.out, note, example=example, device=args.device)
+        shown = seen if example is None else [*seen, *example.strips.values()]  # plain ones as one more lighting
+        encoder, classes = taught(shown, config, args.out, note, example=example, device=args.device)
         untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (

@@ -90,7 +90,7 @@ class Example:
 
     Houses without light are cheap, so an agent can learn in many of them; an encoder that sees a lit house as the
     agent's own sees the unlit one opens lit houses to it. It begins with that encoder's weights, and the labels teach
-    the heads alone.
+    the heads alone. Where the plain strips are also among those it is shown, it goes on seeing them as before.
     """
 
     encoder: Encoder
