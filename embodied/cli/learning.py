@@ -109,8 +109,8 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
         type=any_path,
         dest="example",
         metavar="FILE",
-        help="begin with this encoder, and go on seeing places drawn without light as it does, and see these pictures of them alike: "
-        "agents that know its features may then be shown either (no labels but for probes)",
+        help="begin with this encoder, go on seeing places drawn without light as it does, and see these pictures of "
+        "them alike: agents that know its features may then be shown either (no labels but for probes)",
     )
     add_fields(parser, VisionConfig, skip=("like",))
 
