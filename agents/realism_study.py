@@ -4,8 +4,8 @@ counterpart in the dissertation).
     embodied features --data DATA --encoder ENCODER --quality reference --split test_unseen
     embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
 
-Each agent looks through the encoder it learned with. Which way of drawing ranks agents as path-traced pictures do is
-told by Spearman's rank correlation over all agents.
+Each agent looks through the encoder it learned with, or through another that sees alike. Which way of drawing ranks
+agents as path-traced pictures do is told by Spearman's rank correlation over all agents.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import scipy.stats
@@ -26,6 +26,7 @@ from agents.imitation.loop import Note
 from agents.imitation.studies import table, write_markdown
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
+from agents.vision.encoder import load_encoder
 from assets.cache import digest
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import evaluate
@@ -53,6 +54,12 @@ class RealismSetting:
     """At most so many, from all houses alike."""
     seed: int = 0
     """Of judging."""
+    encoders: Mapping[str, Path] = field(default_factory=dict)
+    """Kind of agent to the encoder that it looks through; those without one look through the one they learned with."""
+
+    def __post_init__(self) -> None:
+        if unknown := [*(self.encoders.keys() - self.arms.keys())]:
+            raise ValueError(f"encoders are given for {sorted(unknown)}, agents for {sorted(self.arms)}")
 
 
 def run_study(setting: RealismSetting, *, threads: int = 1, note: Note = print) -> Path:
@@ -70,7 +77,7 @@ def run_study(setting: RealismSetting, *, threads: int = 1, note: Note = print) 
     with locked(setting.out):
         for way in setting.pictures:
             for arm, paths in setting.arms.items():
-                seeds = [_episodes(setting, data, path, way) for path in paths]
+                seeds = [_episodes(setting, data, arm, path, way) for path in paths]
                 alone = [row(arm, way, episodes, graphs, seed=setting.seed) for episodes in seeds]
                 successes[way] += [r.values["success"].mean for r in alone]
                 everybody = [e for episodes in seeds for e in episodes]
@@ -89,15 +96,16 @@ def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float:
     return float(scipy.stats.spearmanr(first, second).statistic)
 
 
-def _episodes(setting: RealismSetting, data: Dataset, path: Path, way: str) -> list[Episode]:
+def _episodes(setting: RealismSetting, data: Dataset, arm: str, path: Path, way: str) -> list[Episode]:
     """Those of one agent in houses drawn so, from the study's folder if it played them before."""
+    looking = load_encoder(setting.encoders[arm]).digest if arm in setting.encoders else ""
     drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in data.names(setting.split)}
-    key = digest(data.digest, path, setting.split, setting.tasks or 0, setting.seed, drawn)
+    key = digest(data.digest, path, setting.split, setting.tasks or 0, setting.seed, drawn, looking)
     kept = setting.out / "episodes" / f"{key[:24]}.jsonl"
     if kept.exists():
         return list(load_lines(kept, Episode))
     agent = load_agent(path)
-    policy = agent.policy(split_of(data, setting.split, agent.encoder_digest, quality=way).bank)
+    policy = agent.policy(split_of(data, setting.split, looking or agent.encoder_digest, quality=way).bank)
     found: list[Episode] = []
     evaluate(
         data.split(setting.split),

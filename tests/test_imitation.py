@@ -33,6 +33,7 @@ from agents.hanna.losses import (
     relative_entropy,
 )
 from agents.hanna.policy import for_training
+from agents.hanna.trail import Trail, opposite
 from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hanna.vocabulary import Vocabulary, build_vocabulary, tokenize
@@ -47,7 +48,7 @@ from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
-from embodied.interface import Ask, Move, Observation, Sight, Stop
+from embodied.interface import Ask, Candidates, Intention, Mode, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.locks import LockedError, locked
 from embodied.tasks.hanna import hanna_pool, hanna_task
@@ -200,29 +201,40 @@ def test_every_pass_of_training_takes_every_task_once():
 # Play --------------------------------------------------------------------------------------------
 
 
-def test_what_was_tried_at_a_place_weighs_less_there():
+def test_where_the_agent_was_weighs_less():
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, ask_rule="never"))
     tasks = [dataclasses.replace(t, horizon=20) for t in split.tasks[::5]]
 
     def repeated(again: float) -> int:
-        """Moves that were made before at the same place under the same words."""
+        """Steps to places where the episode had been under the same words."""
         policy = dataclasses.replace(agent.policy(split.bank), again=again)
         policy.network.eval()
         with torch.inference_mode():
             played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
-        moves = lambda e: [
-            (s.pose.node, s.instruction, s.next_pose.node) for s in e.steps if isinstance(s.action, Move)
-        ]
+        moves = lambda e: [(s.instruction, s.next_pose.node) for s in e.steps if isinstance(s.action, Move)]
         return sum(len(moves(e)) - len(set(moves(e))) for e in played)
 
-    assert repeated(1.0) > 3 * repeated(0.2) and repeated(0.0) == 0
-    policy = dataclasses.replace(agent.policy(split.bank), again=0.5)
-    seen = split.make_env().reset(tasks[0])
-    (action,), memory = policy.act([seen], None, rngs=[np.random.default_rng(0)])
-    assert isinstance(action, Move)
-    weights = policy._fresh(seen, memory.tried[0])
-    assert weights[action.candidate + 1] == 0.5 and sorted(weights)[1:] == [1.0] * (len(weights) - 1)
+    assert repeated(1.0) > 1.5 * repeated(0.05)
+
+
+def test_a_trail_knows_the_way_back_and_how_often_it_was_there():
+    def seen(node: int, views: list[int], words: str = "go") -> Observation:
+        n = len(views)
+        flat = np.zeros(n, dtype=np.float32)
+        candidates = Candidates(flat, flat, np.array(views), np.ones(n, dtype=bool))
+        return Observation(Sight("house", node), 0, 0, candidates, words, None, Mode.MAIN, (), None, 0, 0)
+
+    first, second = seen(0, [12, 15]), seen(1, [18, 21])  # 12 is level, along +x; 18 lies behind it
+    trail = Trail().here(first)
+    assert trail.times(first).tolist() == [0, 0]
+    trail = trail.left(first, Move(0)).here(second)
+    assert trail.times(second).tolist() == [1, 0], "the way back leads to where one visit was"
+    assert trail.times(seen(1, [18, 21], "turn")).tolist() == [0, 0], "other words begin anew"
+    trail = trail.left(second, Ask(Intention.HELP)).here(second).left(second, Move(0)).here(first)
+    assert trail.times(first).tolist() == [2, 0], "a step that asks is a visit, too"
+    assert trail.left(first, Move(0)).here(second).times(second).tolist() == [2, 0]
+    assert (opposite(0), opposite(7), opposite(17), opposite(35)) == (30, 25, 23, 5)
 
 
 @pytest.mark.slow

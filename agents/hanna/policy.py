@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,10 +16,11 @@ from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.hanna.trail import Trail
 from agents.hanna.vocabulary import Vocabulary
 from agents.imitation.choosing import Chooser, choose_likeliest, choose_sampled
 from agents.vision.bank import FeatureBank
-from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Sight, Situation, Stop, Thought
+from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action
 
 
@@ -30,10 +31,6 @@ class Moment:
     positions: tuple[int, ...]
     """Place of each row in the batch."""
     scores: Scores
-
-
-Tried = Mapping[tuple[Sight, str, int], int]
-"""How often a move was made: the place as it looks, the words that were followed, the view in which the move lies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +49,8 @@ class HannaMemory:
     """(k, D) what each episode sees of every feature channel; None is everything."""
     moments: tuple[Moment, ...] = ()
     """All steps so far, if the policy keeps them."""
-    tried: tuple[Tried, ...] = ()
-    """What each episode did where under which words; empty if the policy does not mind."""
+    trails: tuple[Trail, ...] = ()
+    """The way of each episode so far; empty if the policy does not mind."""
 
     def keep(self, positions: tuple[int, ...]) -> HannaMemory:
         """The memory of the episodes at `positions` only."""
@@ -69,7 +66,7 @@ class HannaMemory:
             previous_ask=self.previous_ask[index],
             last_ask=tuple(self.last_ask[r] for r in rows),
             channels=None if self.channels is None else self.channels[index],
-            tried=tuple(self.tried[r] for r in rows) if self.tried else (),
+            trails=tuple(self.trails[r] for r in rows) if self.trails else (),
         )
 
 
@@ -95,7 +92,7 @@ class HannaPolicy:
     """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
     of policies as in DAgger (Ross et al. 2011). For training."""
     again: float = 1.0
-    """A move's weight for each time it was made before at a place that looks the same, under the same words."""
+    """A move's weight for each time the agent was, under the same words, where it knows the move to lead."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
     _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
@@ -126,6 +123,7 @@ class HannaPolicy:
         asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
         reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
 
+        trails = [t.here(o) for t, o in zip(memory.trails, seen, strict=True)] if memory.trails else []
         actions: list[Action | None] = [None] * len(observations)
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
@@ -134,8 +132,8 @@ class HannaPolicy:
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
             thought = thought_of(moves[row], asks[row], reason, n)
             weights = moves[row, : n + 1]
-            if self.again < 1:
-                weights = weights * self._fresh(o, memory.tried[row])
+            if trails:
+                weights = weights * np.append(1.0, self.again ** trails[row].times(o))
             index = self.choose(weights, rng)  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
@@ -153,11 +151,6 @@ class HannaPolicy:
         rows = torch.arange(len(positions), device=device)
         asked = [isinstance(actions[p], Ask) for p in positions]
         moments = (*memory.moments, Moment(positions, scores)) if self.keep_moments else ()
-        tried = (
-            tuple(_tried_too(t, o, actions[p]) for t, o, p in zip(memory.tried, seen, positions, strict=True))
-            if self.again < 1
-            else ()
-        )
         return actions, HannaMemory(
             positions,
             networks,
@@ -166,14 +159,8 @@ class HannaPolicy:
             tuple(last_ask),
             memory.channels,
             moments,
-            tried,
+            tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
-
-    def _fresh(self, observation: Observation, tried: Tried) -> np.ndarray:
-        """(n + 1,) weights of stop and the n moves by how often they were made here before."""
-        o = observation
-        times = [tried.get((o.sight, o.instruction, int(view)), 0) for view in o.candidates.view]
-        return np.array([1.0, *(self.again**n for n in times)])
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
@@ -186,7 +173,7 @@ class HannaPolicy:
             torch.full((k,), START, device=device),
             (-1,) * k,
             F.dropout(ones, share) if share else None,
-            tried=({},) * k if self.again < 1 else (),
+            trails=(Trail(),) * k if self.again < 1 else (),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -238,14 +225,6 @@ class HannaPolicy:
         if text not in self._encoded:
             self._encoded[text] = self.vocabulary.encode(text, self.instruction_length)
         return self._encoded[text]
-
-
-def _tried_too(tried: Tried, observation: Observation, action: Action | None) -> Tried:
-    """What was tried, with this step."""
-    if not isinstance(action, Move):
-        return tried
-    key = observation.sight, observation.instruction, int(observation.candidates.view[action.candidate])
-    return {**tried, key: tried.get(key, 0) + 1}
 
 
 def thought_of(moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int) -> Thought:

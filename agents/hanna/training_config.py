@@ -61,8 +61,8 @@ class TrainingConfig(ImitationSettings):
     """Share of training episodes of the learned rule in which 'every5' asks in its place (docs/sources.md, S33).
     A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
     again: float = 1.0
-    """When judged, the weight of a move for each time it was made before at a place that looks the same, under the same
-    words; 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
+    """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
+    lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
     reset_inter_task: bool = True
@@ -123,7 +123,7 @@ SCALES: dict[str, TrainingConfig] = {
         curiosity_floor=0.02,
         environment_dropout=0.4,
         guided_asking=0.5,
-        again=0.3,
+        again=0.05,
         validate_every=200,
         validation_tasks=200,
     ),

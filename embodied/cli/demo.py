@@ -135,33 +135,27 @@ def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, .
 
 
 def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
-    """The trained agent does a HANNA task in a house it has never seen; recorded to help.rrd.
-
-    Its features come from panoramas drawn without light, the kind that its encoder learned from, and the
-    recording shows what it sees from the same panoramas.
-    """
+    """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
+    help.rrd."""
     from agents.failures import hanna_policies
     from agents.hanna.agent import load_agent
     from agents.vision.bank import FeatureBank
-    from agents.vision.config import PLAIN
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
     from embodied.language import People
     from embodied.tasks.hanna import hanna_pool, hanna_task
-    from embodied.world import open_world
 
     agent, encoder = load_agent(), load_encoder()
-    with open_world(world.house, world.catalogue, args.cache, PLAIN, graph=world.graph) as eyes:
-        nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
-        features = encode_panoramas(encoder, (eyes.panorama(n) for n in nodes))
-        bank = FeatureBank({world.name: features}, encoder.speaks)
-        pool = hanna_pool(world, seed=args.seed)
-        task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
-        make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
-        episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
-        return recorded(world, episode, args.out / "help.rrd", viewers, eyes=eyes)
+    nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
+    features = encode_panoramas(encoder, (world.panorama(n) for n in nodes))
+    bank = FeatureBank({world.name: features}, encoder.speaks)
+    pool = hanna_pool(world, seed=args.seed)
+    task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
+    make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
+    episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
+    return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world)
 
 
 def recorded(

@@ -334,6 +334,14 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         help="trained agents; those of one name are training seeds of one kind",
     )
     parser.add_argument(
+        "--encoders",
+        type=_named_file,
+        nargs="+",
+        default=[],
+        metavar="NAME=FILE",
+        help="what the agents of a name look through (default: the encoder that they learned with)",
+    )
+    parser.add_argument(
         "--pictures",
         nargs="+",
         choices=tuple(WAYS),

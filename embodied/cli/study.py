@@ -87,7 +87,9 @@ def run_realism(args: argparse.Namespace) -> list[Path]:
     arms: dict[str, list[Path]] = {}
     for name, path in args.agents:
         arms.setdefault(name, []).append(path)
-    setting = RealismSetting(args.data, args.out, arms, tuple(args.pictures), args.split, args.tasks, args.judge_seed)
+    setting = RealismSetting(
+        args.data, args.out, arms, tuple(args.pictures), args.split, args.tasks, args.judge_seed, dict(args.encoders)
+    )
     return [run_study(setting, threads=args.threads, note=note)]
 
 
