@@ -276,6 +276,8 @@ class StudySetting:
     """Of the pictures that features come from; as the data set holds them where not given."""
     seeds: int = 1
     """Agents per row, from the seed of `config` on."""
+    begin: Path | None = None
+    """A trained agent whose weights and words every row begins with; None: random weights."""
 
     def config_of(self, variant: str, seed: int | None = None) -> TrainingConfig:
         return dataclasses.replace(self.config, seed=self.config.seed if seed is None else seed, **VARIANTS[variant])
@@ -337,7 +339,7 @@ def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) ->
             log = stack.enter_context(open(folder / "log.txt", "a", buffering=1, encoding="utf-8"))
             note = lambda line: print(line, file=log)
         lessons = Lessons(data, encoder, setting.quality, device=setting.device)
-        progress = train_agent(lessons, config, folder, note=note)
+        progress = train_agent(lessons, config, folder, begin=setting.begin, note=note)
     best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
     return f"{variant}, seed {seed}: {progress.update} updates, {best}"
 
@@ -456,6 +458,7 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
     how = (
         f"{counts}. Mean and 95 % interval clustered by house{' and training seed' if setting.seeds > 1 else ''}; in "
         f"brackets the dissertation's numbers. Trained {c.iterations} updates of {c.batch} episodes, "
+        f"{f'begun with {setting.begin.name}, ' if setting.begin else ''}"
         f"{'seeds' if setting.seeds > 1 else 'seed'} {', '.join(map(str, setting.repeats()))}; judged with seed "
         f"{setting.seed}, temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per "
         "cent."

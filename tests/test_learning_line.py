@@ -250,6 +250,38 @@ def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data):
     assert {p: p.stat().st_mtime_ns for p in (setting.out / "episodes").iterdir()} == kept
 
 
+def test_agents_may_look_through_an_encoder_that_sees_alike(study, data, tmp_path):
+    run_study(study, ["4.4"])
+    encoder, (name,) = load_encoder(study.encoder), data.names("test_unseen")
+    alike = dataclasses.replace(random_encoder(seed=2), like=encoder.digest)
+    save_encoder(alike, tmp_path / "alike.safetensors")
+    arms = {"a": [study.folder_of("final") / "best.safetensors"]}
+    setting = RealismSetting(
+        data.folder, study.out / "realism", arms, ("matte",), tasks=3, encoders={"a": tmp_path / "alike.safetensors"}
+    )
+    with pytest.raises(FileNotFoundError, match=alike.digest[:16]):
+        realism(setting)
+    place = data.place(name)
+    features = stream(2, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
+    path = feature_path(data.folder / "features", alike.digest, name, WAYS["matte"])
+    save_features(path, features, alike, place.house.digest, WAYS["matte"])
+    assert "| a | 1 | " in realism(setting).read_text()
+    with pytest.raises(ValueError, match="encoders are given for"):
+        dataclasses.replace(setting, encoders={"b": study.encoder})
+
+
+def test_a_study_may_begin_with_a_trained_agent(study):
+    run_study(study, ["4.4"])
+    begin = study.folder_of("final") / "best.safetensors"
+    config = dataclasses.replace(study.config, learning_rate=1e-12, seed=5)
+    again = dataclasses.replace(study, out=study.out.parent / "again", config=config, begin=begin)
+    text = run_study(again, ["4.4"])["4.4"].read_text()
+    gone_on = load_agent(again.folder_of("final") / "best.safetensors").network.state_dict()
+    first = load_agent(begin).network.state_dict()
+    assert all(torch.allclose(gone_on[k].float(), v.float(), atol=1e-6) for k, v in first.items())
+    assert "begun with best.safetensors" in text
+
+
 def test_rank_correlation_is_spearmans():
     assert rank_correlation([0.1, 0.5, 0.3, 0.4], [0.2, 0.3, 0.1, 0.6]) == pytest.approx(1 - 6 * 4 / (4 * 15))
     assert math.isnan(rank_correlation([0.1, 0.5], [0.2, 0.3])) and math.isnan(rank_correlation([1] * 3, [1, 2, 3]))
@@ -315,7 +347,7 @@ def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_mak
 
 def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():
     encoder, agent = load_encoder(), load_agent()
-    assert agent.encoder_digest == encoder.digest
+    assert agent.encoder_digest == encoder.speaks
     assert agent.feature_size == encoder.size
     assert sum(p.stat().st_size for p in WEIGHTS.iterdir()) < 15e6
     look = encoder.encode_strips(np.zeros((1, 192, 576, 3), np.uint8))

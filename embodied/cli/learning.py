@@ -179,10 +179,14 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     add_encoder(parser)
     add_run(parser, SCALES)
     add_device(parser)
+    add_begin(parser)
+    add_fields(parser, TrainingConfig, scales=SCALES)
+
+
+def add_begin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--begin", type=any_path, metavar="FILE", help="begin with the weights of this agent instead of random ones"
     )
-    add_fields(parser, TrainingConfig, scales=SCALES)
 
 
 VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
@@ -312,6 +316,7 @@ def add_study(parser: argparse.ArgumentParser) -> None:
     add_quality(parser)
     add_agents_side_by_side(parser)
     add_device(parser)
+    add_begin(parser)
     parser.set_defaults(threads=1)  # per agent; they are trained side by side
     add_fields(parser, TrainingConfig, skip=("training_houses",), scales=SCALES)
 

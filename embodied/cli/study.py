@@ -77,6 +77,7 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
         args.threads,
         args.quality,
         args.seeds,
+        args.begin,
     )
     return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
 
