@@ -111,8 +111,6 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {
         "agents/weights/encoder.safetensors",
-        "agents/weights/encoder_lit.safetensors",
-        "agents/weights/hanna_lit.safetensors",
         "agents/weights/hanna_mini.safetensors",
         "agents/weights/hari_mini.safetensors",
         "agents/weights/iliad_nav_tiny.safetensors",

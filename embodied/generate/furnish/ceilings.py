@@ -102,7 +102,8 @@ def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | N
             if scale < 1:
                 w, d = w * scale, d * scale
     b = box(x, y, w, d, 0.0, top - h, top)
-    low = underside is not None and any(overlap(b, k) for k in ctx.space.keepouts)  # before a window or in a doorway
+    hangs = underside is not None or lamp.object_class != "ceiling lamp"
+    low = hangs and any(overlap(b, k) for k in ctx.space.keepouts)  # before a window or in a doorway
     if low or not ctx.space.fits(b, passage=True):
         return False
     ctx.space.add([b])
