@@ -239,6 +239,21 @@ def test_one_walks_from_every_door_of_a_room_to_every_other(some):
 
 
 @pytest.mark.slow
+def test_a_curtain_hangs_only_where_one_still_walks_past_it():
+    house = generate_house(9142, HouseConfig(area=(240, 280)), catalogue())  # an armchair stands 0.6 m from a window
+    test_one_walks_from_every_door_of_a_room_to_every_other([house])
+
+    room = next(r for r in house.rooms if r.id == "sun_room_1")
+    space = room_space(house, room)
+    x0, y0, x1, y1 = space.polygon.bounds
+    low, high = space.bottom, space.bottom + 2
+    assert len(space.entries) > 1 and space.leaves_a_way_past(box(x0, y0, 0.1, 0.1, 0.0, low, high))
+    everywhere = box((x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, 0.0, low, high)
+    assert not space.leaves_a_way_past(everywhere)
+    assert space.leaves_a_way_past(dataclasses.replace(everywhere, bottom=low + 1.95))  # one walks below it
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ROOM_KINDS)
 def test_a_room_of_every_kind_gets_furniture_and_a_ceiling_lamp(kind):
     for seed in range(3):

@@ -57,6 +57,8 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
     exact = box(x, y, w, d, wall.yaw, base, base + h)
     if not ctx.space.fits(exact, passage=hanging.passage) or any(overlap(wide, q) for q in ctx.space.solids):
         return None
+    if hanging.passage and d > DEEP and not ctx.space.leaves_a_way_past(exact):
+        return None
     plan = ctx.space.walkable([exact], ()) if d > DEEP and not hanging.passage else ctx.space.walk
     if plan is None:
         return None
