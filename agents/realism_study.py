@@ -23,17 +23,14 @@ from agents.figures import realism_figure
 from agents.hanna.agent import load_agent
 from agents.imitation.lessons import split_of
 from agents.imitation.loop import Note
-from agents.imitation.studies import table, write_markdown
+from agents.imitation.studies import kept_episodes, table, write_markdown
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import load_encoder
-from assets.cache import digest
 from embodied.datasets.store import Dataset, dataset_of
-from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row, row, save, shown
-from embodied.interface import Episode
+from embodied.interface import Agent, Episode
 from embodied.locks import locked
-from embodied.records import load_lines, save_lines
 
 LEAST = 3
 """Agents of which a rank correlation is told."""
@@ -100,23 +97,20 @@ def _episodes(setting: RealismSetting, data: Dataset, arm: str, path: Path, way:
     """Those of one agent in houses drawn so, from the study's folder if it played them before."""
     looking = load_encoder(setting.encoders[arm]).digest if arm in setting.encoders else ""
     drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in data.names(setting.split)}
-    key = digest(data.digest, path, setting.split, setting.tasks or 0, setting.seed, drawn, looking)
-    kept = setting.out / "episodes" / f"{key[:24]}.jsonl"
-    if kept.exists():
-        return list(load_lines(kept, Episode))
-    agent = load_agent(path)
-    policy = agent.policy(split_of(data, setting.split, looking or agent.encoder_digest, quality=way).bank)
-    found: list[Episode] = []
-    evaluate(
+
+    def policy() -> Agent:
+        agent = load_agent(path)
+        return agent.policy(split_of(data, setting.split, looking or agent.encoder_digest, quality=way).bank)
+
+    return kept_episodes(
+        setting.out / "episodes",
+        f"{arm} {way}",
+        (data.digest, path, drawn, looking),
         data.split(setting.split),
-        {way: policy},
+        policy,
         seed=setting.seed,
         limit=setting.tasks,
-        batch=32,
-        keep=lambda name, episodes: found.extend(episodes),
     )
-    save_lines(kept, found)
-    return found
 
 
 def _page(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,19 +24,19 @@ from agents.hanna.agent import load_agent
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import TrainingConfig
 from agents.imitation.lessons import Lessons, split_of
+from agents.imitation.studies import kept_episodes
 from agents.judging import about
 from agents.tables import side_by_side as beside
 from agents.vision.bank import FeatureBank
+from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
-from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Estimate, Row, difference, row, save, shown
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
 from embodied.navigation.graph import NavGraph
-from embodied.records import episodes_file, save_lines
 
 Note = Callable[[str], None]
 
@@ -56,10 +56,16 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "128 houses": {"training_houses": 128},
     "half curiosity": {"alpha": 0.5},
     "no curiosity, no conditions": {"alpha": 0.0, "predict_reasons": False},
+    "price 0.25": {"ask_price": 0.25},
+    "price 4": {"ask_price": 4.0},
 }
-"""What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note). The last two
-are in no printed row: learned asking with the alpha of heuristic askers, and our model without what the LSTM lacks, so
-that agents that are compared differ in one thing."""
+"""What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note). Half curiosity
+(learned asking with the alpha of heuristic askers) and our model without what the LSTM lacks are in no printed row, but
+agents that are compared should differ in one thing."""
+PRICES = ("price 0.25", "price 4")
+SHORTER = {f"{n} houses, equal passes": f"{n} houses" for n in (8, 32, 128)}
+"""Agents that are trained like those of VARIANTS, but see each of their tasks only as often as the agent of all houses
+sees one of its own."""
 
 
 @dataclass(frozen=True)
@@ -244,13 +250,20 @@ TABLES: Mapping[str, Table] = {
         "Success and the number of training houses (no counterpart in the dissertation)",
         TEST,
         FULL,
-        (*(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)), _line("all houses", "final")),
+        (
+            *(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)),
+            _line("all houses", "final"),
+            *(_line(name, name) for name in SHORTER),
+        ),
     ),
     "requests": Table(
         "Success and the number of requests (no counterpart in the dissertation)",
         ("test_unseen",),
         ("success", "spl", "requests"),
-        tuple(_line(name.removeprefix("learned, "), "final", name) for kind in PRICED.values() for name in kind),
+        (
+            *(_line(name.removeprefix("learned, "), "final", name) for kind in PRICED.values() for name in kind),
+            *(_line(f"trained at {name}", name) for name in PRICES),
+        ),
     ),
 }
 """The studies by name. D.2 is on the validation splits, as in the dissertation."""
@@ -280,7 +293,13 @@ class StudySetting:
     """A trained agent whose weights and words every row begins with; None: random weights."""
 
     def config_of(self, variant: str, seed: int | None = None) -> TrainingConfig:
-        return dataclasses.replace(self.config, seed=self.config.seed if seed is None else seed, **VARIANTS[variant])
+        chosen = VARIANTS[SHORTER.get(variant, variant)]
+        config = dataclasses.replace(self.config, seed=self.config.seed if seed is None else seed, **chosen)
+        if variant not in SHORTER:
+            return config
+        share = min(1.0, config.training_houses / len(dataset_of(self.data, "hanna").names("train")))
+        iterations = max(1, round(config.iterations * share))
+        return dataclasses.replace(config, iterations=iterations, validate_every=min(config.validate_every, iterations))
 
     def folder_of(self, variant: str, seed: int | None = None) -> Path:
         name = variant.replace(",", "").replace(" ", "_")
@@ -305,7 +324,7 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
     if unknown := [n for n in names if n not in TABLES]:
         raise ValueError(f"unknown studies {unknown}; there are {list(TABLES)}")
     data = dataset_of(setting.data, "hanna")
-    tables = {n: _possible(TABLES[n], setting, len(data.names("train"))) for n in names}
+    tables = {n: _possible(TABLES[n], setting, data) for n in names}
     wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
     wanted |= dict.fromkeys(name for table in tables.values() for pair in table.compared for name in pair)
     jobs = (
@@ -317,16 +336,44 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
         for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
             note(line)
         curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
+        plays = _plays(setting, tables.values())
+        for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+            joblib.delayed(_play)(setting, *where, names) for where, names in plays.items()
+        ):
+            note(line)
         judged = _Judge(setting, data, note)
         return {name: _write(setting, name, table, judged) for name, table in tables.items()}
 
 
-def _possible(table: Table, setting: StudySetting, houses: int) -> Table:
-    """The table without agents that learn from as many training houses as there are, or more."""
+def _plays(setting: StudySetting, tables: Iterable[Table]) -> Mapping[tuple[str, str, int], list[str]]:
+    """(variant, split, training seed) to what is played of that agent."""
+    found: dict[tuple[str, str, int], dict[str, None]] = {}
+    for table in tables:
+        pairs = [Line(name, name) for pair in table.compared for name in pair]
+        for line in (*table.lines, *pairs):
+            for split in table.splits:
+                for seed in setting.repeats() if line.variant else (setting.config.seed,):
+                    found.setdefault((line.variant, split, seed), {})[line.played] = None
+    return {where: list(names) for where, names in found.items()}
+
+
+def _play(setting: StudySetting, variant: str, split: str, seed: int, names: Sequence[str]) -> str:
+    torch.set_num_threads(setting.threads)
+    player = _Player(setting, Dataset(setting.data))
+    for name in names:
+        player.episodes(variant, name, split, seed)
+    return f"{variant or 'without learning'}, seed {seed}: judged on {split}"
+
+
+def _possible(table: Table, setting: StudySetting, data: Dataset) -> Table:
+    """The table without agents that learn from as many training houses as there are, or more, and with the splits out
+    of distribution that there are."""
+    houses = len(data.names("train"))
     fewer = tuple(
         line for line in table.lines if not line.variant or setting.config_of(line.variant).training_houses < houses
     )
-    return dataclasses.replace(table, lines=fewer)
+    splits = (*TEST, *data.ood) if table.splits == TEST else table.splits
+    return dataclasses.replace(table, lines=fewer, splits=splits)
 
 
 def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> str:
@@ -355,14 +402,52 @@ def _validations(folder: Path) -> list[dict[str, float]]:
     return list({line["update"]: line for line in lines}.values())  # a resumed run may have validated twice
 
 
+class _Player:
+    """Plays an agent of a study on a split, or takes from the study's folder what it played before."""
+
+    def __init__(self, setting: StudySetting, data: Dataset) -> None:
+        self.setting, self.data = setting, data
+        self.encoder: Encoder = load_encoder(setting.encoder)
+        self._splits: dict[str, tuple[SplitData, FeatureBank, dict[str, Any]]] = {}
+
+    def episodes(self, variant: str, played: str, split: str, seed: int) -> list[Episode]:
+        whole, bank, drawn = self._split(split)
+        path = self.setting.folder_of(variant, seed) / "best.safetensors"
+        looks = (path, self.encoder.digest, drawn) if variant else ()
+
+        def policy() -> Agent:
+            if not variant:
+                return agent_without_learning("hanna", played)
+            agent = load_agent(path)
+            return {**hanna_policies(agent, bank), **priced_policies(agent, bank)}[played]
+
+        name = f"{variant}, seed {seed}, {played}" if variant else played
+        return kept_episodes(
+            self.setting.out / "episodes",
+            name,
+            (self.data.digest, played, *looks),
+            whole,
+            policy,
+            seed=self.setting.seed,
+            limit=self.setting.tasks,
+        )
+
+    def _split(self, name: str) -> tuple[SplitData, FeatureBank, dict[str, Any]]:
+        if name not in self._splits:
+            quality = self.setting.quality
+            drawn = {n: dataclasses.asdict(pictures_of(self.data, n, quality)) for n in self.data.names(name)}
+            bank = split_of(self.data, name, self.encoder.digest, quality=quality).bank
+            self._splits[name] = self.data.split(name), bank, drawn
+        return self._splits[name]
+
+
 class _Judge:
-    """Plays each (agent, split) once, with all of its training seeds, however many tables ask for it."""
+    """The episodes of a table's rows, with all of their training seeds, and what they come to."""
 
     def __init__(self, setting: StudySetting, data: Dataset, note: Note) -> None:
         self.setting, self.data, self.note = setting, data, note
-        self.encoder: Encoder = load_encoder(setting.encoder)
         self.behaviour: dict[tuple[str, str], dict] = {}
-        self._banks: dict[str, FeatureBank] = {}
+        self._player = _Player(setting, data)
         self._episodes: dict[tuple[str, str], list[Episode]] = {}
 
     def row(self, line: Line, split: str) -> Row:
@@ -378,8 +463,7 @@ class _Judge:
         """Those of all training seeds, one seed after the other."""
         if (line.key, split) not in self._episodes:
             seeds = self.setting.repeats() if line.variant else [self.setting.config.seed]
-            found = [e for seed in seeds for e in self._played(line, split, seed)]
-            save_lines(self.setting.out / "episodes" / episodes_file(split, line.key), found)
+            found = [e for seed in seeds for e in self._player.episodes(line.variant, line.played, split, seed)]
             if line.variant and line.played == "learned":
                 self.behaviour[line.key, split] = about(found, self.data.places(split))
             self._episodes[line.key, split] = found
@@ -387,35 +471,12 @@ class _Judge:
             self.note(f"{line.key} on {split}: success {shown('success', success)} %")
         return self._episodes[line.key, split]
 
-    def _played(self, line: Line, split: str, seed: int) -> list[Episode]:
-        out: list[Episode] = []
-        evaluate(
-            self.data.split(split),
-            {line.key: self._policy(line, split, seed)},
-            seed=self.setting.seed,
-            limit=self.setting.tasks,
-            batch=32,
-            keep=lambda name, episodes: out.extend(episodes),
-        )
-        return out
-
     def _graphs(self, split: str) -> dict[str, NavGraph]:
         return {name: place.graph for name, place in self.data.places(split).items()}
-
-    def _policy(self, line: Line, split: str, seed: int) -> Agent:
-        if not line.variant:
-            return agent_without_learning("hanna", line.played)
-        agent = load_agent(self.setting.folder_of(line.variant, seed) / "best.safetensors")
-        if split not in self._banks:
-            self._banks[split] = split_of(self.data, split, self.encoder.digest, quality=self.setting.quality).bank
-        bank = self._banks[split]
-        return {**hanna_policies(agent, bank), **priced_policies(agent, bank)}[line.played]
 
 
 def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Path:
     """One study's files; the figures go with the tables they belong to."""
-    if table.splits == TEST:
-        table = dataclasses.replace(table, splits=(*TEST, *judged.data.ood))
     rows = [
         dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
     ]
@@ -430,9 +491,11 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
         requests_figure(behaviour, setting.out / "figure_D.1.png")
         conditions_figure(behaviour, setting.out / "figure_D.2.png")
     if name == "requests":
-        by = {line.played: r.values for line, r in zip(table.lines, rows, strict=False)}
+        by = {line.played: r.values for line, r in zip(table.lines, rows, strict=True)}
+        trained = [r.values for line, r in zip(table.lines, rows, strict=True) if line.variant in PRICES]
         requests_curves(
-            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules] for kind, rules in PRICED.items()},
+            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules] for kind, rules in PRICED.items()}
+            | {"trained at a price": [(v["requests"], v["success"]) for v in trained]},
             setting.out / "figure_requests.png",
         )
     if name == "houses":
@@ -440,8 +503,13 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
         counts = [setting.config_of(line.variant).training_houses or there for line in table.lines]
         houses_figure(
             {
-                s: [(n, r.values["success"]) for n, r in zip(counts, rows[k * len(counts) :], strict=False)]
+                f"{s}, {how}": [
+                    (n, r.values["success"])
+                    for line, n, r in zip(table.lines, counts, rows[k * len(counts) :], strict=False)
+                    if n == there or (line.variant in SHORTER) == (how == "equal passes")
+                ]
                 for k, s in enumerate(table.splits)
+                for how in ("equal updates", "equal passes")
             },
             setting.out / "figure_houses.png",
         )

@@ -32,6 +32,8 @@ from embodied.cli.options import chosen
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
+from embodied.interface import Episode
+from embodied.records import load_lines
 from embodied.seeds import stream
 
 pytestmark = pytest.mark.slow
@@ -282,6 +284,15 @@ def test_a_study_may_begin_with_a_trained_agent(study):
     assert "begun with best.safetensors" in text
 
 
+def test_what_a_study_played_is_not_played_again(study):
+    written = run_study(study, ["4.4"])["4.4"].read_text()
+    kept = {p: p.stat().st_mtime_ns for p in (study.out / "episodes").iterdir()}
+    assert run_study(study, ["4.4"])["4.4"].read_text() == written
+    assert {p: p.stat().st_mtime_ns for p in (study.out / "episodes").iterdir()} == kept and len(kept) >= 4
+    first = next(iter(load_lines(min(kept), Episode)))
+    assert first.agent in ("final, seed 0, learned", "target image only, seed 0, learned")
+
+
 def test_rank_correlation_is_spearmans():
     assert rank_correlation([0.1, 0.5, 0.3, 0.4], [0.2, 0.3, 0.1, 0.6]) == pytest.approx(1 - 6 * 4 / (4 * 15))
     assert math.isnan(rank_correlation([0.1, 0.5], [0.2, 0.3])) and math.isnan(rank_correlation([1] * 3, [1, 2, 3]))
@@ -292,7 +303,8 @@ def test_requests_are_bought_by_three_kinds_of_rule(study):
     rows = {
         r["agent"]: r["values"]["requests"]["mean"] for r in json.loads((study.out / "table_requests.json").read_text())
     }
-    assert len(rows) == 18 and rows["every 2"] > rows["every 20"] and rows["with 0.6"] > rows["with 0.03"]
+    assert len(rows) == 20 and rows["every 2"] > rows["every 20"] and rows["with 0.6"] > rows["with 0.03"]
+    assert {study.config_of(v).ask_price for v in module.PRICES} == {0.25, 4.0} and "trained at price 4" in rows
     assert (
         rows["above 0.1"] >= rows["above 0.9"] and "requests: Success and the number" in written["requests"].read_text()
     )
@@ -303,8 +315,14 @@ def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):
     monkeypatch.setitem(module.VARIANTS, "8 houses", {"training_houses": 1})  # of the two of the hand-made data set
     run_study(study, ["houses"])
     rows = json.loads((study.out / "table_houses.json").read_text())
-    assert [r["agent"] for r in rows if r["split"] == "test_unseen"] == ["8 houses", "all houses"]
-    assert sorted(p.name for p in (study.out / "agents").iterdir()) == ["8_houses", "final"]
+    assert [r["agent"] for r in rows if r["split"] == "test_unseen"] == [
+        "8 houses",
+        "all houses",
+        "8 houses, equal passes",
+    ]
+    assert sorted(p.name for p in (study.out / "agents").iterdir()) == ["8_houses", "8_houses_equal_passes", "final"]
+    long, short = study.config_of("8 houses"), study.config_of("8 houses, equal passes")
+    assert (long.iterations, short.iterations) == (2, 1) and short.training_houses == 1
 
 
 def test_an_unknown_study_is_refused_before_anything_is_trained(study):

@@ -111,12 +111,12 @@ def action_index(action: Move | Stop) -> int:
 
 
 def imitation_loss(
-    said: Said, wanted: Targets, alpha: float, episodes: int, floor: float = 0.0
+    said: Said, wanted: Targets, alpha: float, episodes: int, floor: float = 0.0, price: float = 1.0
 ) -> tuple[Tensor, Tensor]:
     """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes.
 
-    `floor` as in losses.curiosity.
+    `floor` as in losses.curiosity, `price` as in losses.help_loss.
     """
     navigation = navigation_loss(said.moves, wanted.moves, wanted.negatives, alpha, floor).sum() / episodes
-    asking = help_loss(said.asks, wanted.asks, said.reasons, wanted.reasons).sum() / episodes
+    asking = help_loss(said.asks, wanted.asks, said.reasons, wanted.reasons, price).sum() / episodes
     return navigation, asking

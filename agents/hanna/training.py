@@ -101,7 +101,9 @@ def learn_once(
         return experience, experience.thinking
 
     def lesson_of(experience: Experience) -> spine.Lesson:
-        losses = imitation_loss(experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor)
+        losses = imitation_loss(
+            experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor, config.ask_price
+        )
         learned = losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]
         return spine.Lesson(losses, learned, numbers_of(experience, training.worlds))
 

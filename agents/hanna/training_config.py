@@ -17,6 +17,7 @@ from agents.imitation.settings import (
     AT_LEAST_ONE,
     NOT_ALL,
     NOT_NEGATIVE,
+    POSITIVE,
     SHARE,
     ImitationSettings,
     require,
@@ -60,6 +61,9 @@ class TrainingConfig(ImitationSettings):
     guided_asking: float = 0.0
     """Share of training episodes of the learned rule in which 'every5' asks in its place (docs/sources.md, S33).
     A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
+    ask_price: float = 1.0
+    """What a request costs in training that the teacher would not have made, against one that is missing; the authors
+    weigh both alike (docs/sources.md, S33)."""
     again: float = 1.0
     """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
     lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
@@ -81,6 +85,7 @@ class TrainingConfig(ImitationSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
         require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps")
         require(self, NOT_NEGATIVE, "alpha")
+        require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
         require(self, SHARE, "guided_asking", "again")
 

@@ -14,9 +14,12 @@ from typing import Any, TypeVar
 import joblib
 
 from agents.imitation.loop import Note
-from assets.cache import write_bytes
+from assets.cache import digest, write_bytes
+from embodied.datasets.store import SplitData
+from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Estimate
-from embodied.records import RecordError, read_json
+from embodied.interface import Agent, Episode
+from embodied.records import RecordError, episodes_file, load_lines, read_json, save_lines
 
 J = TypeVar("J", bound=Hashable)
 
@@ -40,6 +43,35 @@ def run_all(
         joblib.delayed(work)(seed, job) for seed, job in pairs
     ):
         note(line)
+
+
+def kept_episodes(
+    folder: Path,
+    name: str,
+    parts: Sequence[object],
+    split: SplitData,
+    policy: Callable[[], Agent],
+    *,
+    seed: int,
+    limit: int | None,
+) -> list[Episode]:
+    """An agent's episodes on a split, out of `folder` if they were played before.
+
+    Args:
+      name: of the agent, which the file is called after.
+      parts: all that they come from besides split, seed and limit, as assets.cache.digest takes it.
+      policy: makes the agent; called only where there is something to play.
+      limit: at most so many tasks, from all houses alike.
+    """
+    stem = Path(episodes_file(split.name, name)).stem
+    path = folder / f"{stem}_{digest(*parts, split.name, seed, limit or 0)[:16]}.jsonl"
+    if path.exists():
+        return list(load_lines(path, Episode))
+    found: list[Episode] = []
+    keep = lambda name, episodes: found.extend(episodes)
+    evaluate(split, {name: policy()}, seed=seed, limit=limit, batch=32, keep=keep)
+    save_lines(path, found)
+    return found
 
 
 def history_of(folder: Path) -> list[dict[str, Any]]:

@@ -64,8 +64,9 @@ def box(x: float, y: float, width: float, depth: float, yaw: float, bottom: floa
 
 
 def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
-    """Whether two boxes come closer than `gap` (separating axes); a negative gap forgives touching."""
-    if p.bottom >= q.top - TOUCH or q.bottom >= p.top - TOUCH:
+    """Whether two boxes come closer than `gap` (separating axes); a negative gap forgives touching, upwards, too."""
+    touch = max(TOUCH, -gap)
+    if p.bottom >= q.top - touch or q.bottom >= p.top - touch:
         return False
     dx, dy = q.x - p.x, q.y - p.y
     if abs(dx) >= p.reach_x + q.reach_x + gap or abs(dy) >= p.reach_y + q.reach_y + gap:
