@@ -32,7 +32,7 @@ from embodied.seeds import stream
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
 ATTEMPTS = 12
-REDRAWN = 5
+REDRAWN = 16
 """Houses drawn at most for a seed, until one has all that its rooms must not lack."""
 DEFAULT = HouseConfig()
 
