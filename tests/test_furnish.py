@@ -297,6 +297,16 @@ def test_a_small_flat_may_be_drawn_ten_times_until_its_kitchen_has_a_worktop():
 
 
 @pytest.mark.slow
+def test_a_house_is_drawn_anew_where_a_bedroom_opens_off_the_living_room_only():
+    config = HouseConfig(area=(160.0, 200.0))
+    drafted = generate_house(12037, config, stages=BARE)
+    assert lacking(drafted)[-1] == "bedroom_1: way from a hall or corridor"
+    assert not [x for x in lacking(generate_house(12037, config, catalogue())) if "way" in x]
+    flat = generate_house(9000, HouseConfig(area=(40.0, 55.0)), stages=BARE)
+    assert not [x for x in lacking(flat) if "way" in x]
+
+
+@pytest.mark.slow
 def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
     short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
     monkeypatch.setattr(stages, "lacking", lambda house: next(short))

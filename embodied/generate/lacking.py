@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from embodied.generate.furnish.rooms import PROGRAMMES
-from embodied.house.house import House
+from embodied.generate.kinds import BEDROOMS
+from embodied.house.house import DOORS, House
+
+FLAT = 75.0
+"""Up to here bedrooms may open off the living room, square metres."""
 
 
 def lacking(house: House) -> tuple[str, ...]:
-    """'kitchen_1: fridge' for everything that a room of `house` lacks.
+    """'kitchen_1: fridge' for everything that a room of `house` lacks, 'bedroom_1: way from a hall or corridor'.
 
     Counted are the needs of the table of rooms that name object classes. The furnisher tries for
     more; and it is asked of the finished house, because clearing the ways may take a bed out again.
@@ -15,9 +19,19 @@ def lacking(house: House) -> tuple[str, ...]:
     there: dict[str, set[str]] = {}
     for p in house.placements:
         there.setdefault(p.room, set()).add(p.object_class)
-    return tuple(
+    short = [
         f"{r.id}: {need.classes[0]}"
         for r in house.rooms
         for need in PROGRAMMES[r.kind].needs
         if need.classes and there.get(r.id, set()).isdisjoint(need.classes)
-    )
+    ]
+    return (*short, *_through_rooms(house))
+
+
+def _through_rooms(house: House) -> list[str]:
+    """The bedrooms of a house that one enters through another room only."""
+    if house.area <= FLAT:
+        return []
+    moving = {r.id for r in house.rooms if r.kind in ("hall", "corridor")}
+    entered = {name for o in house.openings if o.kind in DOORS and moving & {*o.rooms} for name in o.rooms}
+    return [f"{r.id}: way from a hall or corridor" for r in house.rooms if r.kind in BEDROOMS and r.id not in entered]

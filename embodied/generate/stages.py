@@ -229,7 +229,7 @@ def generate_house(
 ) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
-    Rooms are drawn anew where furniture that makes a room what it is (lacking.py) found no place; of
+    Rooms are drawn anew where furniture that makes a room what it is found no place (lacking.py); of
     `REDRAWN` houses, the one that lacks least.
 
     Args:
