@@ -239,6 +239,12 @@ def test_one_walks_from_every_door_of_a_room_to_every_other(some):
 
 
 @pytest.mark.slow
+def test_a_radiator_hangs_only_where_one_still_walks_past_it():
+    house = generate_house(12188, HouseConfig(area=(130, 160)), catalogue())  # a dining table ends 0.5 m from a window
+    test_one_walks_from_every_door_of_a_room_to_every_other([house])
+
+
+@pytest.mark.slow
 def test_a_curtain_hangs_only_where_one_still_walks_past_it():
     house = generate_house(9142, HouseConfig(area=(240, 280)), catalogue())  # an armchair stands 0.6 m from a window
     test_one_walks_from_every_door_of_a_room_to_every_other([house])

@@ -14,8 +14,8 @@ from embodied.generate.furnish.looks import looks
 from embodied.generate.furnish.space import RoomSpace, Wall, box, overlap
 from embodied.generate.furnish.stock import Size
 
-DEEP = 0.12
-"""What comes farther out of the wall must leave room to walk past, metres."""
+DEEP, THIN = 0.12, 0.07
+"""What comes farther out of the wall must leave room to walk past: as furniture must, and a narrow way, metres."""
 Spot = tuple[Wall, float]
 """A wall and a position along it, metres."""
 Shares = Callable[[], Iterable[float]]
@@ -57,9 +57,11 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
     exact = box(x, y, w, d, wall.yaw, base, base + h)
     if not ctx.space.fits(exact, passage=hanging.passage) or any(overlap(wide, q) for q in ctx.space.solids):
         return None
-    if hanging.passage and d > DEEP and not ctx.space.leaves_a_way_past(exact):
-        return None
-    plan = ctx.space.walkable([exact], ()) if d > DEEP and not hanging.passage else ctx.space.walk
+    plan: np.ndarray | None = ctx.space.walk
+    if d > DEEP and not hanging.passage:
+        plan = ctx.space.walkable([exact], ())
+    elif d > THIN and not ctx.space.leaves_a_way_past(exact):
+        plan = None
     if plan is None:
         return None
     role = hanging.role or hanging.group
