@@ -60,12 +60,12 @@ def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons
     """L_ask of Eq 4.14, (N,); without reason logits its first term only.
 
     Args:
-      price: what a request costs that the teacher would not have made, against one that is missing; the two weigh 2
-        together. 1 is the equation.
       ask: (N, 2) logits of DO_NOTHING and REQUEST.
       labels: (N,) int64, IGNORE outside the zones of attention.
       reason_logits: (N, 3) or None.
       reasons: (N, 3) float, 0 or 1.
+      price: what a request costs that the teacher would not have made, against one that is missing; the two weigh 2
+        together. 1 is the equation.
     """
     weights = ask.new_tensor([price, 1.0]) * 2 / (1 + price)  # of what the teacher says: DO_NOTHING, REQUEST
     loss = negative_log_likelihood(ask, labels) * weights[labels.clamp(min=0)]

@@ -62,7 +62,7 @@ class TrainingConfig(ImitationSettings):
     """Share of training episodes of the learned rule in which 'every5' asks in its place (docs/sources.md, S33).
     A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
     ask_price: float = 1.0
-    """What a needless request costs in training, against one that the teacher misses; 1: Eq 4.14."""
+    """What a needless request costs in training, against one that is missing; 1: Eq 4.14."""
     again: float = 1.0
     """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
     lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
