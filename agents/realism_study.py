@@ -1,8 +1,8 @@
 """Success against realism: agents that learned from one kind of pictures, judged in houses drawn in others (no
 counterpart in the dissertation).
 
-    embodied features --data DATA --encoder ENCODER --quality reference --split test_unseen
-    embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
+    embodied features --data DATA --encoder ENCODER --quality reference --split test_unseen --houses 8
+    embodied study realism --data DATA --out STUDY --houses 8 --agents unlit=A.safetensors lit=B.safetensors
 
 Each agent looks through the encoder it learned with, or through another that sees alike. Which way of drawing ranks
 agents as path-traced pictures do is told by Spearman's rank correlation over all agents.
@@ -51,12 +51,18 @@ class RealismSetting:
     """At most so many, from all houses alike."""
     seed: int = 0
     """Of judging."""
+    houses: int | None = None
+    """The first so many houses of the split; None: all."""
     encoders: Mapping[str, Path] = field(default_factory=dict)
     """Kind of agent to the encoder that it looks through; those without one look through the one they learned with."""
 
     def __post_init__(self) -> None:
         if unknown := [*(self.encoders.keys() - self.arms.keys())]:
             raise ValueError(f"encoders are given for {sorted(unknown)}, agents for {sorted(self.arms)}")
+
+    def names(self, data: Dataset) -> tuple[str, ...]:
+        """The houses that agents are judged in."""
+        return data.names(self.split)[: self.houses]
 
 
 def run_study(setting: RealismSetting, *, threads: int = 1, note: Note = print) -> Path:
@@ -96,17 +102,18 @@ def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float:
 def _episodes(setting: RealismSetting, data: Dataset, arm: str, path: Path, way: str) -> list[Episode]:
     """Those of one agent in houses drawn so, from the study's folder if it played them before."""
     looking = load_encoder(setting.encoders[arm]).digest if arm in setting.encoders else ""
-    drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in data.names(setting.split)}
+    drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in setting.names(data)}
 
     def policy() -> Agent:
         agent = load_agent(path)
-        return agent.policy(split_of(data, setting.split, looking or agent.encoder_digest, quality=way).bank)
+        digest = looking or agent.encoder_digest
+        return agent.policy(split_of(data, setting.split, digest, houses=setting.houses, quality=way).bank)
 
     return kept_episodes(
         setting.out / "episodes",
         f"{arm} {way}",
         (data.digest, path, drawn, looking),
-        data.split(setting.split),
+        data.split(setting.split, houses=setting.houses),
         policy,
         seed=setting.seed,
         limit=setting.tasks,
@@ -128,7 +135,7 @@ def _page(
     (arm, paths), *_ = setting.arms.items()
     first = rows[arm, best]
     drawn = "; ".join(
-        f"{way}: " + ", ".join(sorted({drawing(pictures_of(data, n, way)) for n in data.names(setting.split)}))
+        f"{way}: " + ", ".join(sorted({drawing(pictures_of(data, n, way)) for n in setting.names(data)}))
         for way in setting.pictures
     )
     how = (

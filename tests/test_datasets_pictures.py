@@ -155,7 +155,14 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     def features(quality: str | None, ray: str | None = None) -> str:
         lines: list[str] = []
         args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
-        args.threads, args.device, args.network, args.encoder, args.split = 1, "cpu", "random", None, None
+        args.threads, args.device, args.network, args.encoder, args.split, args.houses = (
+            1,
+            "cpu",
+            "random",
+            None,
+            None,
+            None,
+        )
         assert vision.run_features(args, lines.append) == 0
         return lines[-1]
 

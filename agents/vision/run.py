@@ -26,7 +26,7 @@ from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
 from embodied.locks import locked
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import TRACED, PictureSettings
 
 Note = Callable[[str], None]
 
@@ -115,7 +115,8 @@ def run_features(args: argparse.Namespace, note: Note = print) -> int:
     """Features of every house of a data set; houses that have them, from pictures drawn so, are skipped."""
     check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
-    wanted = {n: pictures_of(data, n, args.quality) for n in houses_of(data, args.split or data.splits)}
+    names = houses_of(data, args.split or data.splits, args.houses)
+    wanted = {n: pictures_of(data, n, args.quality) for n in names}
     missing = [(n, pictures) for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:
@@ -150,6 +151,8 @@ def _make_features(unit: tuple[str, PictureSettings], folder: Path, encoder: Enc
     torch.set_num_threads(threads)
     (name, pictures), data = unit, Dataset(folder)
     with drawn_world(data, name, cache, pictures) as world:
+        if pictures.quality in TRACED:
+            world.render_all()  # kept for the next encoder: they cost minutes a house
         panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)

@@ -170,6 +170,9 @@ def add_features(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
     parser.add_argument("--split", nargs="+", metavar="SPLIT", help="of the houses of these splits (default: all)")
+    parser.add_argument(
+        "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
+    )
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_device(parser)
 
@@ -356,6 +359,9 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         "features; the last is what the others are ranked against (default: %(default)s)",
     )
     parser.add_argument("--split", default="test_unseen", help="whose tasks (default: %(default)s)")
+    parser.add_argument(
+        "--houses", type=whole(), metavar="N", help="only those in its first so many houses (default: all)"
+    )
     add_judged_tasks(parser)
     parser.add_argument(
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"

@@ -89,7 +89,15 @@ def run_realism(args: argparse.Namespace) -> list[Path]:
     for name, path in args.agents:
         arms.setdefault(name, []).append(path)
     setting = RealismSetting(
-        args.data, args.out, arms, tuple(args.pictures), args.split, args.tasks, args.judge_seed, dict(args.encoders)
+        args.data,
+        args.out,
+        arms,
+        tuple(args.pictures),
+        args.split,
+        args.tasks,
+        args.judge_seed,
+        args.houses,
+        dict(args.encoders),
     )
     return [run_study(setting, threads=args.threads, note=note)]
 

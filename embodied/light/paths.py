@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import constant, drjit, flags, floats, mitsuba, wholes
+from embodied.light.backend import array, constant, drjit, flags, floats, mitsuba, vector, wholes
 from embodied.light.emitters import Lamp, Portal
 from embodied.light.radiosity import Points, Space
 from embodied.light.sky import Outdoors
@@ -21,6 +21,8 @@ from embodied.light.solve import AMBIENT, Luxels
 
 DEEPEST = 14
 """Diffuse bounces followed; Russian roulette begins at the third."""
+DENSE = 0.8
+"""Share of the paths that must be alive for the ended ones to be carried along."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,12 +195,22 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
 
 
 def irradiance(
-    space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, deepest: int = DEEPEST
+    space: Space,
+    lights: Lights,
+    surfaces: Surfaces,
+    p: Points,
+    *,
+    rng: np.random.Generator,
+    deepest: int = DEEPEST,
+    active: Array = True,
 ) -> Array:
-    """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each."""
+    """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each; 0 where not `active`."""
     mi, dr = mitsuba(), drjit()
+    sums = np.zeros((p.n, 3), np.float32)
+    of = np.flatnonzero(np.broadcast_to(np.asarray(active), p.n))  # the point that each path began at
+    p = _only(p, of)
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
-    for depth in range(deepest):
+    for depth in range(deepest if len(of) else 0):
         p = _turned(p, rng)
         total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)
         u = rng.random((4, p.n), np.float32)
@@ -224,15 +236,41 @@ def irradiance(
             alive &= floats(u[3]) < keep
             throughput = throughput / keep
         dr.eval(total, throughput, alive, q.position, q.normal, q.face_normal, q.thin)
-        p = q
-    return total
+        living = np.flatnonzero(np.asarray(alive))
+        if len(living) == 0:
+            break
+        if len(living) > DENSE * len(of):
+            p = q
+            continue
+        sums[of] += array(total)
+        of, p = of[living], _only(q, living)
+        total, throughput, alive = mi.Color3f(0.0), mi.Color3f(_gathered(throughput, living)), mi.Bool(True)
+    if len(of):
+        sums[of] += array(total)
+    return mi.Color3f(vector(sums))
+
+
+def _gathered(v: Array, which: np.ndarray) -> Array:
+    """Some entries of a vector or colour, by their numbers."""
+    mi, dr, numbers = mitsuba(), drjit(), wholes(which)
+    return mi.Vector3f(*(dr.gather(mi.Float, v[k], numbers) for k in range(3)))
+
+
+def _only(p: Points, which: np.ndarray) -> Points:
+    """Some of the points, by their numbers."""
+    if len(which) == p.n:
+        return p
+    zero = floats(np.zeros(len(which), np.float32))
+    at, normal, flat = (_gathered(v, which) for v in (p.position, p.normal, p.face_normal))
+    thin = drjit().gather(mitsuba().Bool, p.thin, wholes(which))
+    return Points(len(which), at, normal, flat, thin, zero, zero)
 
 
 def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:
     """Where rays meet the house from the front: luxel, whether they do, and the points there."""
     mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)
-    luxel, hit, front, _ = radiosity.hit_luxel(space, ray, active)
+    luxel, hit, front, _ = radiosity.hit_luxel(space, ray, active, h)
     flat = dr.gather(mi.Vector3f, space.normal, h.prim_index, hit)
     side = dr.select(dr.dot(flat, ray.d) > 0, -1.0, 1.0)
     normal = dr.gather(mi.Vector3f, surfaces.normal, luxel, hit)

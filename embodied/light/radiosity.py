@@ -396,10 +396,14 @@ def _hits(meet: Callable, n: int, samples: int) -> tuple:
     return found, bad
 
 
-def hit_luxel(space: Space, ray: Ray, active: Array = True) -> Array:
-    """Luxel number where a ray hits, whether it hits, whether from the front, whether nearer than 12 mm."""
+def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -> Array:
+    """Luxel number where a ray hits, whether it hits, whether from the front, whether nearer than 12 mm.
+
+    Args:
+      met: what the scene said of the ray, where it was asked before.
+    """
     mi, dr = mitsuba(), drjit()
-    q, w, height, base, hit, front, near = _met(space, ray, active)
+    q, w, height, base, hit, front, near = _met(space, ray, active, met)
     x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
     y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
     return dr.gather(mi.UInt32, space.luxel_of, base + y * w + x, hit), hit, front, near
@@ -423,11 +427,11 @@ def hit_colour(space: Space, table: Array, ray: Ray, active: Array = True) -> Ar
     return out, hit
 
 
-def _met(space: Space, ray: Ray, active: Array) -> Array:
+def _met(space: Space, ray: Ray, active: Array, met: Array = None) -> Array:
     """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the
     front, within 12 mm."""
     mi, dr = mitsuba(), drjit()
-    h = space.scene.ray_intersect_preliminary(ray, False, active)
+    h = space.scene.ray_intersect_preliminary(ray, False, active) if met is None else met
     hit = h.is_valid() & active
     f = h.prim_index
     page = dr.gather(mi.UInt32, space.page, f, hit)

@@ -5,13 +5,16 @@ Both return an embodied.render.panorama.Panorama with the bake's exposure, so th
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
 from embodied.house.house import House
 from embodied.light import paths, radiosity
 from embodied.light.arrays import Array, Ray, Triple
-from embodied.light.backend import array, drjit, floats, mitsuba
+from embodied.light.backend import array, constant, drjit, floats, mitsuba, vector
 from embodied.light.files import Bake
 from embodied.light.radiosity import Points
 from embodied.light.tone import develop
@@ -31,6 +34,8 @@ QUALITIES = ("glossy", "reference", "diffuse")
 """'diffuse' is the reference without gloss but for mirrors and metals; pages should equal it on all else."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
+LANES = 2**19
+"""Rays traced at once: to set a wave of them up costs as much for few as for many."""
 
 
 class Tracer:
@@ -55,52 +60,65 @@ class Tracer:
         self._world, self._seed = world_of(bake, house), house.seed
 
     def panorama(self, position: Triple, size: int | None = None) -> Panorama:
-        """Six cube faces around `position` (x, y, z)."""
+        """Six cube faces around `position` (x, y, z), traced together."""
         s = size or self.size
-        rgb = np.empty((6, s, s, 3), np.uint8)
-        depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
-        for k, (forward, up) in enumerate(FACES):
-            rgb[k], depth[k], ids[k] = self.picture(position, forward, up, np.pi / 2, (s, s), name=k)
-        return Panorama(rgb, depth, ids)
+        rng = stream(self._seed, "light", "trace", self.quality, "panorama")
+        return Panorama(*self._seen(position, FACES, np.pi / 2, (s, s), rng))
 
     def picture(
         self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int], *, name: int = 0
-    ) -> Array:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(h, w, 3) uint8, (h, w) float32 depth along the axis, (h, w) int32 ids of a pinhole camera."""
         rng = stream(self._seed, "light", "trace", self.quality, name)
-        h, w = size
-        centre = _camera_rays(position, forward, up, vfov, size, 1, 0, None)
+        rgb, depth, ids = self._seen(position, [(forward, up)], vfov, size, rng)
+        return rgb[0], depth[0], ids[0]
+
+    def _seen(
+        self,
+        position: Triple,
+        views: Sequence[tuple[Triple, Triple]],
+        vfov: float,
+        size: tuple[int, int],
+        rng: np.random.Generator,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `picture`, of several cameras in one place, (forward, up) each: (v, h, w, 3), (v, h, w) and (v, h, w)."""
+        shape = (len(views), *size)
+        n = math.prod(shape)
+        centre = _camera_rays(position, views, vfov, size, 1, None)
         hit = look(self._world, centre)
         ok, t, normal = np.asarray(hit.ok), np.asarray(hit.distance), array(hit.normal)
         ids = np.where(ok, self._world.owner[np.where(ok, np.asarray(hit.face), 0)], 0)
-        along = array(centre.d) @ np.asarray(forward, np.float32)
+        ahead = np.repeat(np.asarray([forward for forward, _ in views], np.float32), size[0] * size[1], axis=0)
+        along = np.einsum("nk,nk->n", array(centre.d), ahead)
         if self._world.panes is not None:
             _, _, first, face = through(self._world.panes, centre, hit.distance)
             pane = np.isfinite(np.asarray(first))
             ids = np.where(pane, self._world.panes.owner[np.asarray(face)], ids)
-        sums: list[np.ndarray] = [np.zeros((h * w, k), np.float32) for k in (1, 3, 3, 3, 1)]
+        sums: list[np.ndarray] = [np.zeros((n, k), np.float32) for k in (1, 3, 3, 3, 1)]
         inside, light, other, albedo, square = sums
-        rounds = range(0, self.rays, 4)
-        for start in rounds:
-            ray = _camera_rays(position, forward, up, vfov, size, min(4, self.rays - start), start, rng)
+        at_once = max(1, LANES // n)
+        for start in range(0, self.rays, at_once):
+            ray = _camera_rays(position, views, vfov, size, min(at_once, self.rays - start), rng)
             for total, part in zip(sums, self._samples(ray, rng)):
-                total += part.reshape(-1, h * w, part.shape[1]).sum(0)
+                total += part.reshape(-1, n, part.shape[1]).sum(0)
         share = np.maximum(inside, 1e-6)
         light, albedo, square = light / share, albedo / share, square / share
         if self.quality != "glossy":
             noise = np.sqrt(np.maximum(square[:, 0] / np.maximum(light.mean(1), 1e-4) ** 2 - 1, 0) / self.rays)
-            guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(h, w, 4)
+            guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(*shape, 4)
             white = np.maximum(albedo, 0.02)
-            light = _smoothed((light / white).reshape(h, w, 3), guide, noise.reshape(h, w)).reshape(-1, 3) * white
+            of_views = zip((light / white).reshape(*shape, 3), guide, noise.reshape(shape), strict=True)
+            light = np.stack([_smoothed(*one) for one in of_views]).reshape(-1, 3) * white
         shown = (develop(light, np.ones(3)) * inside + other) / self.rays
-        rgb = (np.clip(shown, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(h, w, 3)
+        rgb = (np.clip(shown, 0, 1) * 255 + 0.5).astype(np.uint8).reshape(*shape, 3)
         if self._world.panes is not None:
             ok, t = ok | pane, np.where(pane, np.asarray(first), t)
-        return rgb, np.where(ok, t * along, np.inf).reshape(h, w).astype(np.float32), ids.reshape(h, w).astype(np.int32)
+        depth = np.where(ok, t * along, np.inf).reshape(shape).astype(np.float32)
+        return rgb, depth, ids.reshape(shape).astype(np.int32)
 
     def plain(self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int]) -> np.ndarray:
         """(h, w) bool: pixels with no mirror or metal within two pixels."""
-        hit = look(self._world, _camera_rays(position, forward, up, vfov, size, 1, 0, None))
+        hit = look(self._world, _camera_rays(position, [(forward, up)], vfov, size, 1, None))
         shiny = np.asarray(hit.ok & ~hit.outdoor & (hit.gloss.z > SHINY)).reshape(size)
         return ~cv2.dilate(shiny.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
 
@@ -116,7 +134,7 @@ class Tracer:
         world = self._world
         hit = look(world, ray)
         inside = hit.ok & ~hit.outdoor
-        e = hit.e if self.quality == "glossy" else self._traced(hit, ray, rng)
+        e = hit.e if self.quality == "glossy" else self._traced(hit, inside & hit.front, rng)
         diffuse = hit.albedo * e
         diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
         radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
@@ -160,18 +178,18 @@ class Tracer:
         onward = mi.Ray3f(at + d * radiosity.LIFT, d)
         second = look(world, onward, there)
         far = picture_at(world.sky, world.rows, d, there) * radiosity.GLASS
-        e = second.e if self.quality == "glossy" else self._traced(second, onward, rng)
+        e = second.e if self.quality == "glossy" else self._traced(second, second.ok & ~second.outdoor, rng)
         seen = dr.select(second.ok & ~second.outdoor, second.albedo * e + second.glow, far)
         points = np.where(np.asarray(there)[:, None], array(at), 0.0)
         return np.asarray(mirrors)[:, None], np.nan_to_num(array(seen), posinf=0.0) * world.exposure.at(points)
 
-    def _traced(self, hit: Hit, ray: Ray, rng: np.random.Generator) -> Array:
-        """e at first hits by path tracing."""
+    def _traced(self, hit: Hit, where: Array, rng: np.random.Generator) -> Array:
+        """e at first hits by path tracing, where that is wanted."""
         world = self._world
         n = len(np.asarray(hit.distance))
         zero = floats(np.zeros(n, np.float32))
         points = Points(n, hit.position, hit.normal, hit.normal, hit.thin, zero, zero)
-        return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng)
+        return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng, active=where)
 
     def _with_gloss(self, hit: Hit, ray: Ray, diffuse: Array, inside: Array, rng: np.random.Generator) -> Array:
         """One GGX lobe above the diffuse light, seen by one reflected ray.
@@ -203,8 +221,9 @@ class Tracer:
         seen = dr.select(second.ok, second.albedo * second.e + second.glow, far)
         seen = dr.select(second.ok & second.outdoor, far * 0.3, seen)
         if self.quality != "glossy":
-            e = self._traced(second, onward, rng)
-            seen = dr.select(second.ok & ~second.outdoor & second.front, second.albedo * e + second.glow, seen)
+            indoors = second.ok & ~second.outdoor & second.front
+            e = self._traced(second, indoors, rng)
+            seen = dr.select(indoors, second.albedo * e + second.glow, seen)
         limit = BRIGHTEST * float(1 / np.median(world.exposure.gains))
         seen = dr.minimum(seen, limit)
         return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse)
@@ -242,24 +261,22 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
 
 def _camera_rays(
     position: Triple,
-    forward: Triple,
-    up: Triple,
+    views: Sequence[tuple[Triple, Triple]],
     vfov: float,
     size: tuple[int, int],
     each: int,
-    start: int,
     rng: np.random.Generator | None,
 ) -> Ray:
-    """`each` rays per pixel, pixel by pixel within a round; through pixel centres without an rng."""
+    """`each` rays per pixel, pixel by pixel and camera by camera within a round; through pixel centres without an
+    rng."""
     mi, dr = mitsuba(), drjit()
     h, w = size
-    f, u = np.asarray(forward, float), np.asarray(up, float)
-    right = np.cross(f, u)
-    jitter = rng.random((2, each, h * w), np.float32) if rng is not None else np.full((2, each, h * w), 0.5, np.float32)
+    ahead, up = (np.asarray([v[k] for v in views], float) for k in (0, 1))
+    of = (2, each, len(views), h * w)
+    jitter = rng.random(of, np.float32) if rng is not None else np.full(of, 0.5, np.float32)
     y, x = np.divmod(np.arange(h * w), w)
     t = np.tan(vfov / 2)
-    sx = ((x + jitter[0]) / w * 2 - 1) * t * w / h
-    sy = (1 - (y + jitter[1]) / h * 2) * t
-    v = lambda a: mi.Vector3f(*(float(k) for k in a))
-    d = v(f) + v(right) * floats(sx) + v(u) * floats(sy)
-    return mi.Ray3f(mi.Point3f(*(float(k) for k in position)), dr.normalize(d))
+    sx = (((x + jitter[0]) / w * 2 - 1) * t * w / h)[..., None]  # (each, views, h * w, 1)
+    sy = ((1 - (y + jitter[1]) / h * 2) * t)[..., None]
+    d = ahead[:, None] + np.cross(ahead, up)[:, None] * sx + up[:, None] * sy
+    return mi.Ray3f(mi.Point3f(*(constant(k) for k in position)), dr.normalize(vector(d.reshape(-1, 3))))
