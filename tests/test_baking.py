@@ -247,3 +247,43 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
     assert psnr > 28 and abs((a - b).mean()) < 6
     known = np.isfinite(depth) & (ids == view.ids)
     assert known.mean() > 0.9 and np.median(np.abs(depth - view.depth)[known]) < 0.01
+
+
+def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
+    from embodied.light.reference import Tracer
+    from embodied.render.panorama import FACES
+
+    house, _, _, baked = lit
+    tracer = Tracer(baked, house, quality="reference", size=16, rays=16)
+    at = (4.2, 3.4, 1.5)
+    panorama = tracer.panorama(at)
+    assert np.array_equal(panorama.rgb, tracer.panorama(at).rgb), "the same rays again"
+    for k, (forward, up) in enumerate(FACES):
+        rgb, depth, ids = tracer.picture(at, forward, up, np.pi / 2, (16, 16))
+        assert np.array_equal(ids, panorama.ids[k]) and np.array_equal(depth, panorama.depth[k])
+        assert abs(rgb.mean() - panorama.rgb[k].mean()) < 6, "other rays, the same light"
+
+
+def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
+    """Ended paths may be left behind or carried along: what the others bring is the same."""
+    from embodied.light import paths
+    from embodied.light.backend import array, flags, floats, mitsuba, vector
+    from embodied.light.radiosity import Points
+    from embodied.light.trace import world_of
+
+    house, _, _, baked = lit
+    world, n = world_of(baked, house), 4096
+    at = vector(np.tile(np.array([4.2, 3.4, 1.0]), (n, 1)))
+    up, zero = vector(np.tile(np.array([0.0, 0.0, 1.0]), (n, 1))), floats(np.zeros(n))
+    points = Points(n, at, up, up, flags(np.zeros(n, bool)), zero, zero)
+    asked = np.arange(n) % 4 == 0
+    trace = lambda **which: array(
+        paths.irradiance(world.space, world.lights, world.surfaces, points, rng=np.random.default_rng(0), **which)
+    )
+    some, everywhere = trace(active=mitsuba().Bool(asked)), trace()
+    assert (some[~asked] == 0).all() and (some[asked].sum(1) > 0).mean() > 0.9
+    monkeypatch.setattr(paths, "DENSE", 0.0)
+    carried = trace()
+    for e in (some[asked], carried):
+        spread = np.hypot(e.std(0) / len(e) ** 0.5, everywhere.std(0) / n**0.5)
+        assert (np.abs(e.mean(0) - everywhere.mean(0)) < 4 * spread).all()

@@ -152,22 +152,19 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     names = [u.name for u in building.units(data.scale)]
     lit = PictureSettings(16, "fast")
 
-    def features(quality: str | None, ray: str | None = None) -> str:
+    def features(quality: str | None, ray: str | None = None, houses: int | None = None) -> str:
         lines: list[str] = []
         args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
-        args.threads, args.device, args.network, args.encoder, args.split, args.houses = (
-            1,
-            "cpu",
-            "random",
-            None,
-            None,
-            None,
-        )
+        args.threads, args.device, args.network, args.encoder, args.split = 1, "cpu", "random", None, None
+        args.houses = houses
         assert vision.run_features(args, lines.append) == 0
         return lines[-1]
 
     for name in names:
         pano(data, name).unlink(missing_ok=True)
+    of_each = {data.names(split)[0] for split in data.splits}
+    assert features(None, houses=1).startswith(f"{len(of_each)} of {len(of_each)} houses made")
+    shutil.rmtree(data.folder / "features")
     assert features(None).startswith("3 of 3 houses made, pictures: 3 unlit_16")
     for name in names:
         pretend_drawn(data, name, lit, code="whoever drew them")

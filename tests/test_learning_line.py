@@ -245,6 +245,8 @@ def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data):
     text = realism(setting).read_text()
     assert "| all | 2 | " in text and "rank correlation with matte | 3 |" in text and "fast_192" in text
     assert "3 tasks in 1 houses" in text
+    first = dataclasses.replace(setting, houses=1, out=study.out / "first")
+    assert first.names(data) == (name,) and realism(first).read_text() == text, "there is but one house"
     kept = {p: p.stat().st_mtime_ns for p in (setting.out / "episodes").iterdir()}
     assert len(kept) == 4 and (setting.out / "figure_realism.png").exists()
     path.unlink()

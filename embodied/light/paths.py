@@ -204,7 +204,7 @@ def irradiance(
     deepest: int = DEEPEST,
     active: Array = True,
 ) -> Array:
-    """e (a Color3f) at points from all lights and any number of diffuse bounces, one path each; 0 where not `active`."""
+    """e (a Color3f) at points, 0 where not `active`, from all lights and any number of diffuse bounces: a path each."""
     mi, dr = mitsuba(), drjit()
     sums = np.zeros((p.n, 3), np.float32)
     of = np.flatnonzero(np.broadcast_to(np.asarray(active), p.n))  # the point that each path began at
