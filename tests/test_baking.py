@@ -264,6 +264,21 @@ def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
         assert abs(rgb.mean() - panorama.rgb[k].mean()) < 6, "other rays, the same light"
 
 
+def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
+    from embodied.light.reference import _denoised
+
+    shape = (48, 48)
+    guide = np.zeros((*shape, 4), np.float32)
+    guide[:, 24:, 0] = 1.0  # another wall
+    light, noise = np.full((*shape, 3), 0.5, np.float32), np.full(shape, 0.1, np.float32)
+    light[30, 12], noise[30, 12] = 20.0, 0.9
+    light[8:12, 34:38] = 20.0  # a lamp, whose rays agree
+    out = _denoised(light, guide, noise)
+    assert out[30, 12].max() < 1.0 and out[9, 35].min() > 18
+    assert out[:, :24].sum() == pytest.approx(light[:, :24].sum(), rel=0.02), "on its own wall"
+    assert out[20:, 24:].mean() == pytest.approx(0.5, rel=0.01)
+
+
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     """Ended paths may be left behind or carried along: what the others bring is the same."""
     from embodied.light import paths
