@@ -68,7 +68,11 @@ class Encoder:
     @torch.no_grad()
     def encode_strips(self, strips: np.ndarray) -> np.ndarray:
         """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
-        return self.finish(pool_views(strip_map(self.network, self._send(strips)), self.network.peaks)).cpu().numpy()
+        sent = self._send(strips)
+        # a processor keeps one strip in its cache, not several
+        parts = sent.split(1) if sent.device.type == "cpu" else [sent]
+        views = torch.cat([pool_views(strip_map(self.network, part), self.network.peaks) for part in parts])
+        return self.finish(views).cpu().numpy()
 
     @torch.no_grad()
     def encode_views(self, views: np.ndarray) -> np.ndarray:
@@ -101,8 +105,10 @@ def strip_map(network: Network, strips: Tensor) -> Tensor:
             f"expected strips (n, {HEIGHT}, {WIDTH}, 3) and a network of stride {CELL}, got {tuple(strips.shape)} and "
             f"stride {network.stride}; use sharing 'views' for other networks"
         )
-    wide = torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2)
-    return network.feature_map(network.normalise(wide))[..., MARGIN // CELL : -(MARGIN // CELL)]
+    wide = network.normalise(torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2))
+    # pixel by pixel is faster, but PyTorch 2.13 may corrupt memory on the way back (agents.vision.training)
+    maps = network.feature_map(wide.contiguous() if torch.is_grad_enabled() else wide)
+    return maps[..., MARGIN // CELL : -(MARGIN // CELL)]
 
 
 def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:

@@ -34,7 +34,7 @@ class Network(nn.Module):
         )
 
     def normalise(self, images: Tensor) -> Tensor:
-        """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect."""
+        """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect, in memory pixel by pixel."""
         mean = torch.tensor(self.mean, device=images.device).view(1, 3, 1, 1)
         deviation = torch.tensor(self.deviation, device=images.device).view(1, 3, 1, 1)
-        return ((images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation).contiguous()
+        return (images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation

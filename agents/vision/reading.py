@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -43,6 +44,7 @@ def labelled(
 
 
 def as_numbers(reading: ReadingScores, classes: Sequence[str]) -> dict[str, Any]:
-    """A reading for JSON."""
+    """A reading for JSON; None for a class that no judged house shows."""
     numbers = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
-    return numbers | {"ap by class": dict(zip(classes, reading.ap, strict=True))}
+    ap = [None if math.isnan(x) else x for x in reading.ap]
+    return numbers | {"ap by class": dict(zip(classes, ap, strict=True))}
