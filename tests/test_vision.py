@@ -19,12 +19,15 @@ from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import NETWORKS, PLAIN, WAYS, VisionConfig, drawing, way_of
 from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
-from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, whitening
+from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
-from agents.vision.probe import Labelled, average_precision, place_auc, read
+from agents.vision.probe import Labelled, ReadingScores, average_precision, place_auc, read
+from agents.vision.reading import as_numbers
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from agents.vision.training import Example, batches, strips_of, taken, train_encoder, turned, whitened
+from assets.cache import write_json
 from embodied.interface import Sight
+from embodied.records import read_json
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 
@@ -155,6 +158,26 @@ def test_turning_a_panorama_turns_its_features():
     closeness = np.corrcoef(np.roll(a[0, level], 1, 0).ravel(), b[0, level].ravel())[0, 1]
     assert closeness > 0.999
     assert np.corrcoef(a[0, level].ravel(), b[0, level].ravel())[0, 1] < closeness - 0.002
+
+
+@pytest.mark.parametrize("name", ["compact", "lite0"])
+def test_a_strip_has_the_same_features_in_any_company(name):
+    encoder = random_encoder(name, seed=0)
+    strips = np.random.default_rng(2).integers(0, 256, (3, strip.HEIGHT, strip.WIDTH, 3)).astype(np.uint8)
+    together = encoder.encode_strips(strips)
+    assert together.shape == (3, 36, encoder.size)
+    assert np.array_equal(together[1], encoder.encode_strips(strips[1:2])[0])
+    with torch.enable_grad():  # as in training, where memory is laid out in the other way
+        maps = strip_map(encoder.network, torch.from_numpy(strips))
+    trained = pool_views(maps, encoder.network.peaks).detach().numpy()
+    assert np.allclose(together, trained, atol=1e-4 * np.abs(trained).max())
+
+
+def test_a_reading_can_be_read_again(tmp_path):
+    """Also that of a class which no judged house shows."""
+    reading = ReadingScores(0.5, 0.1, 1, (0.5, math.nan), 0.7, 0.2, 0.8, 0.7, 4)
+    write_json(tmp_path / "reading.json", as_numbers(reading, ("sofa", "stove")), indent=1)
+    assert read_json(tmp_path / "reading.json")["ap by class"] == {"sofa": 0.5, "stove": None}
 
 
 def test_labels_count_what_each_cell_shows():
