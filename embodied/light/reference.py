@@ -35,7 +35,7 @@ QUALITIES = ("glossy", "reference", "diffuse")
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
 SPIKE = 0.4
-"""Standard error over the mean from which on a pixel is asked whether its neighbours have such light, too."""
+"""Standard error of a pixel's brightness over its mean above which it must not outshine its neighbours."""
 LANES = 2**19
 """Rays traced at once: to set a wave of them up costs as much for few as for many."""
 
@@ -234,7 +234,8 @@ class Tracer:
 def _denoised(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """`_smoothed`, but what a few lucky rays bring to a pixel alone is spread over its surface, and none of it lost.
 
-    Source: Jensen and Christensen 1995, sec. 3, for telling such pixels by their neighbours.
+    Args: as `_smoothed` takes them. Such a pixel is told by its own noise and by its neighbours, of which the third
+    brightest is as bright as it may stay; filters that know noise by its neighbours: Jensen and Christensen 1995.
     """
     shade = light.mean(-1)
     around = np.stack([np.roll(shade, (j, i), (0, 1)) for j in (-1, 0, 1) for i in (-1, 0, 1) if i or j])
