@@ -42,6 +42,7 @@ ENCODERS: Mapping[str, Mapping[str, Any]] = {
     "compact": {"network": "compact"},
     "keen": {"network": "keen"},
     "lite0, frozen": {"network": "lite0", "begin": "imagenet", "frozen": True},
+    "lite0 means, frozen": {"network": "lite0_means", "begin": "imagenet", "frozen": True},
     "lite0, fine-tuned": {"network": "lite0", "begin": "imagenet"},
 }
 """What differs from the chosen settings, by encoder."""

@@ -17,7 +17,7 @@ from agents.checkpoint_file import CheckpointError
 from agents.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
-from agents.vision.config import NETWORKS, PLAIN, WAYS, VisionConfig, drawing, way_of
+from agents.vision.config import IMAGENET, NETWORKS, PLAIN, WAYS, VisionConfig, drawing, way_of
 from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
@@ -160,7 +160,7 @@ def test_turning_a_panorama_turns_its_features():
     assert np.corrcoef(a[0, level].ravel(), b[0, level].ravel())[0, 1] < closeness - 0.002
 
 
-@pytest.mark.parametrize("name", ["compact", "lite0"])
+@pytest.mark.parametrize("name", ["compact", "lite0", "lite0_means"])
 def test_a_strip_has_the_same_features_in_any_company(name):
     encoder = random_encoder(name, seed=0)
     strips = np.random.default_rng(2).integers(0, 256, (3, strip.HEIGHT, strip.WIDTH, 3)).astype(np.uint8)
@@ -390,7 +390,7 @@ def test_lite0_is_the_packages_network():
     assert torch.allclose(found[:, 112:, 1::2, 1::2].mean(), x.mean(), atol=0.05) and found.shape == (1, 432, 4, 6)
     with pytest.raises(ValueError, match="lite0"):
         begin_as_imagenet(build("keen"))
-    with pytest.raises(ValueError, match="'imagenet' goes with network 'lite0'"):
+    with pytest.raises(ValueError, match="'imagenet' goes with networks .'lite0'"):
         VisionConfig(network="keen", begin="imagenet")
 
 
@@ -466,6 +466,7 @@ def test_every_way_of_drawing_has_its_own_features():
 
 def test_the_settings_name_the_networks_that_there_are():
     assert set(NETWORKS) == set(DESIGNS)
+    assert set(IMAGENET) == {name for name, design in DESIGNS.items() if design.body == "lite0"}
     with pytest.raises(ValueError, match="network must be one of"):
         VisionConfig(network="nope")
     with pytest.raises(ValueError, match="learning_rate"):

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
-OURS = ("compact", "keen", "lite0")
+OURS = ("compact", "keen", "lite0", "lite0_means")
+IMAGENET = ("lite0", "lite0_means")
+"""Networks for which ImageNet weights come in a package."""
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
 NETWORKS = (*OURS, *TORCHVISIONS)
 """Keys of agents.vision.designs.DESIGNS."""
@@ -64,9 +66,10 @@ class VisionConfig:
     """How the encoder is trained."""
 
     network: str = "compact"
-    """One of NETWORKS: 'compact' and 'keen' are small residual networks, 'lite0' is EfficientNet-Lite0."""
+    """One of NETWORKS: 'compact' and 'keen' are small residual networks, 'lite0' is EfficientNet-Lite0;
+    of half of the features of 'keen' and 'lite0' a view keeps the largest value, of all others the mean."""
     begin: str = "random"
-    """'imagenet' takes the weights of a package, which there are for 'lite0'."""
+    """'imagenet' takes the weights of a package, which there are for 'lite0' and 'lite0_means'."""
     frozen: bool = False
     """The body stays as it begins; the neck and the heads learn."""
     training_houses: int = 0
@@ -97,10 +100,10 @@ class VisionConfig:
             check_camera(name)
         if self.network not in NETWORKS:
             raise ValueError(f"network must be one of {NETWORKS}, got {self.network!r}")
-        if self.begin not in BEGINNINGS or (self.begin == "imagenet" and self.network != "lite0"):
+        if self.begin not in BEGINNINGS or (self.begin == "imagenet" and self.network not in IMAGENET):
             raise ValueError(
-                f"begin must be one of {BEGINNINGS}, and 'imagenet' goes with network 'lite0', got {self.begin!r} with "
-                f"{self.network!r}"
+                f"begin must be one of {BEGINNINGS}, and 'imagenet' goes with networks {IMAGENET}, got {self.begin!r} "
+                f"with {self.network!r}"
             )
         for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):
             if getattr(self, name) < least:

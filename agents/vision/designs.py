@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.vision.config import IMAGENET
 from agents.vision.lite import LiteBody, imagenet_weights
 from agents.vision.network import Network
 from agents.vision.resnet import ARCHITECTURES, ResNet
@@ -29,6 +30,7 @@ DESIGNS: Mapping[str, Design] = {
     "compact": Design("compact"),
     "keen": Design("compact", 256, 128),
     "lite0": Design("lite0", 256, 128),
+    "lite0_means": Design("lite0", 192),
     **{name: Design(name) for name in ARCHITECTURES if name.startswith("resnet")},
 }
 
@@ -61,7 +63,7 @@ def body_of(network: Network) -> Network:
 
 
 def begin_as_imagenet(network: Network) -> None:
-    """Put what ImageNet taught into the body of a network 'lite0'.
+    """Put what ImageNet taught into the body of 'lite0' or 'lite0_means'.
 
     Raises:
       ValueError: no other network's weights come in a package.
@@ -69,5 +71,5 @@ def begin_as_imagenet(network: Network) -> None:
     """
     body = body_of(network)
     if not isinstance(body, LiteBody):
-        raise ValueError("only 'lite0' can begin with ImageNet weights, which come in a package; use network 'lite0'")
+        raise ValueError(f"ImageNet weights come in a package for {IMAGENET} only; use one of these networks")
     body.load_state_dict(imagenet_weights())
