@@ -70,7 +70,7 @@ def train_agent(
     """
     houses, note = config.training_houses or None, one_voice(note)
     data, encoder = lessons.data, lessons.encoder
-    training = lessons.split("train", houses=houses)
+    training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else load_agent(begin)
     agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.speaks, encoder.size)

@@ -25,6 +25,7 @@ from agents.imitation.loop import Clock, Note, Progress, seed_of, tasks_of_updat
 from agents.imitation.losses import IGNORE
 from embodied.evaluation import metrics
 from embodied.interface import Agent, Episode, Place, Task, Teacher
+from embodied.seeds import stream
 
 
 def train(
@@ -59,7 +60,9 @@ class HannaLearner:
         )
 
     def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        return learn_once(self.agent, self.optimizer, self._player, self._training, self._teacher, update, clock)
+        bank = self._training.bank.relit(stream(self.config.seed, "lightings", update))
+        player = dataclasses.replace(self._player, bank=bank)
+        return learn_once(self.agent, self.optimizer, player, self._training, self._teacher, update, clock)
 
     def judged(self, split: Split) -> Agent:
         return self.agent.policy(split.bank)

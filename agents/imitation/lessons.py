@@ -38,10 +38,20 @@ class Lessons:
     device: str = "cpu"
 
     def split(
-        self, name: str, *, limit: int | None = None, houses: int | None = None, vnla: str = AS_PUBLISHED
+        self,
+        name: str,
+        *,
+        limit: int | None = None,
+        houses: int | None = None,
+        vnla: str = AS_PUBLISHED,
+        lights: int = 1,
     ) -> Split:
-        """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split."""
-        return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla)
+        """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split.
+
+        Args:
+          lights: lightings of every house that the bank can show.
+        """
+        return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla, lights)
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
@@ -58,6 +68,7 @@ def split_of(
     houses: int | None = None,
     quality: str | None = None,
     vnla: str = AS_PUBLISHED,
+    lights: int = 1,
 ) -> Split:
     """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
 
@@ -65,10 +76,11 @@ def split_of(
       encoder: its digest.
       quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
       vnla: VNLA's rule of play, as in Dataset.split.
+      lights: lightings of every house that the bank can show.
     """
     split = data.split(name, houses=houses, vnla=vnla)
     pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
     paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
     tasks = split.tasks if limit is None else spread(split.tasks, limit)
-    bank = load_bank(paths, encoder, split.worlds, pictures)
+    bank = load_bank(paths, encoder, split.worlds, pictures, lights)
     return Split(split.worlds, tasks, split.make_env, bank.to(device))

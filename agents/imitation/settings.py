@@ -94,6 +94,9 @@ class ImitationSettings(ValidatedRunSettings):
     """The authors' programs'; the text does not mention it (docs/sources.md, S28)."""
     training_houses: int = 0
     """Learn from so many of the data set's training houses; 0: from all."""
+    lights: int = 1
+    """Lightings of every training house, of which each update shows one: its own, and those that hour, weather and
+    lamps drawn from its seed make (`embodied features --lights`)."""
     environment_dropout: float = 0.0
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
     instruction_length: int = 50
@@ -111,7 +114,7 @@ class ImitationSettings(ValidatedRunSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self, AT_LEAST_ONE, "instruction_length", "evaluation_batch")
+        require(self, AT_LEAST_ONE, "lights", "instruction_length", "evaluation_batch")
         require(self, NOT_NEGATIVE, "weight_decay", "evaluation_temperature", "training_houses")
         require(self, NOT_ALL, "environment_dropout")
         require(self, SHARE, "cooldown", "ask_threshold")

@@ -1,4 +1,5 @@
-"""FeatureBank: the features of many worlds in one tensor, looked up by Sight."""
+"""FeatureBank: the features of many worlds in one tensor, looked up by Sight; of every lighting that a world is seen
+in."""
 
 from __future__ import annotations
 
@@ -14,16 +15,24 @@ from embodied.interface import Sight
 class FeatureBank:
     """A FeatureSource over (36, D) feature sets that are already computed, as one tensor on a device."""
 
-    def __init__(self, worlds: Mapping[str, np.ndarray], digest: str) -> None:
+    def __init__(
+        self, worlds: Mapping[str, np.ndarray], digest: str, others: Sequence[Mapping[str, np.ndarray]] = ()
+    ) -> None:
         """Args:
           worlds: world name -> (nodes, 36, D) features, float16 or float32.
           digest: of the encoder that agents must have learned from to be shown them.
+          others: the same worlds in other lightings, shown only by what `relit` returns.
 
         Raises:
           ValueError: another shape, or no world.
         """
         self._rows = SightRows(worlds)
-        self._table = torch.from_numpy(self._rows.filled(worlds))
+        for other in others:
+            if SightRows(other).spans != self._rows.spans or SightRows(other).size != self._rows.size:
+                raise ValueError("every lighting must show the same worlds with as many nodes and features")
+        self._table = torch.from_numpy(np.concatenate([self._rows.filled(w) for w in (worlds, *others)]))
+        self._lighting = dict.fromkeys(self._rows.spans, 0)
+        self.lightings = 1 + len(others)
         self.size, self.digest = self._rows.size, digest
 
     def to(self, device: torch.device | str) -> FeatureBank:
@@ -32,17 +41,27 @@ class FeatureBank:
         other.__dict__.update(self.__dict__, _table=self._table.to(device))
         return other
 
+    def relit(self, rng: np.random.Generator) -> FeatureBank:
+        """The bank that shows every world in one of its lightings, drawn evenly; this one goes on as it is."""
+        drawn = rng.integers(self.lightings, size=len(self._rows.spans)).tolist()
+        other = object.__new__(FeatureBank)
+        other.__dict__.update(self.__dict__, _lighting=dict(zip(self._rows.spans, drawn, strict=True)))
+        return other
+
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32, in absolute order."""
-        return self._table[self._rows.row(sight)].cpu().numpy()
+        return self._table[self._row(sight)].cpu().numpy()
 
     def gather(self, sights: Sequence[Sight | None]) -> torch.Tensor:
         """(n, 36, D) features of several sights, zeros for None."""
-        rows = torch.tensor([0 if s is None else self._rows.row(s) for s in sights], device=self._table.device)
+        rows = torch.tensor([0 if s is None else self._row(s) for s in sights], device=self._table.device)
         known = torch.tensor([s is not None for s in sights], device=self._table.device)
         return self._table[rows] * known[:, None, None]
 
     def look(self, sights: Sequence[Sight], views: Sequence[int]) -> torch.Tensor:
         """(n, D) features of one view of each sight."""
-        rows = torch.tensor([self._rows.row(s) for s in sights], device=self._table.device)
+        rows = torch.tensor([self._row(s) for s in sights], device=self._table.device)
         return self._table[rows, torch.tensor(views, device=self._table.device)]
+
+    def _row(self, sight: Sight) -> int:
+        return self._rows.row(sight) + self._rows.count * self._lighting[sight._world]

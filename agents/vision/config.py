@@ -42,6 +42,11 @@ def drawing(pictures: PictureSettings) -> str:
     return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
 
 
+def lit_name(house: str, lighting: int) -> str:
+    """What the strips and features of a house in one of its lightings are filed under; 0 is its own."""
+    return f"{house}@{lighting}" if lighting else house
+
+
 def way_of(pictures: PictureSettings) -> str:
     """The name in WAYS of what pictures are drawn like."""
     return "matte" if pictures.quality == "fast" and pictures.shown_with == "matte" else pictures.quality

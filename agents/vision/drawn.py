@@ -8,7 +8,7 @@ from pathlib import Path
 
 import joblib
 
-from agents.vision.config import WAYS, drawing, way_of
+from agents.vision.config import WAYS, drawing, lit_name, way_of
 from agents.vision.labels import HouseStrips, all_classes, look
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
@@ -35,12 +35,34 @@ def pictures_of(data: Dataset, name: str, quality: str | None = None) -> Picture
     return drawn
 
 
-def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings) -> World:
-    """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone."""
+def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings, lit: House | None = None) -> World:
+    """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone.
+
+    Args:
+      lit: the house in another light than its own.
+    """
     place, catalogue = data.place(name), load_catalogue(cache)
-    if pictures == data.drawn_pictures(name):
+    if lit in (None, place.house) and pictures == data.drawn_pictures(name):
         return data.open_world(name, catalogue, cache, pictures)
-    return open_world(place.house, catalogue, cache, pictures, graph=place.graph)
+    return open_world(lit or place.house, catalogue, cache, pictures, graph=place.graph)
+
+
+def baked_lightings(data: Dataset, name: str, count: int, cache: Path, pictures: PictureSettings) -> tuple[House, ...]:
+    """A house in its own light and in `count` - 1 others; those that have to be baked are baked together, which costs
+    less.
+
+    Raises:
+      ValueError: several lightings of pictures without light.
+    """
+    lightings = lightings_of(data.place(name).house, count)
+    if count > 1:
+        if pictures.lit_by is None:
+            raise ValueError(
+                f"{count} lightings want pictures with light, not {pictures.quality!r}: say --quality fast"
+            )
+        drawn = pictures == data.drawn_pictures(name)
+        bake_all(lightings[1:] if drawn else lightings, load_catalogue(cache), cache, pictures.lit_by)
+    return lightings
 
 
 @dataclass(frozen=True)
@@ -74,25 +96,14 @@ class StripSource:
     def _paths(self, data: Dataset, name: str) -> list[Path]:
         """Where the strips of a house are, in its own light and in others."""
         folder = self.folder / drawing(pictures_of(data, name, self.quality))
-        return [folder / (f"{name}@{k}.npz" if k else f"{name}.npz") for k in range(self.lights)]
+        return [folder / f"{lit_name(name, k)}.npz" for k in range(self.lights)]
 
     def _draw(self, name: str) -> str:
         data = Dataset(self.data)
-        place, pictures, catalogue = data.place(name), pictures_of(data, name, self.quality), load_catalogue(self.cache)
-        lightings = lightings_of(place.house, self.lights)
-        if self.lights > 1:
-            if pictures.lit_by is None:
-                raise ValueError(
-                    f"{self.lights} lightings want pictures with light, not {pictures.quality!r}: say --quality fast"
-                )
-            bake_all(lightings, catalogue, self.cache, pictures.lit_by)  # together, which costs less
-        for k, path in enumerate(self._paths(data, name)):
+        pictures, classes = pictures_of(data, name, self.quality), all_classes(load_catalogue(self.cache))
+        lightings = baked_lightings(data, name, self.lights, self.cache, pictures)
+        for lit, path in zip(lightings, self._paths(data, name), strict=True):
             if not path.exists():
-                with self._world(data, name, lightings[k] if k else None, pictures) as world:
-                    look(world, all_classes(catalogue)).save(path)
+                with drawn_world(data, name, self.cache, pictures, lit) as world:
+                    look(world, classes).save(path)
         return name
-
-    def _world(self, data: Dataset, name: str, lit: House | None, pictures: PictureSettings) -> World:
-        if lit is None:
-            return drawn_world(data, name, self.cache, pictures)
-        return open_world(lit, load_catalogue(self.cache), self.cache, pictures, graph=data.place(name).graph)

@@ -1,8 +1,8 @@
 """From panoramas to the 36 x D features per node of appendix D.1, and their files.
 
-A feature file belongs to one house, one encoder and one way of drawing, and says so: `<folder>/<encoder
-digest, 16 letters>/<drawing>/<house>.safetensors`. Row k of a node is view k of embodied.interface: turn k % 12
-(counter-clockwise from +x), tilt k // 12 - 1.
+A feature file belongs to one house in one light, one encoder and one way of drawing, and says so: `<folder>/<encoder
+digest, 16 letters>/<drawing>/<house>.safetensors`, with `@k` after the house for its k-th other light. Row k of a node
+is view k of embodied.interface: turn k % 12 (counter-clockwise from +x), tilt k // 12 - 1.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import torch
 
 from agents.tensor_file import load_tensors, save_tensors
 from agents.vision.bank import FeatureBank
-from agents.vision.config import PLAIN, drawing, way_of
+from agents.vision.config import PLAIN, drawing, lit_name, way_of
 from agents.vision.encoder import Encoder
 from agents.vision.strip import HEIGHT, VFOV
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
+from embodied.light import lightings_of
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 
@@ -86,20 +87,27 @@ def save_features(
 
 
 def load_features(
-    path: Path, *, encoder: str | None = None, source: str | None = None, pictures: PictureSettings | None = None
+    path: Path,
+    *,
+    encoder: str | None = None,
+    source: str | None = None,
+    pictures: PictureSettings | None = None,
+    lights: int = 1,
 ) -> tuple[np.ndarray, str]:
     """(n, 36, D) float16 features and the digest that their encoder speaks.
 
     Args:
       encoder, source, pictures: what is expected, if anything.
+      lights: how many lightings of the house are wanted; errors say it.
 
     Raises:
       FileNotFoundError: there is no such file.
       ValueError: truncated, changed, of another format, encoder, house or way of drawing.
     """
-    path, remedy = Path(path), f"make it again with `embodied features{_option(pictures)}`"
+    path, command = Path(path), _command(pictures, lights)
+    remedy = f"make it again with `{command}`"
     if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; make it with `embodied features{_option(pictures)}`")
+        raise FileNotFoundError(f"{path} does not exist; make it with `{command}`")
     tensors, about = load_tensors(path, (FORMAT,), remedy)
     features = tensors.get("features")
     if features is None or features.dim() != 3 or features.shape[1] != VIEWS or not {*KEYS} <= set(about):
@@ -111,8 +119,9 @@ def load_features(
     return features.numpy(), about.get("speaks", about["encoder"])
 
 
-def _option(pictures: PictureSettings | None) -> str:
-    return "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {way_of(pictures)}"
+def _command(pictures: PictureSettings | None, lights: int = 1) -> str:
+    quality = "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {way_of(pictures)}"
+    return f"embodied features{quality}" + (f" --lights {lights}" if lights > 1 else "")
 
 
 def load_bank(
@@ -120,27 +129,34 @@ def load_bank(
     encoder: str | None = None,
     places: Mapping[str, Place] | None = None,
     pictures: Mapping[str, PictureSettings] | None = None,
+    lights: int = 1,
 ) -> FeatureBank:
     """The features of several worlds (name -> file); all must come from one encoder.
 
     Args:
       encoder: what is expected, if anything.
       places, pictures: whose features they should be, and how these are drawn, by name.
+      lights: lightings of every world, whose files lie beside those of its own light.
     """
-    worlds, digests = {}, set()
-    for name in sorted(paths):
-        place = None if places is None else places[name]
-        source = None if place is None else place.house.digest
-        drawn = None if pictures is None else pictures[name]
-        worlds[name], digest = load_features(paths[name], encoder=encoder, source=source, pictures=drawn)
-        if place is not None and len(worlds[name]) != len(place.graph.ids):
-            raise ValueError(
-                f"{paths[name]}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
-                f"make it again with `embodied features{_option(drawn)}`"
-            )
-        digests.add(digest)
+    lightings: list[dict[str, np.ndarray]] = []
+    digests = set()
+    for k in range(lights):
+        worlds = {}
+        for name in sorted(paths):
+            place = None if places is None else places[name]
+            source = None if place is None else lightings_of(place.house, k + 1)[k].digest
+            drawn = None if pictures is None else pictures[name]
+            path = paths[name].with_stem(lit_name(paths[name].stem, k))
+            worlds[name], digest = load_features(path, encoder=encoder, source=source, pictures=drawn, lights=lights)
+            if place is not None and len(worlds[name]) != len(place.graph.ids):
+                raise ValueError(
+                    f"{path}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
+                    f"make it again with `{_command(drawn, lights)}`"
+                )
+            digests.add(digest)
+        lightings.append(worlds)
     if len(digests) > 1:
         raise ValueError(
             f"features come from the encoders {sorted(d[:12] for d in digests)}; make them all with one encoder"
         )
-    return FeatureBank(worlds, digests.pop())
+    return FeatureBank(lightings[0], digests.pop(), lightings[1:])

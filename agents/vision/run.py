@@ -14,8 +14,8 @@ from pathlib import Path
 import torch
 
 from agents.device import check_device
-from agents.vision.config import VisionConfig, drawing
-from agents.vision.drawn import StripSource, drawn_world, houses_of, pictures_of
+from agents.vision.config import VisionConfig, drawing, lit_name
+from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips
@@ -25,6 +25,8 @@ from agents.vision.training import Example, save_training, train_encoder, traine
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
+from embodied.house.house import House
+from embodied.light import lightings_of
 from embodied.locks import locked
 from embodied.render.pictures import TRACED, PictureSettings
 
@@ -112,19 +114,29 @@ def encoder_of(args: argparse.Namespace) -> Encoder:
 
 
 def run_features(args: argparse.Namespace, note: Note = print) -> int:
-    """Features of every house of a data set; houses that have them, from pictures drawn so, are skipped."""
+    """Features of every house of a data set, in so many lightings; houses that have them, from pictures drawn so, are
+    skipped.
+
+    Raises:
+      ValueError: several lightings of pictures without light.
+    """
     check_device(args.device)
     data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
     names = houses_of(data, args.split or data.splits, args.houses)
     wanted = {n: pictures_of(data, n, args.quality) for n in names}
-    missing = [(n, pictures) for n, pictures in wanted.items() if not _has_features(data, n, encoder, pictures)]
+    houses = {n: lightings_of(data.place(n).house, args.lights) for n in names}
+    missing = [
+        (n, pictures)
+        for n, pictures in wanted.items()
+        if not all(_has_features(data, n, k, lit, encoder, pictures) for k, lit in enumerate(houses[n]))
+    ]
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:
         for line in lines:
             note(line)
             yield line
 
-    arguments = (args.data.resolve(), encoder, args.cache, args.threads)
+    arguments = (args.data.resolve(), encoder, args.cache, args.threads, args.lights)
     for_each_unit(_make_features, missing, arguments, workers=args.workers, watch=watch, ray_address=args.ray)
     note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
     return 0
@@ -136,24 +148,32 @@ def _ways(pictures: Iterable[PictureSettings]) -> str:
     return "pictures: " + ", ".join(f"{n} {way}" for way, n in sorted(count.items()))
 
 
-def _has_features(data: Dataset, name: str, encoder: Encoder, pictures: PictureSettings) -> bool:
+def _has_features(
+    data: Dataset, name: str, lighting: int, house: House, encoder: Encoder, pictures: PictureSettings
+) -> bool:
     """False: missing, damaged, or of another house."""
-    path = feature_path(data.folder / "features", encoder.digest, name, pictures)
+    path = feature_path(data.folder / "features", encoder.digest, lit_name(name, lighting), pictures)
     try:
-        load_features(path, encoder=encoder.digest, source=data.place(name).house.digest, pictures=pictures)
+        load_features(path, encoder=encoder.digest, source=house.digest, pictures=pictures)
         return True
     except (FileNotFoundError, ValueError):
         return False
 
 
-def _make_features(unit: tuple[str, PictureSettings], folder: Path, encoder: Encoder, cache: Path, threads: int) -> str:
+def _make_features(
+    unit: tuple[str, PictureSettings], folder: Path, encoder: Encoder, cache: Path, threads: int, lights: int
+) -> str:
     """The features of one house (name, how it is drawn) into the data set's folder; returns what was done."""
     torch.set_num_threads(threads)
-    (name, pictures), data = unit, Dataset(folder)
-    with drawn_world(data, name, cache, pictures) as world:
-        if pictures.quality in TRACED:
-            world.render_all()  # kept for the next encoder: they cost minutes a house
-        panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-        path = feature_path(data.folder / "features", encoder.digest, name, pictures)
-        save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
-        return f"{name}: {len(world.graph.positions)} nodes, {pictures.quality} pictures of {pictures.size} pixels"
+    (name, pictures), data, nodes = unit, Dataset(folder), 0
+    for k, lit in enumerate(baked_lightings(data, name, lights, cache, pictures)):
+        if _has_features(data, name, k, lit, encoder, pictures):
+            continue
+        with drawn_world(data, name, cache, pictures, lit) as world:
+            if pictures.quality in TRACED:
+                world.render_all()  # kept for the next encoder: they cost minutes a house
+            panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
+            path = feature_path(data.folder / "features", encoder.digest, lit_name(name, k), pictures)
+            save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
+            nodes += len(world.graph.positions)
+    return f"{name}: {nodes} nodes, {pictures.quality} pictures of {pictures.size} pixels"

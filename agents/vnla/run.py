@@ -49,7 +49,7 @@ def train_agent(
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.vnla.training.train."""
     houses, note = config.training_houses or None, one_voice(note)
-    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules])
+    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
     agent = new_agent(config, words, encoder.speaks, encoder.size, lessons.pictures("train"))

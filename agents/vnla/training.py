@@ -7,6 +7,7 @@ loss = - log pi_main(a*) - log pi_ask(a*), summed over steps, averaged over epis
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ from agents.vnla.policy import VnlaMoment, for_training
 from embodied.envs.vnla import teacher_of
 from embodied.evaluation import metrics
 from embodied.interface import Agent, Episode, Place, Task
+from embodied.seeds import stream
 
 FORMAT = "embodied-vnla-checkpoint-1"
 
@@ -67,10 +69,12 @@ class VnlaLearner:
         """One update; the numbers to report."""
         config, training = self.config, self._training
         tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
+        bank = training.bank.relit(stream(config.seed, "lightings", update))
+        player = dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
 
         def played() -> tuple[VnlaExperience, float]:
             seed = seed_of(config.seed, update)
-            episodes, memory, seconds = play_remembering(training.make_env, self._player, tasks, seed=seed)
+            episodes, memory, seconds = play_remembering(training.make_env, player, tasks, seed=seed)
             return VnlaExperience(episodes, memory.moments), seconds
 
         def lesson_of(experience: VnlaExperience) -> spine.Lesson:

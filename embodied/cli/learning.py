@@ -121,6 +121,14 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
     )
+    _add_lights(parser)
+    parser.add_argument(
+        "--strips", type=folder_to_write, metavar="DIR", help="where strips go, to share them (default: OUT/strips)"
+    )
+    add_quality(parser)
+
+
+def _add_lights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lights",
         type=whole(),
@@ -129,10 +137,6 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
         help="lightings that every house is seen in: as it is, and with hour, weather and lamps drawn from its seed "
         "(default: %(default)s)",
     )
-    parser.add_argument(
-        "--strips", type=folder_to_write, metavar="DIR", help="where strips go, to share them (default: OUT/strips)"
-    )
-    add_quality(parser)
 
 
 def add_study_vision(parser: argparse.ArgumentParser) -> None:
@@ -170,6 +174,7 @@ def add_features(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
     )
     parser.add_argument("--split", nargs="+", metavar="SPLIT", help="of the houses of these splits (default: all)")
+    _add_lights(parser)
     parser.add_argument(
         "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
     )
