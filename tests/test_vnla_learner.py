@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 
@@ -11,8 +12,9 @@ import torch
 from hand_vnla import TINY, lesson, split_under
 
 from agents.checkpoint_file import CheckpointError
-from agents.imitation.loop import Clock
+from agents.imitation.loop import Clock, TrainingError
 from agents.imitation.playing import play_remembering
+from agents.vision.bank import FeatureBank
 from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent
 from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER, VnlaSettings
 from agents.vnla.network import (
@@ -258,6 +260,17 @@ def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("shown", [True, False])
+def test_it_learns_in_every_lighting_of_a_house(shown):
+    agent, training, _ = lesson()
+    own = {"grid": training.bank._table.numpy()}
+    dark = [{"grid": np.full_like(own["grid"], np.nan)}] if shown else []
+    learner = VnlaLearner(agent, dataclasses.replace(training, bank=FeatureBank(own, "hand", dark)))
+    with pytest.raises(TrainingError, match="loss") if shown else contextlib.nullcontext():
+        for update in range(4):  # all of them in its own light: one seed in sixteen
+            learner.learn(update, Clock())
+
+
 def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     def run(folder, *iterations):
         for n in iterations:
