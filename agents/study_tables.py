@@ -26,6 +26,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "8 houses": {"training_houses": 8},
     "32 houses": {"training_houses": 32},
     "128 houses": {"training_houses": 128},
+    "3 lightings": {"lights": 3},
     "half curiosity": {"alpha": 0.5},
     "no curiosity, no conditions": {"alpha": 0.0, "predict_reasons": False},
     "price 0.25": {"ask_price": 0.25},
@@ -227,6 +228,13 @@ TABLES: Mapping[str, Table] = {
             _line("all houses", "final"),
             *(_line(name, name) for name in SHORTER),
         ),
+    ),
+    "lights": Table(
+        "Success and the number of lightings of each training house (no counterpart in the dissertation)",
+        TEST,
+        FULL,
+        (_line("1 lighting", "final"), _line("3 lightings", "3 lightings")),
+        (("3 lightings", "final"),),
     ),
     "requests": Table(
         "Success and the number of requests (no counterpart in the dissertation)",

@@ -327,6 +327,12 @@ def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):
     assert (long.iterations, short.iterations) == (2, 1) and short.training_houses == 1
 
 
+def test_a_study_of_lightings_says_how_to_light_the_houses(study):
+    assert study.config_of("3 lightings").lights == 3 and study.config_of("final").lights == 1
+    with pytest.raises(FileNotFoundError, match="@1.safetensors does not exist; .*embodied features --lights 3"):
+        run_study(study, ["lights"])
+
+
 def test_an_unknown_study_is_refused_before_anything_is_trained(study):
     with pytest.raises(ValueError, match="unknown studies"):
         run_study(study, ["5.1"])

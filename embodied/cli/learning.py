@@ -297,7 +297,9 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses or requests")
+    parser.add_argument(
+        "tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses, lights or requests"
+    )
     add_common(parser)
     parser.add_argument(
         "--encoder",
@@ -326,7 +328,7 @@ def add_study(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     add_begin(parser)
     parser.set_defaults(threads=1)  # per agent; they are trained side by side
-    add_fields(parser, TrainingConfig, skip=("training_houses",), scales=SCALES)
+    add_fields(parser, TrainingConfig, skip=("training_houses", "lights"), scales=SCALES)
 
 
 def add_study_realism(parser: argparse.ArgumentParser) -> None:

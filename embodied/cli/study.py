@@ -11,9 +11,10 @@
     embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5 (with figures D.1 and D.2), 4.6, D.2, and success against the number of training
-`houses` and of `requests`. `realism` judges trained HANNA agents in houses drawn in other ways. HARI's tables are 4.7,
-4.8, `moves`, `sight` (wants `embodied features`), 'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's:
-`askers`, `interventions`, `rooms` (wants --without-rooms) and `rules`.
+`houses`, of their `lights` (wants `embodied features --lights 3`) and of `requests`. `realism` judges trained HANNA
+agents in houses drawn in other ways. HARI's tables are 4.7, 4.8, `moves`, `sight` (wants `embodied features`),
+'figure 4.5' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (wants --without-rooms)
+and `rules`.
 `bandit` is a translator that learns from ratings, on a corpus of `embodied corpus`: Table 3.2, Figures 3.4 and 3.5;
 `stars` lets a HANNA agent learn from ratings in the same way, in houses. `iliad` learns from descriptions of what it
 did: Tables 3.4, 3.5 and C.1, 'figure 3.7', and `describer`: success against wrong descriptions, `speakers`: one that
