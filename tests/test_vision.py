@@ -25,7 +25,7 @@ from agents.vision.features import FORMAT, feature_path, load_bank, load_feature
 from agents.vision.probe import Labelled, ReadingScores, average_precision, place_auc, read
 from agents.vision.reading import as_numbers
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import Example, batches, strips_of, taken, train_encoder, turned, whitened
+from agents.vision.training import Example, batches, matched, strips_of, taken, train_encoder, turned, whitened
 from assets.cache import write_json
 from embodied.interface import Sight
 from embodied.light import lightings_of
@@ -326,6 +326,10 @@ def test_an_encoder_learns_to_see_dark_pictures_as_its_example_sees_bright_ones(
     aim = example.encoder.encode_strips(bright.rgb)
     off = [np.square(who.encode_strips(dark.rgb) - aim).mean() for who in (example.encoder, learned)]
     assert off[1] < off[0] / 2
+    spread = matched(learned, [dark], example).encode_strips(dark.rgb)
+    variance = lambda f: ((f - f.mean((0, 1))) ** 2).sum()
+    assert variance(spread) == pytest.approx(variance(aim), rel=0.02)
+    assert np.square(spread - aim).mean() < 1.2 * off[1]
     save_encoder(learned, tmp_path / "e.safetensors")
     again = load_encoder(tmp_path / "e.safetensors")
     assert again.like == again.speaks == example.encoder.digest != again.digest
@@ -334,6 +338,19 @@ def test_an_encoder_learns_to_see_dark_pictures_as_its_example_sees_bright_ones(
     assert load_features(tmp_path / "f.safetensors", encoder=again.digest)[1] == example.encoder.digest
     with pytest.raises(ValueError, match="made from encoder"):
         load_features(tmp_path / "f.safetensors", encoder=example.encoder.digest)
+
+
+def test_matched_features_are_those_of_the_example_where_a_linear_map_leads_there():
+    encoder, rng = random_encoder(seed=3), np.random.default_rng(0)
+    rgb = rng.integers(0, 256, (12, 24, 72, 3), dtype=np.uint8).repeat(8, 1).repeat(8, 2)
+    houses = [dataclasses.replace(strips_of_colours(12, seed=0), rgb=rgb)]
+    turn = torch.linalg.qr(torch.randn(encoder.size, encoder.size, generator=torch.Generator().manual_seed(0)))[0]
+    example = Example(dataclasses.replace(encoder, mean=torch.ones(encoder.size), mix=3 * turn), {"house": houses[0]})
+    aim = example.encoder.encode_strips(houses[0].rgb)
+    plain = whitened(encoder, houses)
+    found = matched(plain, houses, dataclasses.replace(example, strips={houses[0].name: houses[0]}))
+    off = [np.square(e.encode_strips(houses[0].rgb) - aim).mean() for e in (plain, found)]
+    assert off[1] < 0.05 * aim.var() < off[0]
 
 
 def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():

@@ -21,7 +21,7 @@ from agents.vision.features import encode_panoramas, feature_path, load_features
 from agents.vision.labels import HouseStrips
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
-from agents.vision.training import Example, save_training, train_encoder, trained_classes, whitened
+from agents.vision.training import Example, matched, save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
@@ -93,7 +93,8 @@ def taught(
     if classes is None:
         checkpoint = folder / "checkpoint.pt"
         encoder, heads, classes = train_encoder(seen, config, checkpoint, example=example, device=device, note=note)
-        save_training(encoder if example else whitened(encoder, seen), heads, classes, config, folder)
+        encoder = matched(encoder, seen, example) if example else whitened(encoder, seen)
+        save_training(encoder, heads, classes, config, folder)
         (folder / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes
 

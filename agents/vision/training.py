@@ -368,9 +368,44 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
     Raw features are all positive, so any two views have a cosine near one and the target
     similarity of D.1 says little; after whitening it is near zero for different places.
     """
-    features = [encoder.encode_strips(h.rgb[i : i + batch]) for h in houses for i in range(0, len(h.rgb), batch)]
-    mean, mix = whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
+    mean, mix = whitening(_seen_by(encoder, houses, batch))
     return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
+
+
+def matched(encoder: Encoder, houses: Sequence[HouseStrips], example: Example) -> Encoder:
+    """The encoder with features that are mapped linearly onto those it was taught to see, and spread as widely.
+
+    What least squares teach lies nearer to the mean than what it stands for, the more so the less it can know; an
+    agent that is shown it should find as much between two views as where it learned.
+
+    Args:
+      houses: strips to fit the map on, in any light.
+    """
+    aims = {name: _seen_by(example.encoder, [strips]) for name, strips in example.strips.items()}
+    turned, offset = _spread_map(_seen_by(encoder, houses).double(), torch.cat([aims[h.name] for h in houses]).double())
+    mean, mix = encoder.mean, encoder.mix
+    mean = torch.zeros(encoder.size) if mean is None else mean
+    mix = torch.eye(encoder.size) if mix is None else mix
+    both = mix.double() @ turned  # (x - mean) @ mix @ turned + offset, as (x - other) @ both
+    other = mean.double() - offset @ torch.linalg.pinv(both, rtol=1e-4)
+    return dataclasses.replace(encoder, mean=other.float(), mix=both.float())
+
+
+def _spread_map(seen: Tensor, aim: Tensor, ridge: float = 1e-4) -> tuple[Tensor, Tensor]:
+    """(D, D) and (D,): the least-squares map from `seen` to `aim`, both (n, D), stretched so that what it gives has the
+    variance of `aim`, and its offset."""
+    centre, middle = seen.mean(0), aim.mean(0)
+    x, y = seen - centre, aim - middle
+    damped = x.T @ x + ridge * (x**2).sum() / x.shape[1] * torch.eye(x.shape[1], dtype=x.dtype)
+    fitted = torch.linalg.solve(damped, x.T @ y)
+    fitted = fitted * ((y**2).sum() / ((x @ fitted) ** 2).sum()).sqrt()
+    return fitted, middle - centre @ fitted
+
+
+def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Tensor:
+    """(n, D) features of all views of all strips."""
+    features = [encoder.encode_strips(h.rgb[i : i + batch]) for h in houses for i in range(0, len(h.rgb), batch)]
+    return torch.from_numpy(np.concatenate(features)).flatten(0, 1)
 
 
 def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config: VisionConfig, folder: Path) -> None:
