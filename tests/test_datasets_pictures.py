@@ -152,11 +152,11 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     names = [u.name for u in building.units(data.scale)]
     lit = PictureSettings(16, "fast")
 
-    def features(quality: str | None, ray: str | None = None, houses: int | None = None) -> str:
+    def features(quality: str | None, ray: str | None = None, houses: int | None = None, lights: int = 1) -> str:
         lines: list[str] = []
         args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
         args.threads, args.device, args.network, args.encoder, args.split = 1, "cpu", "random", None, None
-        args.houses = houses
+        args.houses, args.lights = houses, lights
         assert vision.run_features(args, lines.append) == 0
         return lines[-1]
 
@@ -171,6 +171,8 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
     assert features("unlit").startswith("0 of 3 houses made"), "they are still there"
+    with pytest.raises(ValueError, match="2 lightings want pictures with light, not 'unlit': say --quality fast"):
+        features("unlit", lights=2)
     name = names[0]
     path = feature_path(data.folder / "features", encoder.digest, name, lit)
     found, _ = load_features(path, encoder=encoder.digest, source=data.place(name).house.digest, pictures=lit)
