@@ -375,13 +375,14 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
 def matched(encoder: Encoder, houses: Sequence[HouseStrips], example: Example) -> Encoder:
     """The encoder with features that are mapped linearly onto those it was taught to see, and spread as widely.
 
-    What least squares teach lies nearer to the mean than what it stands for, the more so the less it can know; an
-    agent that is shown it should find as much between two views as where it learned.
+    What is taught by least squares lies nearer to the mean than what it stands for, and the nearer the less of it can
+    be known; an agent should find two views as far apart as where it learned.
 
     Args:
       houses: strips to fit the map on, in any light.
     """
-    aims = {name: _seen_by(example.encoder, [strips]) for name, strips in example.strips.items()}
+    teacher = example.encoder.to("cpu")  # training left its network where it computed
+    aims = {name: _seen_by(teacher, [strips]) for name, strips in example.strips.items()}
     turned, offset = _spread_map(_seen_by(encoder, houses).double(), torch.cat([aims[h.name] for h in houses]).double())
     mean, mix = encoder.mean, encoder.mix
     mean = torch.zeros(encoder.size) if mean is None else mean
