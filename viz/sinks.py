@@ -199,7 +199,7 @@ def _spawned() -> str:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        _wait_for(viewer, HERE, "use --serve and a browser, or --rrd and a file")
+        _wait_for(viewer, HERE, (PORT,), "use --serve and a browser, or --rrd and a file")
     return _url(PORT)
 
 
@@ -217,21 +217,22 @@ def _serve(bind: str) -> Iterator[None]:
         start_new_session=True,  # Ctrl-C is for us
     )
     try:
-        _wait_for(server, HERE if bind == EVERYWHERE else bind, f"look whether {bind} is an address of this machine")
+        reached = HERE if bind == EVERYWHERE else bind
+        _wait_for(server, reached, (PORT, WEB_PORT), f"look whether {bind} is an address of this machine")
         yield
     finally:
         server.terminate()
         server.wait()
 
 
-def _wait_for(program: subprocess.Popen, host: str, remedy: str) -> None:
-    """Wait until `program` listens.
+def _wait_for(program: subprocess.Popen, host: str, ports: tuple[int, ...], remedy: str) -> None:
+    """Wait until `program` listens at every one of `ports`: the page's port opens after the recordings'.
 
     Raises:
       UnableError: it ended, or does not listen after a minute.
     """
     until = time.monotonic() + PATIENCE
-    while not listens(host, PORT):
+    while not all(listens(host, p) for p in ports):
         if program.poll() is not None or time.monotonic() > until:
             program.kill()
             raise UnableError(f"the Rerun viewer could not be started (status {program.poll()}); {remedy}")
