@@ -8,12 +8,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_with
 from agents.hanna.policy import PerfectInterpretation
+from agents.imitation.choosing import choose_at
 from agents.vision.bank import FeatureBank
 from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
 from embodied.navigation.graph import nearest
@@ -52,6 +54,23 @@ def priced_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     learned = agent.policy(bank)
     rules = {name: rule for kind in PRICED.values() for name, rule in kind.items()}
     return {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
+
+
+PLAINER: Mapping[str, Mapping[str, Any]] = {
+    "learned, without search": {"search": 0.0},
+    "learned, not by image": {"by_image": False},
+    "learned, without a trail": {"by_image": False, "again": 1.0},
+    "learned, likeliest move": {"choose": choose_at(0.0)},
+    "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
+}
+"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so (docs/sources.md,
+S36)."""
+
+
+def plainer_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+    """A learned agent judged in each way of PLAINER."""
+    learned = agent.policy(bank)
+    return {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any
 import joblib
 import torch
 
-from agents.failures import PRICED, hanna_policies, priced_policies
+from agents.failures import PRICED, hanna_policies, plainer_policies, priced_policies
 from agents.figures import conditions_figure, curves_figure, houses_figure, requests_curves, requests_figure
 from agents.hanna.agent import load_agent
 from agents.hanna.run import train_agent
@@ -188,7 +188,8 @@ class _Player:
             if not variant:
                 return agent_without_learning("hanna", played)
             agent = load_agent(path)
-            return {**hanna_policies(agent, bank), **priced_policies(agent, bank)}[played]
+            every = (hanna_policies, priced_policies, plainer_policies)
+            return {name: policy for make in every for name, policy in make(agent, bank).items()}[played]
 
         name = f"{variant}, seed {seed}, {played}" if variant else played
         return kept_episodes(
@@ -300,7 +301,7 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
         f"{setting.seed}, temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per "
         "cent."
     )
-    title = f"{name}: {table.title}" if name in ("houses", "requests") else f"Table {name}: {table.title}"
+    title = f"{name}: {table.title}" if name.isalpha() else f"Table {name}: {table.title}"
     lines = [(line.label, line.printed) for line in table.lines]
     value = lambda label, split, column: by[label, split].values[column]
     pairs = [

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from agents.failures import PRICED
+from agents.failures import PLAINER, PRICED
 
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "final": {},
@@ -31,11 +31,17 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "no curiosity, no conditions": {"alpha": 0.0, "predict_reasons": False},
     "price 0.25": {"ask_price": 0.25},
     "price 4": {"ask_price": 4.0},
+    "no guided asking": {"guided_asking": 0.0},
+    "no curiosity floor": {"curiosity_floor": 0.0},
+    "no environment dropout": {"environment_dropout": 0.0},
+    "no falling rate": {"cooldown": 0.0},
 }
 """What differs from the chosen settings, by agent. Alpha is 0.5 with heuristic askers (Table D.1, note). Half curiosity
 (learned asking with the alpha of heuristic askers) and our model without what the LSTM lacks are in no printed row, but
 agents that are compared should differ in one thing."""
 PRICES = ("price 0.25", "price 4")
+DEPARTURES = ("no guided asking", "no curiosity floor", "no environment dropout", "no falling rate")
+"""Agents trained with one thing less that `mini` does otherwise than Table D.1 (docs/sources.md, S32 to S35)."""
 SHORTER = {f"{n} houses, equal passes": f"{n} houses" for n in (8, 32, 128)}
 """Agents that are trained like those of VARIANTS, but see each of their tasks only as often as the agent of all houses
 sees one of its own."""
@@ -235,6 +241,18 @@ TABLES: Mapping[str, Table] = {
         FULL,
         (_line("1 lighting", "final"), _line("3 lightings", "3 lightings")),
         (("3 lightings", "final"),),
+    ),
+    "departures": Table(
+        "What mini does otherwise than Table D.1, one thing less at a time (no counterpart in the dissertation)",
+        TEST,
+        (*FULL, "mistake repeat", "request repeat"),
+        (
+            _line("as mini is", "final"),
+            *(_line(name, name) for name in DEPARTURES),
+            _line("no reasons", "no conditions"),
+            *(_line(name.removeprefix("learned, "), "final", name) for name in PLAINER),
+        ),
+        tuple(("final", other) for other in (*DEPARTURES, "no conditions")),
     ),
     "requests": Table(
         "Success and the number of requests (no counterpart in the dissertation)",

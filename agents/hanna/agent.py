@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from agents.hanna.asking import RULES, ask_above
+from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
@@ -44,7 +44,8 @@ class HannaAgent:
         """
         refuse_features(bank.digest, self.encoder_digest)
         config = self.config
-        rule = ask_above(config.ask_threshold) if config.ask_rule == "learned" else RULES[config.ask_rule][1]
+        learned = ask_patiently(config.ask_threshold, config.first_ask_threshold, config.patience)
+        rule = learned if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
             self.network,
             self.vocabulary,
@@ -55,6 +56,8 @@ class HannaAgent:
             turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
             again=config.again,
+            by_image=config.by_image,
+            search=config.search,
         )
 
 

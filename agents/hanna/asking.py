@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from embodied.interface import Observation
+from embodied.interface import Mode, Observation
 from embodied.policies import baselines
 
 
@@ -32,6 +32,19 @@ def ask_sampled(probability: float, observation: Observation, last_asked: int, *
 def ask_above(threshold: float) -> HannaAskRule:
     """Ask where the network's probability exceeds `threshold`: for evaluation."""
     return lambda probability, observation, last_asked, *, rng: probability > threshold
+
+
+def ask_patiently(threshold: float, first: float, patience: int) -> HannaAskRule:
+    """As `ask_above`, but above `first` while nobody has shown where to go, and, once a route is left, not before
+    `patience` moves towards what was shown: who asks again at once is sent back to where it came from."""
+
+    def rule(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
+        if observation.target is None:
+            return probability > first
+        looking = observation.mode is Mode.MAIN and observation.time_on_task < patience
+        return probability > threshold and not looking
+
+    return rule
 
 
 ask_greedily = ask_above(0.5)

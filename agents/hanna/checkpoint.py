@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 
 from agents.hanna.agent import HannaAgent
+from agents.hanna.training_config import JUDGED
 from agents.imitation.checkpoint import load_run, save_run
 from agents.imitation.loop import Progress
 from agents.imitation.settings import MAY_CHANGE
@@ -21,4 +22,4 @@ def save_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimi
 
 def load_checkpoint(path: Path, agent: HannaAgent, optimizer: torch.optim.Optimizer) -> Progress:
     """Put a run back into `agent` and `optimizer` and say where it was; raises CheckpointError."""
-    return load_run(path, FORMAT, agent, optimizer, (*MAY_CHANGE, "again"))
+    return load_run(path, FORMAT, agent, optimizer, (*MAY_CHANGE, *JUDGED))

@@ -16,7 +16,7 @@ from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
-from agents.hanna.trail import Trail
+from agents.hanna.trail import Trail, weigh, weigh_by_image
 from agents.hanna.vocabulary import Vocabulary
 from agents.imitation.choosing import Chooser, choose_likeliest, choose_sampled
 from agents.vision.bank import FeatureBank
@@ -93,6 +93,10 @@ class HannaPolicy:
     of policies as in DAgger (Ross et al. 2011). For training."""
     again: float = 1.0
     """A move's weight for each time the agent was, under the same words, where it knows the move to lead."""
+    by_image: bool = False
+    """Go by the image of where to go, if one is shown (hanna.trail.weigh_by_image)."""
+    search: float = 0.0
+    """How it looks for what the image shows; see hanna.trail.weigh_by_image."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
     _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
@@ -132,13 +136,17 @@ class HannaPolicy:
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
             thought = thought_of(moves[row], asks[row], reason, n)
             weights = moves[row, : n + 1]
+            known = False
             if trails:
-                weights = weights * np.append(1.0, self.again ** trails[row].times(o))
+                weights = weigh(trails[row], o, weights, self.again)
+            if trails and self.by_image:
+                trails[row] = trails[row].thinking(o, moves[row, 1 : n + 1])
+                weights, known = weigh_by_image(trails[row], o, weights, self.search)
             index = self.choose(weights, rng)  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
             rule = RULES["every5"][0] if position < guided else self.ask_rule
-            if Intention.HELP in o.can_ask and rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
+            if Intention.HELP in o.can_ask and not known and rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
                 actions[position] = Ask(Intention.HELP, thought)
                 chosen.append(0)  # its own move is discarded; the last action reads as stop
                 last_ask.append(o.time)
@@ -173,7 +181,7 @@ class HannaPolicy:
             torch.full((k,), START, device=device),
             (-1,) * k,
             F.dropout(ones, share) if share else None,
-            trails=(Trail(),) * k if self.again < 1 else (),
+            trails=(Trail(),) * k if self.again < 1 or self.by_image else (),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -250,6 +258,7 @@ def for_training(
         environment_dropout=environment_dropout,
         guided_asking=guided_asking,
         again=1.0,
+        by_image=False,
         keep_moments=True,
     )
 

@@ -3,19 +3,24 @@
 The likeliest move of an agent that misread its words leads to and fro between the same few places. With a trail it
 knows which of its moves lead towards where it has been, under the words that it still follows, and how often it was
 there; never more than it has walked itself. A place is known again by its panorama; the way back lies opposite the way
-there.
+there. Who is shown the panorama of where to go knows in the same manner when it is there, and, if it has been there
+before, which way leads there.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from agents.hanna.percept import HEADINGS, VIEWS
-from embodied.interface import Action, Move, Observation, Sight
+from embodied.interface import Action, Mode, Move, Observation, Sight
+
+UNLIKELY = 1e-6
+"""Added to what is thought of an untried way, so that one that seems impossible is tried in the end."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class Trail:
     """Where the last move in a view from a place led, in either direction."""
     visits: Mapping[tuple[Sight, str], int] = field(default_factory=dict)
     """How many steps began at a place under these words."""
+    thoughts: Mapping[tuple[str, Sight | None, Sight], Mapping[int, float]] = field(default_factory=dict)
+    """How likely the ways in each view seemed to lead on, under words and image, from a place."""
     begun: tuple[Sight, int] | None = None
     """The last move, which led to where the next step begins."""
 
@@ -38,7 +45,8 @@ class Trail:
             leads[self.begun] = o.sight
             leads[o.sight, opposite(view)] = origin
         key = o.sight, o.instruction
-        return Trail(leads, {**self.visits, key: self.visits.get(key, 0) + 1})
+        visits = {**self.visits, key: self.visits.get(key, 0) + 1}
+        return dataclasses.replace(self, leads=leads, visits=visits, begun=None)
 
     def left(self, observation: Observation, action: Action | None) -> Trail:
         """The trail when a step ends with `action`."""
@@ -51,6 +59,82 @@ class Trail:
         o = observation
         ends = [self.leads.get((o.sight, view)) for view in o.candidates.view.tolist()]
         return np.array([0 if end is None else self.visits.get((end, o.instruction), 0) for end in ends])
+
+    def thinking(self, observation: Observation, moves: np.ndarray) -> Trail:
+        """The trail with what is thought here of the ways that lead on, under these words and this image.
+
+        Args:
+          moves: (n,) probabilities of the candidates; those in one view add up.
+        """
+        o = observation
+        ways = {int(view): float(moves[o.candidates.view == view].sum()) for view in np.unique(o.candidates.view)}
+        quest = o.instruction, o.target
+        return dataclasses.replace(self, thoughts={**self.thoughts, (*quest, o.sight): ways})
+
+    def ways(self, start: Sight) -> dict[Sight, tuple[int, int | None]]:
+        """How many known moves lead from `start` to every place on the trail, and the view in which they begin."""
+        roads: dict[Sight, list[tuple[int, Sight]]] = {}
+        for (origin, view), end in self.leads.items():
+            roads.setdefault(origin, []).append((view, end))
+        found: dict[Sight, tuple[int, int | None]] = {start: (0, None)}
+        queue = deque([start])
+        while queue:
+            place = queue.popleft()
+            steps, first = found[place]
+            for view, end in roads.get(place, ()):
+                if end not in found:
+                    found[end] = steps + 1, view if first is None else first
+                    queue.append(end)
+        return found
+
+    def untried(self, observation: Observation, back: float) -> int | None:
+        """The view in which the way begins to the best of all ways that were not tried yet, by what was thought of them
+        under these words and this image, times `back` for each move that lies between; None without one."""
+        o, ways = observation, self.ways(observation.sight)
+        best, chosen = 0.0, None
+        for (words, image, place), thought in self.thoughts.items():
+            if (words, image) != (o.instruction, o.target) or place not in ways:
+                continue
+            steps, first = ways[place]
+            for view, probability in thought.items():
+                worth = (probability + UNLIKELY) * back**steps
+                if worth > best and (place, view) not in self.leads:
+                    best, chosen = worth, view if first is None else first
+        return chosen
+
+
+def weigh(trail: Trail, observation: Observation, weights: np.ndarray, again: float) -> np.ndarray:
+    """`weights` of an agent that weighs a move by `again` for each time it was where the move is known to lead."""
+    return weights * np.append(1.0, again ** trail.times(observation))
+
+
+def weigh_by_image(
+    trail: Trail, observation: Observation, weights: np.ndarray, search: float = 0.0
+) -> tuple[np.ndarray, bool]:
+    """`weights` of an agent that goes by the image of where to go, if it is shown one: it stops where it sees that
+    very image and nowhere else, and walks straight to it where it has been there.
+
+    Args:
+      weights: (n + 1,) of the actions, stop first.
+      search: on its main task, an agent that has not been there takes the best way that it has not tried yet, be it
+        from where it was before: as Trail.untried has it, with `back`; 0: it does not search.
+
+    Returns:
+      The same anew, and whether the agent knows where it has to go, so that it need not ask.
+    """
+    o, n = observation, len(observation.candidates)
+    if o.target is None:
+        return weights, False
+    if o.target == o.sight:
+        return np.append(1.0, np.zeros(n)), True
+    moves = np.where(np.arange(n + 1) > 0, weights, 0.0)
+    towards = lambda view: moves * np.append(False, o.candidates.view == view)
+    _, way = trail.ways(o.sight).get(o.target, (0, None))
+    if towards(way).any():
+        return towards(way), True
+    if search and o.mode is Mode.MAIN and towards(trail.untried(o, search)).any():
+        return towards(trail.untried(o, search)), False
+    return (moves if moves.any() else weights), False
 
 
 def opposite(view: int) -> int:

@@ -66,6 +66,16 @@ class TrainingConfig(ImitationSettings):
     again: float = 1.0
     """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
     lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
+    by_image: bool = False
+    """When judged, an agent that is shown an image of where to go stops there and nowhere else, and walks straight to
+    it where it has been there (hanna.trail; docs/sources.md, S36)."""
+    search: float = 0.0
+    """When judged by image, what each move back takes off the worth of a way that was not tried yet, so that an agent
+    that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
+    first_ask_threshold: float = 0.5
+    """When judged, `ask_threshold` while no image of where to go has been shown."""
+    patience: int = 0
+    """When judged, moves after departing from a route before the learned rule asks again."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
     reset_inter_task: bool = True
@@ -83,10 +93,10 @@ class TrainingConfig(ImitationSettings):
         require_word(self, "ask_rule", tuple(sorted(RULES)))
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
         require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps")
-        require(self, NOT_NEGATIVE, "alpha")
+        require(self, NOT_NEGATIVE, "alpha", "patience")
         require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
-        require(self, SHARE, "guided_asking", "again")
+        require(self, SHARE, "guided_asking", "again", "search", "first_ask_threshold")
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""
@@ -113,6 +123,9 @@ class TrainingConfig(ImitationSettings):
         return from_json(TrainingConfig, text)
 
 
+JUDGED = ("again", "by_image", "search", "first_ask_threshold", "patience")
+"""Of TrainingConfig, those that say only how an agent is judged, besides agents.imitation.settings.MAY_CHANGE."""
+
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128,
@@ -128,6 +141,10 @@ SCALES: dict[str, TrainingConfig] = {
         environment_dropout=0.4,
         guided_asking=0.5,
         again=0.1,
+        by_image=True,
+        search=0.2,
+        first_ask_threshold=0.25,
+        patience=2,
         evaluation_temperature=0.5,
         validate_every=200,
         validation_tasks=200,

@@ -298,7 +298,7 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
 
 def add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses, lights or requests"
+        "tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses, lights, departures or requests"
     )
     add_common(parser)
     parser.add_argument(
