@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import torch
 
-from agents.failures import failures, hanna_policies, predictions, request_share
+from agents.failures import failures, hanna_policies, plainer_policies, predictions, request_share
 from agents.hanna.agent import load_agent
 from agents.imitation.lessons import split_of
 from agents.vision.config import Looked
@@ -57,9 +57,10 @@ def run_eval(
         for split in args.split or ("test_unseen",):
             whole, bank = data.split(split), split_of(data, split, encoder.digest, quality=args.quality).bank
             learned = hanna_policies(agent, bank)
-            judged = _asked_for({**_without_learning(), **learned}, args.only)
+            plainer = plainer_policies(agent, bank)
+            judged = _asked_for({**_without_learning(), **learned}, plainer, args.only)
             drawn = {n: pictures_of(data, n, args.quality) for n in whole.worlds}
-            looked = Looked(tuple(learned), {**looked.pictures, **drawn})
+            looked = Looked((*learned, *plainer), {**looked.pictures, **drawn})
 
             def keep(name: str, episodes: Sequence[Episode], split: str = split, worlds: Places = whole.worlds) -> None:
                 if args.out:
@@ -87,15 +88,18 @@ def run_eval(
     return 0
 
 
-def _asked_for(judged: Mapping[str, Agent], names: Sequence[str] | None) -> dict[str, Agent]:
-    """The rows `names`, or all of them.
+def _asked_for(
+    judged: Mapping[str, Agent], others: Mapping[str, Agent], names: Sequence[str] | None
+) -> dict[str, Agent]:
+    """The rows `names`, of `judged` or of the `others`; without names all of `judged`.
 
     Raises:
       ValueError: a row that is none.
     """
-    if unknown := sorted(set(names or ()) - set(judged)):
-        raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
-    return {name: judged[name] for name in names or judged}
+    every = {**judged, **others}
+    if unknown := sorted(set(names or ()) - set(every)):
+        raise ValueError(f"unknown rows {unknown}; there are {list(every)}")
+    return {name: every[name] for name in names or judged}
 
 
 def _without_learning() -> Mapping[str, Agent]:

@@ -126,7 +126,7 @@ agents.bandit <- embodied.locks agents.imitation agents.checkpoint_file embodied
 agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface
     embodied.action_spaces embodied.language embodied.records embodied.teachers embodied.policies embodied.assistants
     embodied.envs embodied.datasets embodied.evaluation
-agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.vision agents.hanna
+agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.imitation agents.vision agents.hanna
 agents.judging <- agents.imitation embodied.interface embodied.records embodied.datasets embodied.evaluation
     agents.vision agents.hanna agents.failures embodied.locks
 agents.study_tables <- agents.failures

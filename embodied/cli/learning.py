@@ -389,7 +389,13 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
         "--agent", type=any_path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)"
     )
     parser.add_argument("--split", nargs="+", help="which splits (default: test_unseen; HARI: all three of test)")
-    parser.add_argument("--only", nargs="+", metavar="NAME", help="which rows (default: all)")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        metavar="NAME",
+        help="which rows (default: all; of HANNA besides, judged more as the text has it: 'learned, likeliest move', "
+        "'learned, without a trail' and others)",
+    )
     parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument(
