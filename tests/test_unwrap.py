@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +26,25 @@ def test_unwrapping_keeps_every_face_and_its_proportions():
         on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1))))
         assert np.ptp(on_page / areas_of(flat.corners)) / np.mean(on_page / areas_of(flat.corners)) < uneven
         assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
+
+
+def test_an_atlas_is_freed_only_after_its_threads_had_time_to_fall_asleep():
+    """xatlas waits for ever where it ends a thread that is about to sleep."""
+    freed: dict[int, float] = {}
+
+    class Atlas:
+        def __init__(self, number: int) -> None:
+            self.number = number
+
+        def __del__(self) -> None:
+            freed[self.number] = time.monotonic()
+
+    retired = {}
+    for number in range(3):
+        unwrap._retire(Atlas(number))
+        retired[number] = time.monotonic()
+    assert {0, 1} == set(freed), "the last one rests"
+    assert all(freed[n] - retired[n] > 0.9 * unwrap.REST for n in freed)
 
 
 def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():

@@ -7,6 +7,7 @@ unfolded plane by plane, so that one wall is one chart however many holes it has
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -28,6 +29,10 @@ ONCE = 6000.0
 """Budget for which models are unwrapped; other budgets get the same charts at another density."""
 SPARSEST = 0.36
 """Luxels per metre that large things get at least, times the square root of the budget."""
+REST = 0.05
+"""Seconds after which the threads of an atlas are surely asleep."""
+_retired: list[tuple[Any, float]] = []
+"""The atlas that is freed next, and since when it rests."""
 APART = ("assets", "assets.data", "embodied", "embodied.light")
 """What the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
@@ -146,7 +151,21 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     atlas.generate(charts, packing)
     _, faces, place = atlas[0]  # faces keep their order, so part and uv carry over per corner
     luxels, size, chart = _repacked(place[faces] * [atlas.width, atlas.height], faces)
+    _retire(atlas)
     return _unwrapped(corners, normals, luxels, uv, part, thin, size, chart)
+
+
+def _retire(atlas: Any) -> None:
+    """Free the atlas that was retired before, once it has rested, and keep this one until then.
+
+    xatlas ends its threads when an atlas is freed, and waits for ever for one that was just about to sleep and misses
+    the call. (Seen once in some thousands of models, on a busy machine: the process stood still in ~TaskScheduler.)
+    """
+    if _retired:
+        _, since = _retired[0]
+        time.sleep(max(0.0, since + REST - time.monotonic()))
+        _retired.clear()
+    _retired.append((atlas, time.monotonic()))
 
 
 def _repacked(luxels: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
