@@ -132,8 +132,10 @@ def weigh_by_image(
     _, way = trail.ways(o.sight).get(o.target, (0, None))
     if towards(way).any():
         return towards(way), True
-    if search and o.mode is Mode.MAIN and towards(trail.untried(o, search)).any():
-        return towards(trail.untried(o, search)), False
+    if search and o.mode is Mode.MAIN:
+        on = towards(trail.untried(o, search))
+        if on.any():
+            return on, False
     return (moves if moves.any() else weights), False
 
 
