@@ -63,8 +63,8 @@ PLAINER: Mapping[str, Mapping[str, Any]] = {
     "learned, likeliest move": {"choose": choose_at(0.0)},
     "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
 }
-"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so (docs/sources.md,
-S36)."""
+"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
+asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
 def plainer_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:

@@ -68,12 +68,12 @@ class TrainingConfig(ImitationSettings):
     lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
     by_image: bool = False
     """When judged, an agent that is shown an image of where to go stops there and nowhere else, and walks straight to
-    it where it has been there (hanna.trail; docs/sources.md, S36)."""
+    it where it has been there (hanna.trail; docs/sources.md, S161)."""
     search: float = 0.0
-    """When judged by image, what each move back takes off the worth of a way that was not tried yet, so that an agent
-    that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
+    """When judged by image, what the worth of a way that was not tried yet is multiplied with for each move back to it,
+    so that an agent that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
     first_ask_threshold: float = 0.5
-    """When judged, `ask_threshold` while no image of where to go has been shown."""
+    """When judged, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
     patience: int = 0
     """When judged, moves after departing from a route before the learned rule asks again."""
     read_assistance: bool = True
