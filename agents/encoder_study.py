@@ -3,9 +3,10 @@ dissertation, whose features are a ResNet-152's).
 
     embodied study vision encoders --data DATA --out STUDY
     embodied study vision pictures --data DATA --out STUDY --split test_unseen
+    embodied study vision pictures --data DATA --out STUDY --lights 3 --encoders one=A.safetensors three=B.safetensors
 
 A run is a folder of the study that goes on where it stopped. Readers are fitted on training houses, in the pictures
-that the encoder learned from.
+that the encoders of the study learn from; 'pictures' judges houses in their own light.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import math
 import statistics
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,12 @@ from agents.imitation.loop import Note
 from agents.imitation.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
 from agents.vision.config import WAYS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
-from agents.vision.encoder import Encoder
+from agents.vision.encoder import Encoder, load_encoder
 from agents.vision.labels import HouseStrips
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
 from agents.vision.run import taught, training_houses
+from agents.vision.training import frequent_classes
 from assets.cache import write_json
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Estimate, across_seeds
@@ -76,16 +78,36 @@ class EncoderStudySetting:
     threads: int = 1
     """Of PyTorch, per encoder."""
     device: str = "cpu"
+    ready: Mapping[str, Sequence[Path]] = field(default_factory=dict)
+    """Encoders that are there already, to be judged beside those that are trained: by row, one file per training
+    seed."""
+
+    def __post_init__(self) -> None:
+        if twice := sorted(self.ready.keys() & ENCODERS.keys()):
+            raise ValueError(f"encoders of the names {twice} are trained by the study; give those of --encoders others")
 
     def folder(self, encoder: str, seed: int) -> Path:
+        if encoder in self.ready:
+            return self.out / "ready" / load_encoder(self.ready[encoder][seed]).digest[:16]
         return self.out / encoder.replace(",", "").replace(" ", "_") / f"seed_{seed}"
 
     def reading(self, encoder: str, seed: int, quality: str | None = None) -> Path:
         """Where the numbers are that an encoder reaches on pictures drawn so."""
         return self.folder(encoder, seed) / f"reading_{self.split}{'_' + quality if quality else ''}.json"
 
-    def repeats(self) -> range:
+    def rows(self) -> list[str]:
+        """Of the tables."""
+        return [*ENCODERS, *self.ready]
+
+    def repeats(self, encoder: str) -> range:
+        """Its training seeds, or the files given for it."""
+        if encoder in self.ready:
+            return range(len(self.ready[encoder]))
         return range(self.config.seed, self.config.seed + self.seeds)
+
+    def judging(self, quality: str | None) -> StripSource:
+        """What they are judged on: pictures as they learned from, or drawn otherwise."""
+        return self.source if quality is None else dataclasses.replace(self.source, quality=quality, lights=1)
 
 
 def run_study(
@@ -100,7 +122,7 @@ def run_study(
     """Train and judge what is missing and write the tables; returns the Markdown files.
 
     Args:
-      rows: train and judge these encoders only.
+      rows: train and judge these encoders only; None: all, or none where some are there already.
       pictures: qualities that 'pictures' judges on.
 
     Raises:
@@ -110,37 +132,50 @@ def run_study(
     refuse_unknown(rows or (), ENCODERS)
     check_device(setting.device)
     data, ways = Dataset(setting.source.data), tuple(pictures) if "pictures" in names else ()
+    chosen = [*(rows or (() if setting.ready else ENCODERS)), *setting.ready]
     for quality in (None, *ways):  # drawn before encoders share the cores
         houses = houses_of(data, (setting.split,))
-        source = dataclasses.replace(setting.source, quality=quality or setting.source.quality)
-        source.strips(houses + (training_houses(data, setting.config) if quality is None else []), workers=workers)
+        setting.judging(quality).strips(
+            houses + (training_houses(data, setting.config) if quality is None else []), workers=workers
+        )
     work = functools.partial(_run, setting, ways, note)
-    run_all(rows or ENCODERS, setting.repeats(), work, workers=workers, note=note)
+    jobs = [(name, k) for name in chosen for k in setting.repeats(name)]
+    run_all(jobs, (setting.config.seed,), work, workers=workers, note=note)
     writers = {"encoders": lambda: _encoders(setting), "pictures": lambda: _pictures(setting, ways)}
     return {name: writers[name]() for name in names}
 
 
-def _run(setting: EncoderStudySetting, ways: Sequence[str], note: Note, seed: int, name: str) -> str:
-    """Train one encoder and judge it, unless that is done."""
+def _run(setting: EncoderStudySetting, ways: Sequence[str], note: Note, seed: int, job: tuple[str, int]) -> str:
+    """Judge one encoder, and train it before if it is not there, unless that is done; `seed` is that of the readers."""
     torch.set_num_threads(setting.threads)
-    data, folder = Dataset(setting.source.data), setting.folder(name, seed)
-    config = dataclasses.replace(setting.config, seed=seed, **ENCODERS[name])
-    missing = [q for q in (None, *ways) if not setting.reading(name, seed, q).exists()]
+    (name, k), data = job, Dataset(setting.source.data)
+    missing = [q for q in (None, *ways) if not setting.reading(name, k, q).exists()]
     if not missing:
-        return f"{name}, seed {seed}: done before"
-    with locked(folder):
-        seen = setting.source.strips(training_houses(data, config))
-        encoder, classes = taught(
-            seen, config, folder, lambda line: note(f"{name}, seed {seed}: {line}"), device=setting.device
-        )
+        return f"{name}, seed {k}: done before"
+    with locked(setting.folder(name, k)):
+        seen = setting.source.strips(training_houses(data, setting.config))
+        encoder, classes, path = _encoder(setting, name, k, seen, lambda line: note(f"{name}, seed {k}: {line}"))
         known = labelled(data, seen, encoder, classes)
         for quality in missing:
-            source = dataclasses.replace(setting.source, quality=quality or setting.source.quality)
-            unseen = source.strips(houses_of(data, (setting.split,)))
+            unseen = setting.judging(quality).strips(houses_of(data, (setting.split,)))
             numbers = as_numbers(read(known, labelled(data, unseen, encoder, classes), seed=seed), classes)
-            facts = {"milliseconds": price(encoder, unseen), "megabytes": _megabytes(folder), "houses": len(unseen)}
-            write_json(setting.reading(name, seed, quality), numbers | facts | {"strips": len(known.room)}, indent=1)
-    return f"{name}, seed {seed}: trained and judged"
+            facts = {"milliseconds": price(encoder, unseen), "megabytes": path.stat().st_size / 1e6}
+            facts |= {"houses": len(unseen), "strips": len(known.room)}
+            write_json(setting.reading(name, k, quality), numbers | facts, indent=1)
+    return f"{name}, seed {k}: judged"
+
+
+def _encoder(
+    setting: EncoderStudySetting, name: str, seed: int, seen: Sequence[HouseStrips], note: Note
+) -> tuple[Encoder, list[str], Path]:
+    """An encoder, the classes that readers look for, and its file."""
+    if name in setting.ready:
+        path = setting.ready[name][seed]
+        classes = [seen[0].classes[i] for i in frequent_classes(seen, setting.config.least_views)]
+        return load_encoder(path), classes, path
+    folder, config = setting.folder(name, seed), dataclasses.replace(setting.config, seed=seed, **ENCODERS[name])
+    encoder, classes = taught(seen, config, folder, note, device=setting.device)
+    return encoder, classes, folder / "encoder.safetensors"
 
 
 def price(encoder: Encoder, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
@@ -153,12 +188,8 @@ def price(encoder: Encoder, houses: Sequence[HouseStrips], rounds: int = 5) -> f
     return statistics.median(times[1:])
 
 
-def _megabytes(folder: Path) -> float:
-    return (folder / "encoder.safetensors").stat().st_size / 1e6
-
-
 def _encoders(setting: EncoderStudySetting) -> Path:
-    judged = {name: _judged(setting, name, None) for name in ENCODERS}
+    judged = {name: _judged(setting, name, None) for name in setting.rows()}
     lines = table(_heads("encoder"), [_cells(setting, name, None) for name, seeds in judged.items() if seeds])
     return write_markdown(
         setting.out / "table_encoders.md",
@@ -171,13 +202,13 @@ def _encoders(setting: EncoderStudySetting) -> Path:
 
 def _pictures(setting: EncoderStudySetting, ways: Sequence[str]) -> Path:
     rows, missing = [], []
-    for name in ENCODERS:
+    for name in setting.rows():
         for quality in ways:
             if _judged(setting, name, quality):
                 rows.append([f"{name}, {quality}", *_cells(setting, name, quality)[1:]])
             elif _judged(setting, name, None):
                 missing.append(f"{name} on {quality}")
-    judged = {name: _judged(setting, name, None) for name in ENCODERS}
+    judged = {name: _judged(setting, name, None) for name in setting.rows()}
     how = _made_with(setting, judged, None) + " Readers were fitted in the pictures that the encoders learned from."
     return write_markdown(
         setting.out / "table_pictures.md",
@@ -205,7 +236,7 @@ def _cells(setting: EncoderStudySetting, name: str, quality: str | None) -> list
 
 def _judged(setting: EncoderStudySetting, name: str, quality: str | None) -> list[int]:
     """The seeds of an encoder that were judged on such pictures."""
-    return seeds_with(setting.repeats(), lambda seed: setting.reading(name, seed, quality).exists())
+    return seeds_with(setting.repeats(name), lambda seed: setting.reading(name, seed, quality).exists())
 
 
 def _made_with(setting: EncoderStudySetting, judged: Mapping[str, Sequence[int]], quality: str | None) -> str:

@@ -146,7 +146,20 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.set_defaults(threads=1)  # per encoder; they are trained side by side
     _add_strips(parser)
-    parser.add_argument("--rows", nargs="+", metavar="NAME", help="train and judge these encoders only (default: all)")
+    parser.add_argument(
+        "--rows",
+        nargs="+",
+        metavar="NAME",
+        help="train and judge these encoders only (default: all, or none where --encoders are given)",
+    )
+    parser.add_argument(
+        "--encoders",
+        type=_named_file,
+        nargs="+",
+        default=[],
+        metavar="NAME=FILE",
+        help="encoders that are there already, to be judged as well; those of one name are training seeds of one kind",
+    )
     parser.add_argument(
         "--pictures",
         nargs="+",

@@ -25,6 +25,7 @@ once. Interrupt it whenever you like: the same command goes on.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from embodied.cli.common import note
@@ -86,13 +87,10 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
 def run_realism(args: argparse.Namespace) -> list[Path]:
     from agents.realism_study import RealismSetting, run_study
 
-    arms: dict[str, list[Path]] = {}
-    for name, path in args.agents:
-        arms.setdefault(name, []).append(path)
     setting = RealismSetting(
         args.data,
         args.out,
-        arms,
+        by_name(args.agents),
         tuple(args.pictures),
         args.split,
         args.tasks,
@@ -101,6 +99,14 @@ def run_realism(args: argparse.Namespace) -> list[Path]:
         dict(args.encoders),
     )
     return [run_study(setting, threads=args.threads, note=note)]
+
+
+def by_name(files: Sequence[tuple[str, Path]]) -> dict[str, list[Path]]:
+    """The files of each name, in the order in which they were given."""
+    arms: dict[str, list[Path]] = {}
+    for name, path in files:
+        arms.setdefault(name, []).append(path)
+    return arms
 
 
 def run_vision(args: argparse.Namespace) -> list[Path]:
@@ -118,6 +124,7 @@ def run_vision(args: argparse.Namespace) -> list[Path]:
         split=args.split,
         threads=args.threads,
         device=args.device,
+        ready=by_name(args.encoders),
     )
     made = run_study(setting, args.tables, rows=args.rows, pictures=args.pictures, workers=args.workers, note=note)
     return list(made.values())

@@ -1,0 +1,93 @@
+"""Encoders side by side: those that a study trains, and those that are there already."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+
+import numpy as np
+import pytest
+from hand_data import build, small_house
+
+from agents.encoder_study import EncoderStudySetting, run_study
+from agents.vision.config import WAYS, VisionConfig, drawing, lit_name
+from agents.vision.drawn import StripSource
+from agents.vision.encoder import random_encoder, save_encoder
+from agents.vision.labels import HouseStrips
+from agents.vision.resnet import ARCHITECTURES
+from embodied.cli import learning, study
+from embodied.records import read_json
+
+
+def coloured(path, n: int, *, seed: int) -> None:
+    """Strips of a world in which a red cell is a 'rose' and a green one a 'fern'."""
+    rng = np.random.default_rng(seed)
+    what = rng.integers(0, 2, (n, 1, 4)).repeat(12, 1).repeat(9, 2)  # half a view or more is of one colour
+    rgb = np.zeros((n, 12, 36, 3), np.uint8)
+    rgb[..., 0], rgb[..., 1] = 200 * (what == 0) + 30, 200 * (what == 1) + 30
+    share = (np.eye(2)[what] * 255).astype(np.uint8)
+    strips = HouseStrips(
+        path.stem.partition("@")[0],
+        ("rose", "fern"),
+        rgb.repeat(16, 1).repeat(16, 2),
+        share,
+        np.zeros((n, 12, 36), np.int8),
+        rng.normal(size=(n, 12, 36)).astype(np.float16),
+        np.zeros(n, np.int8),
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    strips.save(path)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("encoders")
+    return build(folder / "data", folder / "cache", make_house=small_house)
+
+
+@pytest.fixture
+def setting(data, tmp_path, monkeypatch):
+    """Two lightings of a house to learn from and of one to judge in, without light too, and two kinds of encoders."""
+    for name in (*data.names("train"), *data.names("val_unseen")):
+        nodes = len(data.place(name).graph.positions)
+        for k in range(2):
+            coloured(tmp_path / "strips" / drawing(WAYS["fast"]) / f"{lit_name(name, k)}.npz", nodes, seed=k)
+        coloured(tmp_path / "strips" / drawing(WAYS["unlit"]) / f"{name}.npz", nodes, seed=5)
+    small = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
+    monkeypatch.setitem(ARCHITECTURES, "compact", small)
+    files = [tmp_path / f"{k}.safetensors" for k in range(3)]
+    for k, path in enumerate(files):
+        save_encoder(random_encoder(seed=k), path)
+    source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "fast", 2)
+    return EncoderStudySetting(
+        source, tmp_path / "study", VisionConfig(least_views=1), ready={"two": files[:2], "one": files[2:]}
+    )
+
+
+@pytest.mark.slow
+def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_is_trained(setting, data):
+    lines: list[str] = []
+    made = run_study(setting, ["encoders", "pictures"], pictures=("fast", "unlit"), note=lines.append)
+    assert len(lines) == 3 and not (setting.out / "compact").exists()
+    text = made["pictures"].read_text()
+    for row in ("| two, fast | 2 |", "| two, unlit | 2 |", "| one, unlit | 1 |"):
+        assert row in text
+    for quality, houses in ((None, 2), ("fast", 1), ("unlit", 1)):  # other pictures are of a house's own light
+        body = read_json(setting.reading("one", 0, quality))
+        assert body["houses"] == houses * len(data.names("val_unseen")) and body["mean_ap"] > body["chance_ap"]
+    again: list[str] = []
+    run_study(setting, ["pictures"], pictures=("fast", "unlit"), note=again.append)
+    assert all(line.endswith("done before") for line in again) and len(again) == 3
+
+
+def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
+    with pytest.raises(ValueError, match=r"\['keen'\] are trained by the study"):
+        EncoderStudySetting(setting.source, setting.out, setting.config, ready={"keen": [setting.out]})
+
+
+def test_files_of_one_name_are_training_seeds(tmp_path):
+    parser = argparse.ArgumentParser()
+    learning.add_study_vision(parser)
+    words = ["pictures", "--data", str(tmp_path), "--out", str(tmp_path / "o"), "--encoders", "a=x", "b=y", "a=z"]
+    arms = study.by_name(parser.parse_args(words).encoders)
+    assert {name: [p.name for p in paths] for name, paths in arms.items()} == {"a": ["x", "z"], "b": ["y"]}
