@@ -88,6 +88,7 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
 
     Raises:
       ValueError: an unknown study.
+      FileNotFoundError: features of a split that agents are judged on are missing; said before any is trained.
       LockedError: another process writes to the study's folder.
     """
     if unknown := [n for n in names if n not in TABLES]:
@@ -101,6 +102,8 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
         for seed in setting.repeats()
         for v in wanted
     )
+    for split in dict.fromkeys(split for table in tables.values() for split in table.splits):
+        _bank(setting, data, split)
     with locked(setting.out):
         for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
             note(line)
@@ -206,9 +209,13 @@ class _Player:
         if name not in self._splits:
             quality = self.setting.quality
             drawn = {n: dataclasses.asdict(pictures_of(self.data, n, quality)) for n in self.data.names(name)}
-            bank = split_of(self.data, name, self.encoder.digest, quality=quality).bank
-            self._splits[name] = self.data.split(name), bank, drawn
+            self._splits[name] = self.data.split(name), _bank(self.setting, self.data, name), drawn
         return self._splits[name]
+
+
+def _bank(setting: StudySetting, data: Dataset, split: str) -> FeatureBank:
+    """What agents see in a split's houses."""
+    return split_of(data, split, load_encoder(setting.encoder).digest, quality=setting.quality).bank
 
 
 class _Judge:

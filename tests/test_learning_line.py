@@ -333,6 +333,14 @@ def test_a_study_of_lightings_says_how_to_light_the_houses(study):
         run_study(study, ["lights"])
 
 
+def test_missing_features_are_told_before_anything_is_trained(study, data):
+    last = data.names(data.ood[0])[0]
+    feature_path(data.folder / "features", load_encoder(study.encoder).digest, last).unlink()
+    with pytest.raises(FileNotFoundError, match=f"{last}.*embodied features"):
+        run_study(study, ["4.4"])
+    assert not (study.out / "agents").exists()
+
+
 def test_an_unknown_study_is_refused_before_anything_is_trained(study):
     with pytest.raises(ValueError, match="unknown studies"):
         run_study(study, ["5.1"])
