@@ -53,12 +53,23 @@ class RealismSetting:
     """Of judging."""
     houses: int | None = None
     """The first so many houses of the split; None: all."""
-    encoders: Mapping[str, Path] = field(default_factory=dict)
-    """Kind of agent to the encoder that it looks through; those without one look through the one they learned with."""
+    encoders: Mapping[str, Sequence[Path]] = field(default_factory=dict)
+    """Kind of agent to the encoder that all of its agents look through, or to one for each of them; those without look
+    through the one they learned with."""
 
     def __post_init__(self) -> None:
         if unknown := [*(self.encoders.keys() - self.arms.keys())]:
             raise ValueError(f"encoders are given for {sorted(unknown)}, agents for {sorted(self.arms)}")
+        for arm, paths in self.encoders.items():
+            if len(paths) not in (1, len(self.arms[arm])):
+                raise ValueError(
+                    f"{arm!r} has {len(self.arms[arm])} agents and {len(paths)} encoders; give one or each"
+                )
+
+    def watched(self, arm: str) -> list[tuple[Path, Path | None]]:
+        """The agents of a kind, each with what it looks through if that is not what it learned with."""
+        paths, through = self.arms[arm], self.encoders.get(arm, (None,))
+        return [*zip(paths, through if len(through) > 1 else [*through] * len(paths), strict=True)]
 
     def names(self, data: Dataset) -> tuple[str, ...]:
         """The houses that agents are judged in."""
@@ -79,8 +90,8 @@ def run_study(setting: RealismSetting, *, threads: int = 1, note: Note = print) 
     successes: dict[str, list[float]] = {way: [] for way in setting.pictures}
     with locked(setting.out):
         for way in setting.pictures:
-            for arm, paths in setting.arms.items():
-                seeds = [_episodes(setting, data, arm, path, way) for path in paths]
+            for arm in setting.arms:
+                seeds = [_episodes(setting, data, arm, *pair, way) for pair in setting.watched(arm)]
                 alone = [row(arm, way, episodes, graphs, seed=setting.seed) for episodes in seeds]
                 successes[way] += [r.values["success"].mean for r in alone]
                 everybody = [e for episodes in seeds for e in episodes]
@@ -99,9 +110,11 @@ def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float:
     return float(scipy.stats.spearmanr(first, second).statistic)
 
 
-def _episodes(setting: RealismSetting, data: Dataset, arm: str, path: Path, way: str) -> list[Episode]:
+def _episodes(
+    setting: RealismSetting, data: Dataset, arm: str, path: Path, encoder: Path | None, way: str
+) -> list[Episode]:
     """Those of one agent in houses drawn so, from the study's folder if it played them before."""
-    looking = load_encoder(setting.encoders[arm]).digest if arm in setting.encoders else ""
+    looking = "" if encoder is None else load_encoder(encoder).digest
     drawn = {name: dataclasses.asdict(pictures_of(data, name, way)) for name in setting.names(data)}
 
     def policy() -> Agent:

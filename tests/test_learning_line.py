@@ -261,7 +261,7 @@ def test_agents_may_look_through_an_encoder_that_sees_alike(study, data, tmp_pat
     save_encoder(alike, tmp_path / "alike.safetensors")
     arms = {"a": [study.folder_of("final") / "best.safetensors"]}
     setting = RealismSetting(
-        data.folder, study.out / "realism", arms, ("matte",), tasks=3, encoders={"a": tmp_path / "alike.safetensors"}
+        data.folder, study.out / "realism", arms, ("matte",), tasks=3, encoders={"a": [tmp_path / "alike.safetensors"]}
     )
     with pytest.raises(FileNotFoundError, match=alike.digest[:16]):
         realism(setting)
@@ -271,7 +271,17 @@ def test_agents_may_look_through_an_encoder_that_sees_alike(study, data, tmp_pat
     save_features(path, features, alike, place.house.digest, WAYS["matte"])
     assert "| a | 1 | " in realism(setting).read_text()
     with pytest.raises(ValueError, match="encoders are given for"):
-        dataclasses.replace(setting, encoders={"b": study.encoder})
+        dataclasses.replace(setting, encoders={"b": [study.encoder]})
+
+
+def test_each_agent_may_look_through_an_encoder_of_its_own(tmp_path):
+    a, b, x, y = (tmp_path / n for n in "abxy")
+    through = lambda **encoders: RealismSetting(tmp_path, tmp_path, {"k": [a, b]}, ("fast",), encoders=encoders)
+    assert through().watched("k") == [(a, None), (b, None)]
+    assert through(k=[x]).watched("k") == [(a, x), (b, x)]
+    assert through(k=[x, y]).watched("k") == [(a, x), (b, y)]
+    with pytest.raises(ValueError, match="'k' has 2 agents and 3 encoders"):
+        through(k=[x, y, x])
 
 
 def test_a_study_may_begin_with_a_trained_agent(study):

@@ -367,7 +367,8 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="NAME=FILE",
-        help="what the agents of a name look through (default: the encoder that they learned with)",
+        help="what the agents of a name look through, one file for all or one for each (default: the encoder that they "
+        "learned with)",
     )
     parser.add_argument(
         "--pictures",

@@ -96,7 +96,7 @@ def run_realism(args: argparse.Namespace) -> list[Path]:
         args.tasks,
         args.judge_seed,
         args.houses,
-        dict(args.encoders),
+        by_name(args.encoders),
     )
     return [run_study(setting, threads=args.threads, note=note)]
 
