@@ -45,9 +45,9 @@ ENCODERS: Mapping[str, Mapping[str, Any]] = {
     "keen": {"network": "keen"},
     "lite0, frozen": {"network": "lite0", "begin": "imagenet", "frozen": True},
     "lite0 means, frozen": {"network": "lite0_means", "begin": "imagenet", "frozen": True},
-    "lite0, fine-tuned": {"network": "lite0", "begin": "imagenet"},
+    "lite0, fine-tuned": {"network": "lite0", "begin": "imagenet", "learning_rate": 5e-4},
 }
-"""What differs from the chosen settings, by encoder."""
+"""What differs from the chosen settings, by encoder; who goes on from what ImageNet taught goes slowly."""
 COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "mean_ap": ("AP", 3, 1),
     "room_accuracy": ("room, %", 1, 100),

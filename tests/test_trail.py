@@ -88,10 +88,11 @@ def test_asking_patiently_waits_after_a_route_and_asks_sooner_before_the_first()
 
     def asks(probability: float, target: Sight | None, mode: Mode, time_on_task: int) -> bool:
         o = Observation(Sight("house", 0), 0, 0, nowhere, "go", target, mode, (), None, 9, time_on_task)
-        return ask_patiently(0.5, 0.25, 2)(probability, o, -1, rng=None)
+        return ask_patiently(0.5, first=0.25, on_route=0.7, patience=2)(probability, o, -1, rng=None)
 
     image = Sight("house", 1)
     assert asks(0.3, None, Mode.MAIN, 0) and not asks(0.2, None, Mode.MAIN, 9)
     assert not asks(0.3, image, Mode.MAIN, 5) and asks(0.6, image, Mode.MAIN, 2)
     assert not asks(0.9, image, Mode.MAIN, 1), "it has just left a route"
-    assert asks(0.6, image, Mode.SUB, 0), "on a route it may ask at once"
+    assert asks(0.8, image, Mode.SUB, 0), "on a route it may ask at once"
+    assert not asks(0.6, image, Mode.SUB, 5), "the next person may send it elsewhere"

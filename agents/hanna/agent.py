@@ -44,7 +44,12 @@ class HannaAgent:
         """
         refuse_features(bank.digest, self.encoder_digest)
         config = self.config
-        learned = ask_patiently(config.ask_threshold, config.first_ask_threshold, config.patience)
+        learned = ask_patiently(
+            config.ask_threshold,
+            first=config.first_ask_threshold,
+            on_route=config.route_ask_threshold,
+            patience=config.patience,
+        )
         rule = learned if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
             self.network,

@@ -34,15 +34,17 @@ def ask_above(threshold: float) -> HannaAskRule:
     return lambda probability, observation, last_asked, *, rng: probability > threshold
 
 
-def ask_patiently(threshold: float, first: float, patience: int) -> HannaAskRule:
-    """As `ask_above`, but above `first` while nobody has shown where to go, and, once a route is left, not before
-    `patience` moves towards what was shown: who asks again at once is sent back to where it came from."""
+def ask_patiently(threshold: float, *, first: float, on_route: float, patience: int) -> HannaAskRule:
+    """As `ask_above`, but above `first` while nobody has shown where to go, above `on_route` while following one
+    person's route, from which the next person may send elsewhere, and, once a route is left, not before `patience`
+    moves towards what was shown: who asks again at once is sent back to where it came from."""
 
     def rule(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
         if observation.target is None:
             return probability > first
-        looking = observation.mode is Mode.MAIN and observation.time_on_task < patience
-        return probability > threshold and not looking
+        if observation.mode is Mode.SUB:
+            return probability > on_route
+        return probability > threshold and observation.time_on_task >= patience
 
     return rule
 

@@ -74,6 +74,8 @@ class TrainingConfig(ImitationSettings):
     so that an agent that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
     first_ask_threshold: float = 0.5
     """When judged, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
+    route_ask_threshold: float = 0.5
+    """When judged, `ask_threshold` on a route (docs/sources.md, S162)."""
     patience: int = 0
     """When judged, moves after departing from a route before the learned rule asks again."""
     read_assistance: bool = True
@@ -96,7 +98,7 @@ class TrainingConfig(ImitationSettings):
         require(self, NOT_NEGATIVE, "alpha", "patience")
         require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
-        require(self, SHARE, "guided_asking", "again", "search", "first_ask_threshold")
+        require(self, SHARE, "guided_asking", "again", "search", "first_ask_threshold", "route_ask_threshold")
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""
@@ -123,7 +125,7 @@ class TrainingConfig(ImitationSettings):
         return from_json(TrainingConfig, text)
 
 
-JUDGED = ("again", "by_image", "search", "first_ask_threshold", "patience")
+JUDGED = ("again", "by_image", "search", "first_ask_threshold", "route_ask_threshold", "patience")
 """Of TrainingConfig, those that say only how an agent is judged, besides agents.imitation.settings.MAY_CHANGE."""
 
 SCALES: dict[str, TrainingConfig] = {
@@ -144,6 +146,7 @@ SCALES: dict[str, TrainingConfig] = {
         by_image=True,
         search=0.2,
         first_ask_threshold=0.25,
+        route_ask_threshold=0.7,
         patience=2,
         evaluation_temperature=0.5,
         validate_every=200,
