@@ -34,7 +34,7 @@ from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
 from agents.vision.run import taught, training_houses
 from agents.vision.training import frequent_classes
-from assets.cache import write_json
+from assets.cache import digest, write_json
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Estimate, across_seeds
 from embodied.locks import locked
@@ -88,7 +88,7 @@ class EncoderStudySetting:
 
     def folder(self, encoder: str, seed: int) -> Path:
         if encoder in self.ready:
-            return self.out / "ready" / load_encoder(self.ready[encoder][seed]).digest[:16]
+            return self.out / "ready" / digest(self.ready[encoder][seed])[:16]
         return self.out / encoder.replace(",", "").replace(" ", "_") / f"seed_{seed}"
 
     def reading(self, encoder: str, seed: int, quality: str | None = None) -> Path:
@@ -209,7 +209,7 @@ def _pictures(setting: EncoderStudySetting, ways: Sequence[str]) -> Path:
             elif _judged(setting, name, None):
                 missing.append(f"{name} on {quality}")
     judged = {name: _judged(setting, name, None) for name in setting.rows()}
-    how = _made_with(setting, judged, None) + " Readers were fitted in the pictures that the encoders learned from."
+    how = _made_with(setting, judged, None) + " Readers were fitted in the pictures that the study learns from."
     return write_markdown(
         setting.out / "table_pictures.md",
         "Encoders, judged on other pictures",

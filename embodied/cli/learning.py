@@ -152,13 +152,9 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="train and judge these encoders only (default: all, or none where --encoders are given)",
     )
-    parser.add_argument(
-        "--encoders",
-        type=_named_file,
-        nargs="+",
-        default=[],
-        metavar="NAME=FILE",
-        help="encoders that are there already, to be judged as well; those of one name are training seeds of one kind",
+    _add_named_encoders(
+        parser,
+        "encoders that are there already, to be judged as well; those of one name are training seeds of one kind",
     )
     parser.add_argument(
         "--pictures",
@@ -361,13 +357,9 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=FILE",
         help="trained agents; those of one name are training seeds of one kind",
     )
-    parser.add_argument(
-        "--encoders",
-        type=_named_file,
-        nargs="+",
-        default=[],
-        metavar="NAME=FILE",
-        help="what the agents of a name look through, one file for all or one for each (default: the encoder that they "
+    _add_named_encoders(
+        parser,
+        "what the agents of a name look through, one file for all or one for each (default: the encoder that they "
         "learned with)",
     )
     parser.add_argument(
@@ -387,6 +379,10 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
+
+
+def _add_named_encoders(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument("--encoders", type=_named_file, nargs="+", default=[], metavar="NAME=FILE", help=what)
 
 
 def _named_file(text: str) -> tuple[str, Path]:
