@@ -279,6 +279,32 @@ def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
     assert out[20:, 24:].mean() == pytest.approx(0.5, rel=0.01)
 
 
+def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
+    """Noise in a mirror is smoothed over what is seen in it, not over its glass: as sharp as baked light, which has
+    none."""
+    from embodied.light.backend import floats
+    from embodied.light.reference import Tracer
+    from embodied.render.camera import camera_at
+
+    house, _, _, baked = lit
+    at, yaw, pitch, vfov, size = (3.9, 1.1, 0.7), 1.19, -0.2, 0.3, (48, 48)  # the red box's south side, no more
+    camera = camera_at(at, yaw, pitch, vfov)
+
+    def seen(quality: str, rays: int) -> tuple[np.ndarray, np.ndarray]:
+        tracer = Tracer(baked, house, quality=quality, rays=rays)
+        world, box = tracer._world, baked.lit.owners.index("red_box_1") + 1
+        gloss = np.array(world.gloss).reshape(-1, 3)
+        gloss[world.owner == box] = (0.02, 0.5, 1.0)
+        tracer._world = dataclasses.replace(world, gloss=floats(gloss))
+        rgb, _, ids = tracer.picture(at, camera.forward, camera.up, vfov, size)
+        return rgb.astype(float), ids == box
+
+    (baked_light, mirror), (traced, _) = seen("glossy", 64), seen("reference", 8)
+    edges = lambda rgb: np.abs(np.diff(rgb.mean(2), axis=1)).mean()
+    assert mirror.all() and edges(traced) > 0.7 * edges(baked_light), "a smoothed glass has 0.36 of it"
+    assert np.corrcoef(baked_light.ravel(), traced.ravel())[0, 1] > 0.99
+
+
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     """Ended paths may be left behind or carried along: what the others bring is the same."""
     from embodied.light import paths

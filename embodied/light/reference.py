@@ -30,6 +30,8 @@ SPARK = 12.0
 would take sunlit floors' and beds' colour off the walls."""
 SHINY = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
+CLEAR = 0.1
+"""Roughness up to which what shines is a mirror: its noise is that of what is seen in it."""
 QUALITIES = ("glossy", "reference", "diffuse")
 """'diffuse' is the reference without gloss but for mirrors and metals; pages should equal it on all else."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
@@ -88,7 +90,7 @@ class Tracer:
         n = math.prod(shape)
         centre = _camera_rays(position, views, vfov, size, 1, None)
         hit = look(self._world, centre)
-        ok, t, normal = np.asarray(hit.ok), np.asarray(hit.distance), array(hit.normal)
+        ok, t = np.asarray(hit.ok), np.asarray(hit.distance)
         ids = np.where(ok, self._world.owner[np.where(ok, np.asarray(hit.face), 0)], 0)
         ahead = np.repeat(np.asarray([forward for forward, _ in views], np.float32), size[0] * size[1], axis=0)
         along = np.einsum("nk,nk->n", array(centre.d), ahead)
@@ -107,7 +109,8 @@ class Tracer:
         light, albedo, square = light / share, albedo / share, square / share
         if self.quality != "glossy":
             noise = np.sqrt(np.maximum(square[:, 0] / np.maximum(light.mean(1), 1e-4) ** 2 - 1, 0) / self.rays)
-            guide = np.concatenate([normal, 4 * np.log(np.where(ok, t, 1.0))[:, None]], axis=1).reshape(*shape, 4)
+            facing, far = self._surface_seen(centre, hit)
+            guide = np.concatenate([facing, 4 * np.log(np.where(ok, far, 1.0))[:, None]], axis=1).reshape(*shape, 4)
             white = np.maximum(albedo, 0.02)
             of_views = zip((light / white).reshape(*shape, 3), guide, noise.reshape(shape), strict=True)
             light = np.stack([_denoised(*one) for one in of_views]).reshape(-1, 3) * white
@@ -126,7 +129,7 @@ class Tracer:
 
     def _samples(self, ray: Ray, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
         """Per ray: how much of it ends indoors (n, 1); exposed radiance there, shown colour elsewhere, albedo (n, 3
-        each); brightness squared (n, 1).
+        each; in a mirror times that of what is seen in it); brightness squared (n, 1).
 
         Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
         curved noise is too dark.
@@ -138,7 +141,7 @@ class Tracer:
         inside = hit.ok & ~hit.outdoor
         e = hit.e if self.quality == "glossy" else self._traced(hit, inside & hit.front, rng)
         diffuse = hit.albedo * e
-        diffuse = self._with_gloss(hit, ray, diffuse, inside, rng)
+        diffuse, albedo = self._with_gloss(hit, ray, diffuse, inside, rng)
         radiance = dr.select(hit.front | ~inside, diffuse, hit.albedo * hit.e) + hit.glow
         shown = dr.select(hit.ok, hit.e, backdrop_at(world.dome, world.rows, ray.d))
         keep = np.asarray(inside)[:, None]
@@ -152,7 +155,7 @@ class Tracer:
             np.square(x.mean(1, keepdims=True)),
         )
         if world.panes is None:
-            return share, x, elsewhere, np.where(keep, array(hit.albedo), 0.0), square
+            return share, x, elsewhere, np.where(keep, array(albedo), 0.0), square
         colour, left, first, face = through(world.panes, ray, dr.select(hit.ok, hit.distance, dr.inf))
         t = np.broadcast_to(np.asarray(left).reshape(-1, 1), share.shape).astype(np.float32)
         elsewhere = elsewhere * t + array(colour)
@@ -161,7 +164,7 @@ class Tracer:
             x = x * (1 - mirrors) + np.minimum(mirrored, most) * mirrors
             lit = light_of(255 * elsewhere) * (1 - mirrors) + mirrored * mirrors
             elsewhere = np.where(~keep & (mirrors > 0), shown_of(lit) / np.float32(255), elsewhere)
-        return share * t, x * t, elsewhere, np.where(keep, array(hit.albedo), 0.0) * t, square * t
+        return share * t, x * t, elsewhere, np.where(keep, array(albedo), 0.0) * t, square * t
 
     def _in_panes(
         self, panes: Panes, ray: Ray, first: Array, face: Array, rng: np.random.Generator
@@ -193,8 +196,11 @@ class Tracer:
         points = Points(n, hit.position, hit.normal, hit.normal, hit.thin, zero, zero)
         return paths.irradiance(world.space, world.lights, world.surfaces, points, rng=rng, active=where)
 
-    def _with_gloss(self, hit: Hit, ray: Ray, diffuse: Array, inside: Array, rng: np.random.Generator) -> Array:
-        """One GGX lobe above the diffuse light, seen by one reflected ray.
+    def _with_gloss(
+        self, hit: Hit, ray: Ray, diffuse: Array, inside: Array, rng: np.random.Generator
+    ) -> tuple[Array, Array]:
+        """One GGX lobe above the diffuse light, seen by one reflected ray; and albedo, in a mirror times that of what
+        the ray meets.
 
         Source: Walter et al. 2007 eq. 35 for the half vector, Schlick 1994 for F; F0 = 0.08 specular.
         """
@@ -216,7 +222,7 @@ class Tracer:
         f = f0 + (1 - f0) * dr.power(1 - c, 5) * (1 - dr.square(rough) * 0.9)
         active = inside & (dr.max(f0) > 1e-3) & (dr.dot(d, hit.normal) > 0)
         if not dr.any(active):
-            return diffuse
+            return diffuse, hit.albedo
         onward = mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d)
         second = look(world, onward, active)
         far = picture_at(world.sky, world.rows, d, active) * radiosity.GLASS
@@ -228,7 +234,22 @@ class Tracer:
             seen = dr.select(indoors, second.albedo * e + second.glow, seen)
         limit = BRIGHTEST * float(1 / np.median(world.exposure.gains))
         seen = dr.minimum(seen, limit)
-        return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse)
+        tinted = active & _is_mirror(hit) & second.ok & ~second.outdoor & second.front
+        albedo = hit.albedo * dr.select(tinted, second.albedo, mi.Color3f(1.0))
+        return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse), albedo
+
+    def _surface_seen(self, ray: Ray, hit: Hit) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) normals and (n,) distances of what rays show: where they meet a mirror, of what is seen in it."""
+        mi, dr = mitsuba(), drjit()
+        mirror = hit.front & _is_mirror(hit)
+        d = ray.d - 2 * dr.dot(ray.d, hit.normal) * hit.normal
+        second = look(self._world, mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d), mirror)
+        normal = dr.select(second.ok, second.normal, hit.normal)
+        return array(normal), np.asarray(hit.distance + dr.select(second.ok, second.distance, 0.0))
+
+
+def _is_mirror(hit: Hit) -> Array:
+    return hit.ok & ~hit.outdoor & (hit.gloss.z > SHINY) & (hit.gloss.x < CLEAR)
 
 
 def _denoised(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.ndarray:
