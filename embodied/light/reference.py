@@ -239,7 +239,8 @@ class Tracer:
         return dr.select(active, diffuse * (1 - metal) * (1 - f) + seen * f, diffuse), albedo
 
     def _surface_seen(self, ray: Ray, hit: Hit) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3) normals and (n,) distances of what rays show: where they meet a mirror, of what is seen in it."""
+        """(n, 3) normals and (n,) distances (m) of what rays show: where they meet a mirror, of what is seen in it, and
+        the whole way there. Renderers guide Open Image Denoise so, too: by the first diffuse bounce."""
         mi, dr = mitsuba(), drjit()
         mirror = hit.front & _is_mirror(hit)
         d = ray.d - 2 * dr.dot(ray.d, hit.normal) * hit.normal
