@@ -6,6 +6,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +22,13 @@ from agents.hanna.agent import load_agent
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import TrainingConfig
 from agents.imitation.lessons import Lessons, split_of
-from agents.imitation.studies import kept_episodes
+from agents.imitation.studies import kept_episodes, refuse_unknown
 from agents.judging import about
+from agents.processor_time import ProcessorTime
 from agents.study_tables import COMPARED, PRICES, SHORTER, TABLES, TEST, VARIANTS, Line, Table
 from agents.tables import side_by_side as beside
 from agents.vision.bank import FeatureBank
+from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
@@ -60,6 +64,13 @@ class StudySetting:
     """Agents per row, from the seed of `config` on."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
+    judged_in: Path | None = None
+    """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
+
+    @property
+    def judges(self) -> Path:
+        """The data set that agents are judged in."""
+        return self.data if self.judged_in is None else self.judged_in
 
     def config_of(self, variant: str, seed: int | None = None) -> TrainingConfig:
         chosen = VARIANTS[SHORTER.get(variant, variant)]
@@ -79,22 +90,35 @@ class StudySetting:
         return range(self.config.seed, self.config.seed + self.seeds)
 
 
-def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print) -> dict[str, Path]:
+def run_study(
+    setting: StudySetting,
+    names: Sequence[str],
+    *,
+    rows: Sequence[str] | None = None,
+    workers: int = 1,
+    note: Note = print,
+) -> dict[str, Path]:
     """Train what is missing, judge, and write the tables as Markdown, CSV and JSON, and the learning curves;
     returns the Markdown files.
 
     Agents are trained in `workers` processes; each goes on from its run folder, so the same
     command continues after an interruption. Results do not depend on `workers`.
 
+    Args:
+      rows: train and judge these agents of VARIANTS and SHORTER only; tables say which rows they lack.
+
     Raises:
-      ValueError: an unknown study.
+      ValueError: an unknown study or agent, or a table without any of `rows`.
       FileNotFoundError: features of a split that agents are judged on are missing; said before any is trained.
       LockedError: another process writes to the study's folder.
     """
-    if unknown := [n for n in names if n not in TABLES]:
-        raise ValueError(f"unknown studies {unknown}; there are {list(TABLES)}")
-    data = dataset_of(setting.data, "hanna")
-    tables = {n: _possible(TABLES[n], setting, data) for n in names}
+    refuse_unknown(names, TABLES)
+    refuse_unknown(rows or (), {**VARIANTS, **SHORTER})
+    data = dataset_of(setting.judges, "hanna")
+    tables = {n: _possible(TABLES[n], setting, data, rows) for n in names}
+    if rows is not None and (without := [n for n, t in tables.items() if not any(x.variant for x in t.lines)]):
+        known = {n: list(dict.fromkeys(x.variant for x in TABLES[n].lines if x.variant)) for n in without}
+        raise ValueError(f"no row of {without} is one of {list(rows)}; they have {known}")
     wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
     wanted |= dict.fromkeys(name for table in tables.values() for pair in table.compared for name in pair)
     jobs = (
@@ -105,15 +129,18 @@ def run_study(setting: StudySetting, names: Sequence[str], *, workers: int = 1, 
     for split in dict.fromkeys(split for table in tables.values() for split in table.splits):
         _bank(setting, data, split)
     with locked(setting.out):
-        for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+        cost = ProcessorTime(setting.out)
+        for (variant, _), seconds, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+            cost.trained(variant, seconds)
             note(line)
         curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
         plays = _plays(setting, tables.values())
-        for line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+        for where, seconds, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
             joblib.delayed(_play)(setting, *where, names) for where, names in plays.items()
         ):
+            cost.judged(where, seconds)
             note(line)
-        judged = _Judge(setting, data, note)
+        judged = _Judge(setting, data, cost, note)
         return {name: _write(setting, name, table, judged) for name, table in tables.items()}
 
 
@@ -129,26 +156,43 @@ def _plays(setting: StudySetting, tables: Iterable[Table]) -> Mapping[tuple[str,
     return {where: list(names) for where, names in found.items()}
 
 
-def _play(setting: StudySetting, variant: str, split: str, seed: int, names: Sequence[str]) -> str:
+def _play(
+    setting: StudySetting, variant: str, split: str, seed: int, names: Sequence[str]
+) -> tuple[tuple[str, str, int], float, str]:
+    """Play what has not been played; who and where, the seconds of processor time it took, and what to tell."""
+    began = time.process_time()
     torch.set_num_threads(setting.threads)
-    player = _Player(setting, Dataset(setting.data))
+    player = _Player(setting, Dataset(setting.judges))
     for name in names:
         player.episodes(variant, name, split, seed)
-    return f"{variant or 'without learning'}, seed {seed}: judged on {split}"
+    line = f"{variant or 'without learning'}, seed {seed}: judged on {split}"
+    return (variant, split, seed), time.process_time() - began, line
 
 
-def _possible(table: Table, setting: StudySetting, data: Dataset) -> Table:
-    """The table without agents that learn from as many training houses as there are, or more, and with the splits out
-    of distribution that there are."""
-    houses = len(data.names("train"))
-    fewer = tuple(
-        line for line in table.lines if not line.variant or setting.config_of(line.variant).training_houses < houses
+def _possible(table: Table, setting: StudySetting, data: Dataset, rows: Sequence[str] | None) -> Table:
+    """The table without agents that are not wanted, or that learn from as many training houses as there are, or more;
+    with the splits out of distribution that there are, and without seen houses where agents are judged in those of
+    another data set.
+
+    Args:
+      data: that agents are judged in.
+      rows: agents that are wanted; None: all.
+    """
+    houses = len(dataset_of(setting.data, "hanna").names("train"))
+    wanted = lambda variant: rows is None or variant in rows
+    there = lambda variant: not variant or (wanted(variant) and setting.config_of(variant).training_houses < houses)
+    kept = [k for k, s in enumerate(table.splits) if setting.judged_in is None or not s.endswith("_seen")]
+    printed = lambda line: {name: [x[k] for k in kept if k < len(x)] for name, x in line.printed.items()}
+    return dataclasses.replace(
+        table,
+        lines=tuple(dataclasses.replace(x, printed=printed(x)) for x in table.lines if there(x.variant)),
+        splits=(*(table.splits[k] for k in kept), *(data.ood if table.splits == TEST else ())),
+        compared=tuple(pair for pair in table.compared if all(map(there, pair))),
     )
-    splits = (*TEST, *data.ood) if table.splits == TEST else table.splits
-    return dataclasses.replace(table, lines=fewer, splits=splits)
 
 
-def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> str:
+def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> tuple[tuple[str, int], float, str]:
+    """Train an agent, or go on; who, the seconds of processor time it took, and what to tell."""
     torch.set_num_threads(setting.threads)
     data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant, seed)
     config = setting.config_of(variant, seed)
@@ -160,7 +204,8 @@ def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) ->
         lessons = Lessons(data, encoder, setting.quality, device=setting.device)
         progress = train_agent(lessons, config, folder, begin=setting.begin, note=note)
     best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
-    return f"{variant}, seed {seed}: {progress.update} updates, {best}"
+    line = f"{variant}, seed {seed}: {progress.update} updates, {best}"
+    return (variant, seed), progress.processor or math.nan, line
 
 
 def _validations(folder: Path) -> list[dict[str, float]]:
@@ -221,8 +266,8 @@ def _bank(setting: StudySetting, data: Dataset, split: str) -> FeatureBank:
 class _Judge:
     """The episodes of a table's rows, with all of their training seeds, and what they come to."""
 
-    def __init__(self, setting: StudySetting, data: Dataset, note: Note) -> None:
-        self.setting, self.data, self.note = setting, data, note
+    def __init__(self, setting: StudySetting, data: Dataset, cost: ProcessorTime, note: Note) -> None:
+        self.setting, self.data, self.cost, self.note = setting, data, cost, note
         self.behaviour: dict[tuple[str, str], dict] = {}
         self._player = _Player(setting, data)
         self._episodes: dict[tuple[str, str], list[Episode]] = {}
@@ -271,26 +316,32 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
         by = {line.played: r.values for line, r in zip(table.lines, rows, strict=True)}
         trained = [r.values for line, r in zip(table.lines, rows, strict=True) if line.variant in PRICES]
         requests_curves(
-            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules] for kind, rules in PRICED.items()}
+            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules if n in by] for kind, rules in PRICED.items()}
             | {"trained at a price": [(v["requests"], v["success"]) for v in trained]},
             setting.out / "figure_requests.png",
         )
     if name == "houses":
-        there = len(judged.data.names("train"))
-        counts = [setting.config_of(line.variant).training_houses or there for line in table.lines]
+        there = len(dataset_of(setting.data, "hanna").names("train"))
+        count = {line.variant: setting.config_of(line.variant).training_houses or there for line in table.lines}
+        by_trail = {(r.split, line.variant): r for line, r in _with(table, rows) if line.played == "learned"}
         houses_figure(
             {
                 f"{s}, {how}": [
-                    (n, r.values["success"])
-                    for line, n, r in zip(table.lines, counts, rows[k * len(counts) :], strict=False)
-                    if n == there or (line.variant in SHORTER) == (how == "equal passes")
+                    (n, by_trail[s, variant].values["success"])
+                    for variant, n in count.items()
+                    if n == there or (variant in SHORTER) == (how == "equal passes")
                 ]
-                for k, s in enumerate(table.splits)
+                for s in table.splits
                 for how in ("equal updates", "equal passes")
             },
             setting.out / "figure_houses.png",
         )
     return path
+
+
+def _with(table: Table, rows: Sequence[Row]) -> Iterable[tuple[Line, Row]]:
+    """Rows, split after split, each with its line of the table."""
+    return zip([line for _ in table.splits for line in table.lines], rows, strict=True)
 
 
 def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row], judged: _Judge) -> str:
@@ -300,13 +351,15 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
     tasks = {s: len({e.task.id for e in judged.episodes(table.lines[0], s)}) for s in table.splits}
     counts = "; ".join(f"{s}: {tasks[s]} tasks in {first[s].houses} houses" for s in table.splits)
     c = setting.config
+    brackets = "; in brackets the dissertation's numbers" if any(line.printed for line in table.lines) else ""
     how = (
-        f"{counts}. Mean and 95 % interval clustered by house{' and training seed' if setting.seeds > 1 else ''}; in "
-        f"brackets the dissertation's numbers. Trained {c.iterations} updates of {c.batch} episodes, "
+        f"{counts}{_where(setting, table, judged)}. Mean and 95 % interval clustered by "
+        f"house{' and training seed' if setting.seeds > 1 else ''}{brackets}. Trained {c.iterations} updates of "
+        f"{c.batch} episodes, "
         f"{f'begun with {setting.begin.name}, ' if setting.begin else ''}"
         f"{'seeds' if setting.seeds > 1 else 'seed'} {', '.join(map(str, setting.repeats()))}; judged with seed "
         f"{setting.seed}, temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per "
-        "cent."
+        f"cent.{_cost(setting, table, judged)}"
     )
     title = f"{name}: {table.title}" if name.isalpha() else f"Table {name}: {table.title}"
     lines = [(line.label, line.printed) for line in table.lines]
@@ -318,4 +371,25 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
         for split in table.splits
     ]
     told = ["", "Task by task, between agents that differ in one thing:", "", *pairs, ""] if pairs else []
+    every = [line.label for line in _possible(TABLES[name], setting, judged.data, None).lines]
+    if missing := [label for label in every if label not in dict(lines)]:
+        told += ["", f"Not run: {', '.join(missing)}.", ""]
     return beside(title, table.splits, table.columns, lines, value, how) + "\n".join(told)
+
+
+def _where(setting: StudySetting, table: Table, judged: _Judge) -> str:
+    """How the pictures are drawn that agents learn from and are judged by, and whose houses those are."""
+    learned, seen = (
+        ", ".join(sorted({drawing(pictures_of(data, n, setting.quality)) for s in splits for n in data.names(s)}))
+        for data, splits in ((dataset_of(setting.data, "hanna"), ("train",)), (judged.data, table.splits))
+    )
+    other = f", of the data set {judged.data.digest}, not that of training" if setting.judged_in else ""
+    return f"{other}; drawn {seen}, in training {learned}"
+
+
+def _cost(setting: StudySetting, table: Table, judged: _Judge) -> str:
+    """The processor time of a table's agents, where it was counted."""
+    trained, played = judged.cost.of(
+        dict.fromkeys(line.variant for line in table.lines if line.variant), _plays(setting, [table])
+    )
+    return "" if math.isnan(trained) else f" Processor time: {trained:.2f} hours to train, {played:.2f} to judge."

@@ -6,6 +6,7 @@ Agents are named by what is different about their training; agents that several 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,6 +27,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "8 houses": {"training_houses": 8},
     "32 houses": {"training_houses": 32},
     "128 houses": {"training_houses": 128},
+    "256 houses": {"training_houses": 256},
     "3 lightings": {"lights": 3},
     "half curiosity": {"alpha": 0.5},
     "no curiosity, no conditions": {"alpha": 0.0, "predict_reasons": False},
@@ -42,7 +44,8 @@ agents that are compared should differ in one thing."""
 PRICES = ("price 0.25", "price 4")
 DEPARTURES = ("no guided asking", "no curiosity floor", "no environment dropout", "no falling rate")
 """Agents trained with one thing less that `mini` does otherwise than Table D.1 (docs/sources.md, S32 to S35)."""
-SHORTER = {f"{n} houses, equal passes": f"{n} houses" for n in (8, 32, 128)}
+HOUSES = ("8 houses", "32 houses", "128 houses", "256 houses")
+SHORTER = {f"{name}, equal passes": name for name in HOUSES}
 """Agents that are trained like those of VARIANTS, but see each of their tasks only as often as the agent of all houses
 sees one of its own."""
 
@@ -230,10 +233,13 @@ TABLES: Mapping[str, Table] = {
         TEST,
         FULL,
         (
-            *(_line(f"{n} houses", f"{n} houses") for n in (8, 32, 128)),
+            *(_line(name, name) for name in HOUSES),
             _line("all houses", "final"),
             *(_line(name, name) for name in SHORTER),
+            *(_line(f"{name}, without a trail", name, "learned, without a trail") for name in HOUSES),
+            _line("all houses, without a trail", "final", "learned, without a trail"),
         ),
+        (*((more, fewer) for fewer, more in itertools.pairwise(HOUSES)), *(("final", fewer) for fewer in HOUSES)),
     ),
     "lights": Table(
         "Success and the number of lightings of each training house (no counterpart in the dissertation)",

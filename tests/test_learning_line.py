@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -15,10 +16,11 @@ from hand_data import build
 from agents import study as module
 from agents.failures import failures, hanna_policies, predictions, request_share
 from agents.hanna.agent import load_agent, new_agent
-from agents.hanna.run import run_train_hanna, vocabulary_of
+from agents.hanna.run import run_train_hanna, train_agent, vocabulary_of
 from agents.hanna.training_config import SCALES
-from agents.imitation.lessons import split_of
+from agents.imitation.lessons import Lessons, split_of
 from agents.judging import run_eval
+from agents.processor_time import ProcessorTime
 from agents.realism_study import RealismSetting, rank_correlation
 from agents.realism_study import run_study as realism
 from agents.shipped import WEIGHTS
@@ -178,6 +180,18 @@ def study(data, tmp_path):
     return StudySetting(data.folder, tmp_path / "encoder.safetensors", tmp_path / "study", config, tasks=3)
 
 
+@pytest.fixture
+def other(study, tmp_path):
+    """The study's data set again, but of another kind of routes and without houses out of distribution."""
+    other, encoder = build(tmp_path / "other", tmp_path / "cache", routes="spanning"), load_encoder(study.encoder)
+    for name in other.names("test_unseen"):
+        place = other.place(name)
+        features = stream(3, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
+        path = feature_path(other.folder / "features", encoder.digest, name)
+        save_features(path, features, encoder, place.house.digest)
+    return other
+
+
 def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study):
     lines = []
     written = run_study(study, ["4.5", "4.6"], note=lines.append)
@@ -325,16 +339,67 @@ def test_requests_are_bought_by_three_kinds_of_rule(study):
 
 def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):
     monkeypatch.setitem(module.VARIANTS, "8 houses", {"training_houses": 1})  # of the two of the hand-made data set
-    run_study(study, ["houses"])
+    written = run_study(study, ["houses"])
     rows = json.loads((study.out / "table_houses.json").read_text())
     assert [r["agent"] for r in rows if r["split"] == "test_unseen"] == [
         "8 houses",
         "all houses",
         "8 houses, equal passes",
+        "8 houses, without a trail",
+        "all houses, without a trail",
     ]
+    table = written["houses"].read_text()
+    assert "- final less 8 houses, test_unseen: success " in table and "32 houses" not in table
+    assert "drawn unlit_192, in training unlit_192" in table and "dissertation's numbers" not in table
+    hours = re.search(r"Processor time: ([\d.]+) hours to train, ([\d.]+) to judge", table)
+    assert hours and float(hours[1]) < 1
     assert sorted(p.name for p in (study.out / "agents").iterdir()) == ["8_houses", "8_houses_equal_passes", "final"]
     long, short = study.config_of("8 houses"), study.config_of("8 houses, equal passes")
     assert (long.iterations, short.iterations) == (2, 1) and short.training_houses == 1
+
+
+def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, other, tmp_path):
+    there = dataclasses.replace(study, judged_in=other.folder)
+    written = run_study(there, ["4.5"])["4.5"].read_text()
+    rows = json.loads((study.out / "table_4.5.json").read_text())
+    assert {r["split"] for r in rows} == {"test_unseen"}, "nobody has seen its houses, and none are out of distribution"
+    assert f"of the data set {other.digest}, not that of training" in written
+    assert "(45.43)" in written and "(86.67)" not in written, "the printed numbers are those of unseen houses"
+    names = {e.task.id for p in (study.out / "episodes").iterdir() for e in load_lines(p, Episode)}
+    assert names <= {t.id for t in other.tasks("test_unseen")}
+    for name in other.names("test_unseen"):
+        feature_path(other.folder / "features", load_encoder(study.encoder).digest, name).unlink()
+    with pytest.raises(FileNotFoundError, match=f"embodied features.*{other.folder}|{other.folder}.*embodied features"):
+        run_study(dataclasses.replace(there, out=tmp_path / "again"), ["4.5"])
+
+
+def test_some_rows_of_a_study_may_be_had_alone(study):
+    written = run_study(study, ["4.4", "requests"], rows=["target image only", "price 4"])
+    text = written["4.4"].read_text()
+    assert "| Target image only |" in text and "| + language instruction |" not in text and " less " not in text
+    assert "Not run: + language instruction." in text
+    assert sorted(p.name for p in (study.out / "agents").iterdir()) == ["price_4", "target_image_only"]
+    assert "| trained at price 4 |" in written["requests"].read_text()
+    with pytest.raises(ValueError, match=r"no row of \['4.4'\] is one of \['lstm'\]; .*target image only"):
+        run_study(study, ["4.4", "4.6"], rows=["lstm"])
+    with pytest.raises(ValueError, match="unknown studies .*lstms"):
+        run_study(study, ["4.6"], rows=["lstms"])
+
+
+def test_processor_time_is_counted_over_sessions_and_kept(study):
+    short = dataclasses.replace(study, config=dataclasses.replace(study.config, iterations=1))
+    lessons = Lessons(dataset_of(study.data, "hanna"), load_encoder(study.encoder))
+    used = [train_agent(lessons, s.config, study.out / "run", note=print).processor for s in (short, study, study)]
+    assert 0 < used[0] < used[1] and used[0] < used[2], "sessions add up, and what is done is not forgotten"
+    cost, where = ProcessorTime(study.out), ("final", "test_unseen", 0)
+    cost.trained("final", 3600)
+    cost.trained("final", 1800)
+    cost.judged(where, 720)
+    again = ProcessorTime(study.out)
+    again.judged(where, 0.1)  # found played
+    again.trained("final", math.nan)
+    assert cost.of(["final"], [where]) == (1.5, 0.2)
+    assert again.of([], [where]) == (0.0, 0.2) and math.isnan(again.of(["final"], [])[0])
 
 
 def test_a_study_of_lightings_says_how_to_light_the_houses(study):

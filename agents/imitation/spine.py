@@ -140,10 +140,15 @@ def _train(
     if parallel.rank() == 0:
         write_json(folder / "settings.json", json.loads(config.to_json()), indent=1)
     report = TrainingLog(folder, config.iterations, progress, note)
-    began, saved, before = time.monotonic(), time.monotonic(), progress.seconds
+    began, saved, before = time.monotonic(), time.monotonic(), progress
+    used = time.process_time()
 
     def now() -> Progress:
-        return dataclasses.replace(progress, seconds=before + time.monotonic() - began)
+        return dataclasses.replace(
+            progress,
+            seconds=before.seconds + time.monotonic() - began,
+            processor=before.processor + time.process_time() - used,
+        )
 
     with stop_signal() as stop:
         try:

@@ -332,6 +332,15 @@ def add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds", type=whole(), default=1, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
     )
+    parser.add_argument(
+        "--judged-in",
+        type=any_path,
+        metavar="DIR",
+        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
+    )
+    parser.add_argument(
+        "--rows", nargs="+", metavar="NAME", help="train and judge these agents only; tables say which rows they lack"
+    )
     add_quality(parser)
     add_agents_side_by_side(parser)
     add_device(parser)

@@ -1,6 +1,7 @@
 """Train agents for each row of a table of the dissertation, judge them, and print the table.
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
+    embodied study hanna houses --data DATA --judged-in OTHER --out STUDY --seeds 3
     embodied study vision encoders pictures --data DATA --out STUDY
     embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
     embodied study hari 4.7 4.8 --data DATA --out STUDY
@@ -80,8 +81,9 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
         args.quality,
         args.seeds,
         args.begin,
+        args.judged_in,
     )
-    return list(run_study(setting, args.tables, workers=args.workers, note=note).values())
+    return list(run_study(setting, args.tables, rows=args.rows, workers=args.workers, note=note).values())
 
 
 def run_realism(args: argparse.Namespace) -> list[Path]:
