@@ -21,7 +21,7 @@ from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, check, compose, radiosity, scalar, settings_of, solve
 from embodied.light.atlas import atlas_of, things_of
-from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, variant_of
+from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, threads_allowed, variant_of
 from embodied.light.baking import brightest
 from embodied.light.colours import ColourMaps
 from embodied.light.cover import rasterise
@@ -279,6 +279,31 @@ def test_cuda_goes_before_llvm_and_without_both_the_scalar_variant_does_with_a_w
     assert variant_of(lambda name: name == "LLVM") == "llvm_ad_rgb"
     with pytest.warns(RuntimeWarning, match="scalar.*slower.*libllvm19.*quality='unlit'"):
         assert variant_of(lambda name: False) == "scalar_rgb"
+
+
+def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
+    for text, threads in (("1", 1), ("3,2", 3), (" 4 ", 4), ("", None), ("0", None), ("-2", None), ("many", None)):
+        monkeypatch.setenv("OMP_NUM_THREADS", text)
+        assert threads_allowed() == threads, text
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    assert threads_allowed() is None
+
+
+@pytest.mark.slow
+def test_workers_share_the_processors(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    code = """
+import joblib
+from embodied.light.backend import drjit
+
+def threads(k):
+    return drjit().thread_count()
+
+many = 2 * joblib.cpu_count()
+print(joblib.Parallel(n_jobs=many)(joblib.delayed(threads)(k) for k in range(2)))
+"""
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout == "[1, 1]\n"
 
 
 def test_arrays_without_llvm_mean_the_same():

@@ -163,3 +163,21 @@ def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
         width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part
     )
     assert len(rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
+
+
+def test_rectangles_are_put_where_they_lie_lowest_and_leftmost():
+    """`pack` against the same rule written out over every place."""
+    rng = np.random.default_rng(0)
+    for trial in range(60):
+        n, width = int(rng.integers(1, 120)), int(rng.integers(1, 90))
+        sizes = np.stack([rng.geometric(0.2, n), rng.geometric(0.1, n)], 1)
+        filled = np.zeros(max(width, sizes[:, 0].max()), int)
+        expected = np.zeros((n, 2), int)
+        for i in sorted(range(n), key=lambda i: (-sizes[i, 1], -sizes[i, 0])):
+            w, h = sizes[i]
+            lies = [filled[x : x + w].max() for x in range(len(filled) - w + 1)]
+            x = int(np.argmin(lies))
+            expected[i] = x, lies[x]
+            filled[x : x + w] = lies[x] + h
+        places, size = pack(sizes, width)
+        assert (places == expected).all() and (size == (expected + sizes).max(0)).all(), trial

@@ -7,6 +7,7 @@ unfolded plane by plane, so that one wall is one chart however many holes it has
 from __future__ import annotations
 
 import itertools
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -295,18 +296,54 @@ def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.nd
     Source: the skyline heuristic, bottom left (Jylaenki 2010, A Thousand Ways to Pack the Bin, sec. 2.4).
     """
     sizes = np.asarray(sizes, int)
-    widest = int(sizes[:, 0].max())
     if width is None:
         width = int(np.sqrt(sizes.prod(1).sum() * 1.1)) + 1
-    skyline = np.zeros(max(width, widest), int)
+    skyline = _Skyline(max(width, int(sizes[:, 0].max())))
     places = np.zeros((len(sizes), 2), np.int32)
-    for i in np.lexsort((-sizes[:, 0], -sizes[:, 1])):
-        w, h = sizes[i]
-        rests = np.lib.stride_tricks.sliding_window_view(skyline, w).max(1)
-        x = int(np.argmin(rests))
-        places[i] = x, rests[x]
-        skyline[x : x + w] = rests[x] + h
+    order = np.lexsort((-sizes[:, 0], -sizes[:, 1]))
+    places[order] = [skyline.put(w, h) for w, h in sizes[order].tolist()]
     return places, (places + sizes).max(0).astype(np.int32)
+
+
+class _Skyline:
+    """How high a sheet is filled, as steps from left to right, neighbours of different heights."""
+
+    def __init__(self, width: int) -> None:
+        self._width, self._starts, self._heights = width, [0], [0]
+
+    def put(self, width: int, height: int) -> tuple[int, int]:
+        """Put a rectangle, no wider than the sheet, where it comes to lie lowest, leftmost of these; its corner."""
+        at, stop, rest = self._lowest(width)
+        x = self._starts[at]
+        starts, heights = [x], [rest + height]
+        if (self._starts[stop] if stop < len(self._starts) else self._width) > x + width:  # the last step sticks out
+            starts.append(x + width)
+            heights.append(self._heights[stop - 1])
+        self._starts[at:stop], self._heights[at:stop] = starts, heights
+        for k in (at + len(starts), at):
+            if 0 < k < len(self._starts) and self._heights[k] == self._heights[k - 1]:
+                del self._starts[k], self._heights[k]
+        return x, rest
+
+    def _lowest(self, width: int) -> tuple[int, int, int]:
+        """The step that a rectangle best begins with, the step after those that it covers, and the height of the
+        highest of these. (From one step's beginning to the next a place comes to lie only higher: what it leaves
+        behind on the left is no whole step.)
+        """
+        starts, heights = self._starts, self._heights
+        best, rest = (0, 0), sys.maxsize
+        for first, x in enumerate(starts):
+            if x + width > self._width:
+                break
+            stop, top = first, -1
+            while stop < len(starts) and starts[stop] < x + width:
+                top = max(top, heights[stop])
+                if top >= rest:
+                    break
+                stop += 1
+            else:
+                best, rest = (first, stop), top
+        return *best, rest
 
 
 def _strips(corners: np.ndarray, chart: np.ndarray, full: float = 0.25, most: int = 100) -> np.ndarray:
