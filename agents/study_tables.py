@@ -84,7 +84,7 @@ def _line(label: str, variant: str, played: str = "learned", **printed: Sequence
 
 
 TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
-COMPARED = ("success", "requests")
+COMPARED = ("success", "spl", "requests")
 """What pairs of agents are compared by."""
 FULL = ("success", "spl", "navigation error", "requests")
 TABLES: Mapping[str, Table] = {

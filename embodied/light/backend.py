@@ -76,8 +76,7 @@ def threads_allowed() -> int | None:
     """How many threads this process should use, as OMP_NUM_THREADS has it; None where nobody says.
 
     The workers of joblib and of Ray get it as their share of the machine, and so do jobs of batch systems. Without it
-    every process takes all processors, and those that wait for work do so awake: two houses lit side by side on two
-    processors took 15 % longer.
+    every process takes all processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
     """
     first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
     return int(first) if first.isdecimal() and int(first) > 0 else None
