@@ -129,7 +129,7 @@ def run_study(
       ValueError: an unknown table or encoder.
     """
     refuse_unknown(names, STUDIES)
-    refuse_unknown(rows or (), ENCODERS)
+    refuse_unknown(rows or (), ENCODERS, "rows")
     check_device(setting.device)
     data, ways = Dataset(setting.source.data), tuple(pictures) if "pictures" in names else ()
     chosen = [*(rows or (() if setting.ready else ENCODERS)), *setting.ready]

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import json
-import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,14 +21,13 @@ from agents.figures import conditions_figure, curves_figure, houses_figure, requ
 from agents.hanna.agent import load_agent
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import TrainingConfig
-from agents.imitation.lessons import Lessons, split_of
+from agents.imitation.lessons import Lessons, drawings, split_of
 from agents.imitation.studies import kept_episodes, refuse_unknown
 from agents.judging import about
 from agents.processor_time import ProcessorTime
 from agents.study_tables import COMPARED, PRICES, SHORTER, TABLES, TEST, VARIANTS, Line, Table
 from agents.tables import side_by_side as beside
 from agents.vision.bank import FeatureBank
-from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder, load_encoder
 from assets.cache import write_bytes, write_json
@@ -102,25 +101,24 @@ def run_study(
     returns the Markdown files.
 
     Agents are trained in `workers` processes; each goes on from its run folder, so the same
-    command continues after an interruption. Results do not depend on `workers`.
+    command continues after an interruption. Results, but for the processor time they took, do not depend on `workers`.
 
     Args:
       rows: train and judge these agents of VARIANTS and SHORTER only; tables say which rows they lack.
 
     Raises:
-      ValueError: an unknown study or agent, or a table without any of `rows`.
+      ValueError: an unknown study, or rows that none of the tables can have.
       FileNotFoundError: features of a split that agents are judged on are missing; said before any is trained.
       LockedError: another process writes to the study's folder.
     """
     refuse_unknown(names, TABLES)
-    refuse_unknown(rows or (), {**VARIANTS, **SHORTER})
     data = dataset_of(setting.judges, "hanna")
+    whole = [_possible(TABLES[n], setting, data, None) for n in names]
+    refuse_unknown(rows or (), _agents(whole), "rows of these tables")
     tables = {n: _possible(TABLES[n], setting, data, rows) for n in names}
-    if rows is not None and (without := [n for n, t in tables.items() if not any(x.variant for x in t.lines)]):
-        known = {n: list(dict.fromkeys(x.variant for x in TABLES[n].lines if x.variant)) for n in without}
-        raise ValueError(f"no row of {without} is one of {list(rows)}; they have {known}")
-    wanted = dict.fromkeys(line.variant for table in tables.values() for line in table.lines if line.variant)
-    wanted |= dict.fromkeys(name for table in tables.values() for pair in table.compared for name in pair)
+    if empty := [n for n, table in tables.items() if not table.lines]:
+        raise ValueError(f"rows {list(rows or ())} leave nothing of {empty}; leave these out, or add rows of theirs")
+    wanted = _agents(tables.values())
     jobs = (
         joblib.delayed(_train)(setting, v, seed, note if workers == 1 else None)
         for seed in setting.repeats()
@@ -129,19 +127,25 @@ def run_study(
     for split in dict.fromkeys(split for table in tables.values() for split in table.splits):
         _bank(setting, data, split)
     with locked(setting.out):
-        cost = ProcessorTime(setting.out)
-        for (variant, _), seconds, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
-            cost.trained(variant, seconds)
+        cost = ProcessorTime(setting.out / "judging_seconds.json")
+        for variant, trained, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+            cost.trained(variant, trained)
             note(line)
         curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
         plays = _plays(setting, tables.values())
-        for where, seconds, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+        for took, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
             joblib.delayed(_play)(setting, *where, names) for where, names in plays.items()
         ):
-            cost.judged(where, seconds)
+            cost.judged(took)
             note(line)
         judged = _Judge(setting, data, cost, note)
         return {name: _write(setting, name, table, judged) for name, table in tables.items()}
+
+
+def _agents(tables: Iterable[Table]) -> list[str]:
+    """The learning agents that tables show or compare, each once."""
+    names = ([*(line.variant for line in t.lines), *itertools.chain(*t.compared)] for t in tables)
+    return [*dict.fromkeys(name for name in itertools.chain(*names) if name)]
 
 
 def _plays(setting: StudySetting, tables: Iterable[Table]) -> Mapping[tuple[str, str, int], list[str]]:
@@ -158,15 +162,15 @@ def _plays(setting: StudySetting, tables: Iterable[Table]) -> Mapping[tuple[str,
 
 def _play(
     setting: StudySetting, variant: str, split: str, seed: int, names: Sequence[str]
-) -> tuple[tuple[str, str, int], float, str]:
-    """Play what has not been played; who and where, the seconds of processor time it took, and what to tell."""
-    began = time.process_time()
+) -> tuple[dict[str, float], str]:
+    """Play what has not been played; the seconds of processor time that each took, and what to tell."""
     torch.set_num_threads(setting.threads)
-    player = _Player(setting, Dataset(setting.judges))
+    player, took = _Player(setting, Dataset(setting.judges)), {}
     for name in names:
+        began = time.process_time()
         player.episodes(variant, name, split, seed)
-    line = f"{variant or 'without learning'}, seed {seed}: judged on {split}"
-    return (variant, split, seed), time.process_time() - began, line
+        took[player.named(variant, name, split, seed)] = time.process_time() - began
+    return took, f"{variant or 'without learning'}, seed {seed}: judged on {split}"
 
 
 def _possible(table: Table, setting: StudySetting, data: Dataset, rows: Sequence[str] | None) -> Table:
@@ -191,8 +195,8 @@ def _possible(table: Table, setting: StudySetting, data: Dataset, rows: Sequence
     )
 
 
-def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> tuple[tuple[str, int], float, str]:
-    """Train an agent, or go on; who, the seconds of processor time it took, and what to tell."""
+def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> tuple[str, float | None, str]:
+    """Train an agent, or go on; which, the seconds of processor time it took, and what to tell."""
     torch.set_num_threads(setting.threads)
     data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant, seed)
     config = setting.config_of(variant, seed)
@@ -204,8 +208,7 @@ def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) ->
         lessons = Lessons(data, encoder, setting.quality, device=setting.device)
         progress = train_agent(lessons, config, folder, begin=setting.begin, note=note)
     best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
-    line = f"{variant}, seed {seed}: {progress.update} updates, {best}"
-    return (variant, seed), progress.processor or math.nan, line
+    return variant, progress.processor, f"{variant}, seed {seed}: {progress.update} updates, {best}"
 
 
 def _validations(folder: Path) -> list[dict[str, float]]:
@@ -250,6 +253,12 @@ class _Player:
             limit=self.setting.tasks,
         )
 
+    def named(self, variant: str, played: str, split: str, seed: int) -> str:
+        """What `episodes` plays, in words."""
+        agent = f"{variant}, seed {seed}, {played}" if variant else played
+        how = f"{self.setting.tasks or 'all'} tasks, judged with seed {self.setting.seed}"
+        return f"{agent} on {split} of {self.data.digest}, {how}"
+
     def _split(self, name: str) -> tuple[SplitData, FeatureBank, dict[str, Any]]:
         if name not in self._splits:
             quality = self.setting.quality
@@ -268,8 +277,10 @@ class _Judge:
 
     def __init__(self, setting: StudySetting, data: Dataset, cost: ProcessorTime, note: Note) -> None:
         self.setting, self.data, self.cost, self.note = setting, data, cost, note
+        self.folder = setting.out if setting.judged_in is None else setting.out / f"judged_in_{data.digest}"
+        """Where tables and figures go; agents and episodes are shared."""
         self.behaviour: dict[tuple[str, str], dict] = {}
-        self._player = _Player(setting, data)
+        self.player = _Player(setting, data)
         self._episodes: dict[tuple[str, str], list[Episode]] = {}
 
     def row(self, line: Line, split: str) -> Row:
@@ -285,7 +296,7 @@ class _Judge:
         """Those of all training seeds, one seed after the other."""
         if (line.key, split) not in self._episodes:
             seeds = self.setting.repeats() if line.variant else [self.setting.config.seed]
-            found = [e for seed in seeds for e in self._player.episodes(line.variant, line.played, split, seed)]
+            found = [e for seed in seeds for e in self.player.episodes(line.variant, line.played, split, seed)]
             if line.variant and line.played == "learned":
                 self.behaviour[line.key, split] = about(found, self.data.places(split))
             self._episodes[line.key, split] = found
@@ -303,22 +314,22 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
         dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
     ]
     stem = f"table_{name}"
-    save(rows, setting.out, stem)
-    path = setting.out / f"{stem}.md"
+    save(rows, judged.folder, stem)
+    path = judged.folder / f"{stem}.md"
     write_bytes(path, side_by_side(setting, name, table, rows, judged).encode())
-    if name == "4.5":
-        line, split = table.lines[-1], "test_unseen"
-        behaviour = judged.behaviour[line.key, split]
-        write_json(setting.out / "behaviour.json", behaviour, indent=1)
-        requests_figure(behaviour, setting.out / "figure_D.1.png")
-        conditions_figure(behaviour, setting.out / "figure_D.2.png")
+    learned = [line for line in table.lines if line.variant == "final"]
+    if name == "4.5" and learned:
+        behaviour = judged.behaviour[learned[-1].key, "test_unseen"]
+        write_json(judged.folder / "behaviour.json", behaviour, indent=1)
+        requests_figure(behaviour, judged.folder / "figure_D.1.png")
+        conditions_figure(behaviour, judged.folder / "figure_D.2.png")
     if name == "requests":
         by = {line.played: r.values for line, r in zip(table.lines, rows, strict=True)}
         trained = [r.values for line, r in zip(table.lines, rows, strict=True) if line.variant in PRICES]
         requests_curves(
             {kind: [(by[n]["requests"], by[n]["success"]) for n in rules if n in by] for kind, rules in PRICED.items()}
             | {"trained at a price": [(v["requests"], v["success"]) for v in trained]},
-            setting.out / "figure_requests.png",
+            judged.folder / "figure_requests.png",
         )
     if name == "houses":
         there = len(dataset_of(setting.data, "hanna").names("train"))
@@ -334,7 +345,7 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
                 for s in table.splits
                 for how in ("equal updates", "equal passes")
             },
-            setting.out / "figure_houses.png",
+            judged.folder / "figure_houses.png",
         )
     return path
 
@@ -371,25 +382,23 @@ def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[
         for split in table.splits
     ]
     told = ["", "Task by task, between agents that differ in one thing:", "", *pairs, ""] if pairs else []
-    every = [line.label for line in _possible(TABLES[name], setting, judged.data, None).lines]
-    if missing := [label for label in every if label not in dict(lines)]:
+    there = _agents([table])
+    if missing := [a for a in _agents([_possible(TABLES[name], setting, judged.data, None)]) if a not in there]:
         told += ["", f"Not run: {', '.join(missing)}.", ""]
     return beside(title, table.splits, table.columns, lines, value, how) + "\n".join(told)
 
 
 def _where(setting: StudySetting, table: Table, judged: _Judge) -> str:
-    """How the pictures are drawn that agents learn from and are judged by, and whose houses those are."""
-    learned, seen = (
-        ", ".join(sorted({drawing(pictures_of(data, n, setting.quality)) for s in splits for n in data.names(s)}))
-        for data, splits in ((dataset_of(setting.data, "hanna"), ("train",)), (judged.data, table.splits))
-    )
+    """How the pictures are drawn that agents are judged by and learn from, and whose houses those are."""
+    seen = drawings(judged.data, itertools.chain(*map(judged.data.names, table.splits)), setting.quality)
+    data = dataset_of(setting.data, "hanna")
     other = f", of the data set {judged.data.digest}, not that of training" if setting.judged_in else ""
-    return f"{other}; drawn {seen}, in training {learned}"
+    return f"{other}; drawn {seen}, those of training {drawings(data, data.names('train'), setting.quality)}"
 
 
 def _cost(setting: StudySetting, table: Table, judged: _Judge) -> str:
     """The processor time of a table's agents, where it was counted."""
-    trained, played = judged.cost.of(
-        dict.fromkeys(line.variant for line in table.lines if line.variant), _plays(setting, [table])
-    )
-    return "" if math.isnan(trained) else f" Processor time: {trained:.2f} hours to train, {played:.2f} to judge."
+    plays = [(*where, name) for where, names in _plays(setting, [table]).items() for name in names]
+    played = (judged.player.named(variant, name, split, seed) for variant, split, seed, name in plays)
+    hours = judged.cost.hours(_agents([table]), played)
+    return "" if hours is None else f" Processor time: {hours[0]:.2f} hours to train, {hours[1]:.2f} to judge."

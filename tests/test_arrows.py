@@ -130,9 +130,10 @@ agents.failures <- embodied.navigation embodied.interface embodied.teachers agen
 agents.judging <- agents.imitation embodied.interface embodied.records embodied.datasets embodied.evaluation
     agents.vision agents.hanna agents.failures embodied.locks
 agents.study_tables <- agents.failures
-agents.study <- agents.study_tables embodied.navigation agents.imitation agents.tables embodied.interface
-    embodied.datasets embodied.evaluation agents.figures agents.vision agents.hanna agents.failures agents.judging
-    embodied.locks
+agents.processor_time <- embodied.records
+agents.study <- agents.processor_time agents.study_tables embodied.navigation agents.imitation agents.tables
+    embodied.interface embodied.datasets embodied.evaluation agents.figures agents.vision agents.hanna agents.failures
+    agents.judging embodied.locks
 agents.realism_study <- agents.imitation agents.figures agents.hanna agents.vision embodied.datasets embodied.evaluation
     embodied.interface embodied.locks
 viz.sinks <-

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from agents.vision.bank import FeatureBank
@@ -54,9 +54,13 @@ class Lessons:
         return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla, lights)
 
     def pictures(self, name: str) -> str:
-        """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
-        drawn = {drawing(pictures_of(self.data, n, self.quality)) for n in self.data.names(name)}
-        return ", ".join(sorted(drawn))
+        """How the pictures of a split's houses were drawn, as in `drawings`."""
+        return drawings(self.data, self.data.names(name), self.quality)
+
+
+def drawings(data: Dataset, houses: Iterable[str], quality: str | None) -> str:
+    """How the pictures of some houses were drawn, in words: 'unlit_192', or several of them."""
+    return ", ".join(sorted({drawing(pictures_of(data, n, quality)) for n in houses}))
 
 
 def split_of(

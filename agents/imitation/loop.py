@@ -41,8 +41,8 @@ class Progress:
     """Best validation success so far."""
     best_update: int = 0
     """After which best.safetensors was kept."""
-    processor: float = 0.0
-    """Seconds of processor time spent so far, of all threads; 0 by runs that learned before this was counted, and by
+    processor: float | None = None
+    """Seconds of processor time spent so far, of all threads; None by runs that began before this was counted, and by
     learners that do not count it."""
 
 

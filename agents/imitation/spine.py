@@ -134,7 +134,7 @@ def _train(
     """See `train`; nobody else writes into `folder`."""
     config = learner.config
     checkpoint = folder / "checkpoint.pt"
-    progress = learner.load(checkpoint) if checkpoint.exists() else Progress()
+    progress = learner.load(checkpoint) if checkpoint.exists() else Progress(processor=0.0)
     if progress.update:
         note(f"continuing after update {progress.update}")
     if parallel.rank() == 0:
@@ -147,7 +147,7 @@ def _train(
         return dataclasses.replace(
             progress,
             seconds=before.seconds + time.monotonic() - began,
-            processor=before.processor + time.process_time() - used,
+            processor=None if before.processor is None else before.processor + time.process_time() - used,
         )
 
     with stop_signal() as stop:

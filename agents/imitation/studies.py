@@ -24,14 +24,14 @@ from embodied.records import RecordError, episodes_file, load_lines, read_json, 
 J = TypeVar("J", bound=Hashable)
 
 
-def refuse_unknown(names: Sequence[str], known: Iterable[str]) -> None:
+def refuse_unknown(names: Sequence[str], known: Iterable[str], what: str = "studies") -> None:
     """
     Raises:
-      ValueError: a table or figure that this learner has not.
+      ValueError: a table or figure (or what else it is) that this learner has not.
     """
     there = list(known)
     if unknown := [n for n in names if n not in there]:
-        raise ValueError(f"unknown studies {unknown}; there are {there}")
+        raise ValueError(f"unknown {what} {unknown}; there are {there}")
 
 
 def run_all(

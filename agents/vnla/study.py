@@ -178,7 +178,7 @@ def run_study(
       ValueError: an unknown table or variant, or data that it lacks.
     """
     refuse_unknown(names, TABLES)
-    refuse_unknown(rows or (), VARIANTS)
+    refuse_unknown(rows or (), VARIANTS, "rows")
     wanted: dict[str, dict[str, VnlaLine]] = {}
     for line in (line for name in names for line in TABLES[name][1]):
         if rows is None or line.variant in rows:

@@ -336,10 +336,15 @@ def add_study(parser: argparse.ArgumentParser) -> None:
         "--judged-in",
         type=any_path,
         metavar="DIR",
-        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
+        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data); "
+        "its tables go into a folder of their own in --out",
     )
     parser.add_argument(
-        "--rows", nargs="+", metavar="NAME", help="train and judge these agents only; tables say which rows they lack"
+        "--rows",
+        nargs="+",
+        metavar="NAME",
+        help="train and judge these agents only, such as 'final' or '8 houses'; tables are written anew with these and "
+        "say which agents they lack",
     )
     add_quality(parser)
     add_agents_side_by_side(parser)

@@ -73,13 +73,14 @@ def _module() -> types.ModuleType:
 
 
 def threads_allowed() -> int | None:
-    """How many threads this process should use, as OMP_NUM_THREADS has it; None where nobody says.
+    """How many threads this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None
+    where nobody says.
 
-    The workers of joblib and of Ray get it as their share of the machine, and so do jobs of batch systems. Without it
-    every process takes all processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
+    The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
+    processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
     """
     first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
-    return int(first) if first.isdecimal() and int(first) > 0 else None
+    return min(int(first), os.cpu_count() or 1) if first.isdecimal() and int(first) > 0 else None
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:
