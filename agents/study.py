@@ -277,7 +277,7 @@ class _Judge:
 
     def __init__(self, setting: StudySetting, data: Dataset, cost: ProcessorTime, note: Note) -> None:
         self.setting, self.data, self.cost, self.note = setting, data, cost, note
-        self.folder = setting.out if setting.judged_in is None else setting.out / f"judged_in_{data.digest}"
+        self.folder = setting.out if setting.judged_in is None else setting.out / f"judged_in_{data.digest[:16]}"
         """Where tables and figures go; agents and episodes are shared."""
         self.behaviour: dict[tuple[str, str], dict] = {}
         self.player = _Player(setting, data)
@@ -392,7 +392,7 @@ def _where(setting: StudySetting, table: Table, judged: _Judge) -> str:
     """How the pictures are drawn that agents are judged by and learn from, and whose houses those are."""
     seen = drawings(judged.data, itertools.chain(*map(judged.data.names, table.splits)), setting.quality)
     data = dataset_of(setting.data, "hanna")
-    other = f", of the data set {judged.data.digest}, not that of training" if setting.judged_in else ""
+    other = f", of the data set {judged.data.digest[:16]}, not that of training" if setting.judged_in else ""
     return f"{other}; drawn {seen}, those of training {drawings(data, data.names('train'), setting.quality)}"
 
 
