@@ -334,7 +334,8 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
     if name == "houses":
         there = len(dataset_of(setting.data, "hanna").names("train"))
         count = {line.variant: setting.config_of(line.variant).training_houses or there for line in table.lines}
-        by_trail = {(r.split, line.variant): r for line, r in _with(table, rows) if line.played == "learned"}
+        lines = [line for _ in table.splits for line in table.lines]
+        by_trail = {(r.split, x.variant): r for x, r in zip(lines, rows, strict=True) if x.played == "learned"}
         houses_figure(
             {
                 f"{s}, {how}": [
@@ -348,11 +349,6 @@ def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Pa
             judged.folder / "figure_houses.png",
         )
     return path
-
-
-def _with(table: Table, rows: Sequence[Row]) -> Iterable[tuple[Line, Row]]:
-    """Rows, split after split, each with its line of the table."""
-    return zip([line for _ in table.splits for line in table.lines], rows, strict=True)
 
 
 def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row], judged: _Judge) -> str:
