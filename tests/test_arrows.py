@@ -93,48 +93,48 @@ embodied.evaluation <- embodied.navigation embodied.interface embodied.policies 
 embodied.gym <- assets.catalogue embodied.house embodied.navigation embodied.generate embodied.interface
     embodied.language embodied.render embodied.tasks embodied.world embodied.assistants embodied.envs embodied.datasets
     embodied.evaluation
-embodied.cli <- agents.shipped embodied.locks embodied.gl viz.sinks agents.imitation assets.importing assets.catalogue
+embodied.cli <- agents.common.shipped embodied.locks embodied.gl viz.sinks agents.common assets.importing assets.catalogue
     assets.attribution embodied.house embodied.navigation embodied.scene embodied.generate embodied.interface
     embodied.language embodied.records embodied.render viz.video embodied.light viz.report embodied.policies
     embodied.tasks embodied.world embodied.assistants viz.recording embodied.envs embodied.datasets embodied.bench
-    embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.iliad agents.failures
-    agents.judging agents.study agents.encoder_study agents.realism_study
+    embodied.evaluation agents.vision agents.hanna agents.hari agents.vnla agents.bandit agents.iliad agents.hanna.evaluation
+    agents.hanna.judging agents.hanna.study agents.vision.study agents.hanna.realism
 embodied.__main__ <- embodied.cli
-agents.shipped <-
-agents.device <-
-agents.tensor_file <-
-agents.checkpoint_file <-
-agents.imitation <- agents.device agents.checkpoint_file agents.tensor_file agents.vision embodied.interface
+agents.common.shipped <-
+agents.common.device <-
+agents.common.tensor_file <-
+agents.common.checkpoint_file <-
+agents.common <- agents.common.device agents.common.checkpoint_file agents.common.tensor_file agents.vision embodied.interface
     embodied.records embodied.locks embodied.envs embodied.datasets embodied.evaluation
-agents.figures <- embodied.evaluation
-agents.tables <- embodied.evaluation
-agents.vision <- agents.shipped agents.device assets.catalogue embodied.house embodied.scene embodied.interface
-    embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.tensor_file
-    agents.checkpoint_file embodied.locks embodied.records
-agents.encoder_study <- agents.device agents.imitation agents.vision embodied.datasets embodied.evaluation
+agents.common.figures <- embodied.evaluation
+agents.common.tables <- embodied.evaluation
+agents.vision <- agents.common.shipped agents.common.device assets.catalogue embodied.house embodied.scene embodied.interface
+    embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.common.tensor_file
+    agents.common.checkpoint_file embodied.locks embodied.records
+agents.vision.study <- agents.common.device agents.common agents.vision embodied.datasets embodied.evaluation
     embodied.locks embodied.records
-agents.hanna <- agents.shipped agents.imitation embodied.interface embodied.teachers embodied.policies embodied.envs
-    embodied.datasets embodied.evaluation agents.vision agents.tensor_file embodied.records
-agents.hari <- agents.imitation agents.checkpoint_file embodied.interface embodied.action_spaces embodied.records
-    embodied.teachers embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.tensor_file
+agents.hanna <- agents.common.shipped agents.common embodied.interface embodied.teachers embodied.policies embodied.envs
+    embodied.datasets embodied.evaluation agents.vision agents.common.tensor_file embodied.records
+agents.hari <- agents.common agents.common.checkpoint_file embodied.interface embodied.action_spaces embodied.records
+    embodied.teachers embodied.assistants embodied.envs embodied.datasets embodied.evaluation agents.common.tensor_file
     agents.vision embodied.render embodied.locks
-agents.iliad <- agents.imitation embodied.action_spaces embodied.assistants embodied.interface embodied.navigation
+agents.iliad <- agents.common embodied.action_spaces embodied.assistants embodied.interface embodied.navigation
     embodied.teachers assets.catalogue embodied.language embodied.tasks embodied.envs embodied.datasets
-    embodied.evaluation embodied.records agents.vision agents.hanna agents.tensor_file embodied.locks
-agents.bandit <- embodied.locks agents.imitation agents.checkpoint_file embodied.navigation embodied.interface
-    embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna agents.tensor_file
-agents.vnla <- agents.imitation agents.hanna agents.vision agents.tensor_file agents.tables embodied.interface
+    embodied.evaluation embodied.records agents.vision agents.hanna agents.common.tensor_file embodied.locks
+agents.bandit <- embodied.locks agents.common agents.common.checkpoint_file embodied.navigation embodied.interface
+    embodied.records embodied.datasets embodied.evaluation agents.vision agents.hanna agents.common.tensor_file
+agents.vnla <- agents.common agents.hanna agents.vision agents.common.tensor_file agents.common.tables embodied.interface
     embodied.action_spaces embodied.language embodied.records embodied.teachers embodied.policies embodied.assistants
     embodied.envs embodied.datasets embodied.evaluation
-agents.failures <- embodied.navigation embodied.interface embodied.teachers agents.imitation agents.vision agents.hanna
-agents.judging <- agents.imitation embodied.interface embodied.records embodied.datasets embodied.evaluation
-    agents.vision agents.hanna agents.failures embodied.locks
-agents.study_tables <- agents.failures
-agents.processor_time <- embodied.records
-agents.study <- agents.processor_time agents.study_tables embodied.navigation agents.imitation agents.tables
-    embodied.interface embodied.datasets embodied.evaluation agents.figures agents.vision agents.hanna agents.failures
-    agents.judging embodied.locks
-agents.realism_study <- agents.imitation agents.figures agents.hanna agents.vision embodied.datasets embodied.evaluation
+agents.hanna.evaluation <- embodied.navigation embodied.interface embodied.teachers agents.common agents.vision agents.hanna
+agents.hanna.judging <- agents.common embodied.interface embodied.records embodied.datasets embodied.evaluation
+    agents.vision agents.hanna agents.hanna.evaluation embodied.locks
+agents.hanna.study_tables <- agents.hanna.evaluation
+agents.common.processor_time <- embodied.records
+agents.hanna.study <- agents.common.processor_time agents.hanna.study_tables embodied.navigation agents.common agents.common.tables
+    embodied.interface embodied.datasets embodied.evaluation agents.common.figures agents.vision agents.hanna agents.hanna.evaluation
+    agents.hanna.judging embodied.locks
+agents.hanna.realism <- agents.common agents.common.figures agents.hanna agents.vision embodied.datasets embodied.evaluation
     embodied.interface embodied.locks
 viz.sinks <-
 viz.house3d <- embodied.scene

@@ -11,7 +11,7 @@ import torch
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
-from agents.imitation.actor_critic import Decisions, DivergedError, actor_loss, advantages, critic_loss, descend
+from agents.common.actor_critic import Decisions, DivergedError, actor_loss, advantages, critic_loss, descend
 from embodied.seeds import stream
 
 

@@ -22,10 +22,10 @@ from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct,
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
-from agents.checkpoint_file import CheckpointError, read_checkpoint
-from agents.imitation.decoding import drawn_with
-from agents.imitation.runs import Run
-from agents.imitation.studies import history_of
+from agents.common.checkpoint_file import CheckpointError, read_checkpoint
+from agents.common.decoding import drawn_with
+from agents.common.runs import Run
+from agents.common.studies import history_of
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hand_data import build, small_house
 
-from agents.encoder_study import EncoderStudySetting, run_study
+from agents.vision.study import EncoderStudySetting, run_study
 from agents.vision.config import WAYS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import random_encoder, save_encoder

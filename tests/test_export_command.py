@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_datasets import build
 
-from agents.shipped import SHIPPED_ENCODER
+from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import load_encoder
 from agents.vision.features import feature_path, save_features
 from embodied import cli

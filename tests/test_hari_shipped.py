@@ -8,7 +8,7 @@ from hand_worlds import grid_world
 
 from agents.hari.agent import HariAgent, load_agent
 from agents.hari.policy import policy_of
-from agents.shipped import SHIPPED_HARI
+from agents.common.shipped import SHIPPED_HARI
 from embodied.envs.hari import HariRules
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics

@@ -10,7 +10,7 @@ import pytest
 import torch
 from hand_data import build, small_house
 
-from agents.checkpoint_file import CheckpointError
+from agents.common.checkpoint_file import CheckpointError
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.network import Follower

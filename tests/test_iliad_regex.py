@@ -12,7 +12,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.checkpoint_file import CheckpointError
+from agents.common.checkpoint_file import CheckpointError
 from agents.iliad.config import LearnerConfig
 from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
 from agents.iliad.regex.config import MARGINALS, RegexConfig
@@ -49,7 +49,7 @@ from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Wr
 from agents.iliad.study import IliadStudySetting, report, run_study
 from agents.iliad.subjects import RegexSubject
 from agents.iliad.training import IliadProblem, train
-from agents.imitation.decoding import likeliest
+from agents.common.decoding import likeliest
 from embodied.cli import main
 from embodied.seeds import stream
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 import torch
 
-from agents.checkpoint_file import CheckpointError
-from agents.tensor_file import read_weights, save_tensors
+from agents.common.checkpoint_file import CheckpointError
+from agents.common.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import IMAGENET, NETWORKS, PLAIN, WAYS, VisionConfig, drawing, lit_name, way_of
@@ -526,7 +526,7 @@ def test_the_settings_name_the_networks_that_there_are():
 FULL = """
 import resource, signal, sys, torch
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
-from agents.checkpoint_file import write_checkpoint
+from agents.common.checkpoint_file import write_checkpoint
 from agents.vision.encoder import random_encoder, save_encoder
 from embodied import cli
 from embodied.cli import doctor

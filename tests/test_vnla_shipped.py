@@ -8,7 +8,7 @@ import torch
 from hand_vnla import tasks_of
 from hand_worlds import grid_world
 
-from agents.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
+from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import load_encoder
 from agents.vnla.agent import VnlaAgent, load_agent

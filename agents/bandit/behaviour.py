@@ -14,7 +14,7 @@ from agents.bandit.config import RUN_FORMAT
 from agents.bandit.network import Translator
 from agents.bandit.training import NumberedCorpus, sampled
 from agents.bandit.translate import greedy, in_order, padded, perplexity
-from agents.checkpoint_file import read_checkpoint
+from agents.common.checkpoint_file import read_checkpoint
 
 COLUMNS = (
     "BLEU",

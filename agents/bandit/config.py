@@ -6,7 +6,7 @@ import dataclasses
 import json
 from dataclasses import dataclass
 
-from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
+from agents.common.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
 
 UNITS = ("words", "pieces")
 RUN_FORMAT = "embodied-bandit-run-1"

@@ -1,6 +1,6 @@
 """Navigation from ratings: a person watches an episode and gives one to five stars, nothing else.
 
-The learner is the translator's (agents.imitation.actor_critic): an agent that was taught by imitation plays
+The learner is the translator's (agents.common.actor_critic): an agent that was taught by imitation plays
 episodes, each episode gets one rating, and every decision of it is credited with the rating less
 what a critic expected. Decisions are words there; here they are moves, stopping, and asking.
 """
@@ -25,10 +25,10 @@ from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
-from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
-from agents.imitation.lessons import Split
-from agents.imitation.loop import Note, seed_of, tasks_of_update
-from agents.imitation.runs import Run
+from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.common.lessons import Split
+from agents.common.session import Note, seed_of, tasks_of_update
+from agents.common.runs import Run
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -17,8 +17,8 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
-from agents.imitation.lessons import Split, split_of
-from agents.imitation.studies import history_of
+from agents.common.lessons import Split, split_of
+from agents.common.studies import history_of
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import dataset_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.imitation.settings import AT_LEAST_ONE, POSITIVE, require, require_word
+from agents.common.settings import AT_LEAST_ONE, POSITIVE, require, require_word
 
 SCORES = ("success", "nDTW", "SDTW")
 """What a person's stars are simulated from."""

@@ -12,7 +12,7 @@ from torch import nn
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
 from agents.bandit.words import WordNumbers, lexicon_from_json
-from agents.tensor_file import load_tensors, put, save_tensors
+from agents.common.tensor_file import load_tensors, put, save_tensors
 from embodied.records import from_json, from_plain, parse
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from agents.bandit.corpus import pairs_of
 from agents.bandit.figures import curves_figure, gains_figure
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import LEARNERS, REFERENCES, bandit, material, pretrain, teach_critic
-from agents.imitation.studies import (
+from agents.common.studies import (
     beside,
     history_of,
     refuse_unknown,

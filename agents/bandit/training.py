@@ -28,10 +28,10 @@ from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.store import load_weights, save_weights
 from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
 from agents.bandit.words import BUILDERS, WordNumbers
-from agents.imitation.actor_critic import Decisions, actor_loss, critic_loss, descend
-from agents.imitation.decoding import drawn_with
-from agents.imitation.loop import Note
-from agents.imitation.runs import Run
+from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.common.decoding import drawn_with
+from agents.common.session import Note
+from agents.common.runs import Run
 from embodied.locks import locked
 from embodied.seeds import stream
 

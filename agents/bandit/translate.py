@@ -11,7 +11,7 @@ from torch import Tensor
 
 from agents.bandit.network import Translator
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, WordNumbers
-from agents.imitation.decoding import Choice, likeliest
+from agents.common.decoding import Choice, likeliest
 
 POOL = 20
 """Batches that are sorted by length together."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, Protocol
 
-from agents.hanna.vocabulary import END, PAD, UNKNOWN, Vocabulary
+from agents.common.vocabulary import END, PAD, UNKNOWN, Vocabulary
 from embodied.errors import UnableError
 
 PAD_NUMBER, UNKNOWN_NUMBER, END_NUMBER = 0, 1, 2

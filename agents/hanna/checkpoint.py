@@ -8,9 +8,9 @@ import torch
 
 from agents.hanna.agent import HannaAgent
 from agents.hanna.training_config import JUDGED
-from agents.imitation.checkpoint import load_run, save_run
-from agents.imitation.loop import Progress
-from agents.imitation.settings import MAY_CHANGE
+from agents.common.checkpoint import load_run, save_run
+from agents.common.session import Progress
+from agents.common.settings import MAY_CHANGE
 
 FORMAT = "embodied-checkpoint-1"
 

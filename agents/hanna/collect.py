@@ -17,8 +17,8 @@ from torch import Tensor
 
 from agents.hanna.losses import help_loss, navigation_loss
 from agents.hanna.policy import HannaPolicy, Moment
-from agents.imitation.losses import IGNORE
-from agents.imitation.playing import play_remembering
+from agents.common.losses import IGNORE
+from agents.common.playing import play_remembering
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, Label, Move, Place, Stop, Task, Teacher
 

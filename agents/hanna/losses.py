@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.imitation.losses import IGNORE, negative_log_likelihood
+from agents.common.losses import IGNORE, negative_log_likelihood
 
 
 def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor, floor: float = 0.0) -> Tensor:

@@ -11,10 +11,10 @@ import torch
 from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.hanna.training import train
 from agents.hanna.training_config import TrainingConfig
-from agents.hanna.vocabulary import Vocabulary, build_vocabulary
-from agents.imitation.lessons import Lessons
-from agents.imitation.loop import Progress
-from agents.imitation.parallel import join_launcher, one_voice
+from agents.common.vocabulary import Vocabulary, build_vocabulary
+from agents.common.lessons import Lessons
+from agents.common.session import Progress
+from agents.common.parallel import join_launcher, one_voice
 from agents.vision.run import encoder_of
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import Episode

@@ -1,4 +1,4 @@
-"""The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.imitation.spine.
+"""The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.common.spine.
 
 episodes = play tasks with the sampling policies          (collect)
 labels = teacher.relabel(episodes)                        (collect)
@@ -19,10 +19,10 @@ from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.collect import Experience, collect, imitation_loss
 from agents.hanna.policy import HannaPolicy, for_training
 from agents.hanna.training_config import TrainingConfig
-from agents.imitation import parallel, spine
-from agents.imitation.lessons import Split
-from agents.imitation.loop import Clock, Note, Progress, seed_of, tasks_of_update
-from agents.imitation.losses import IGNORE
+from agents.common import parallel, spine
+from agents.common.lessons import Split
+from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.common.losses import IGNORE
 from embodied.evaluation import metrics
 from embodied.interface import Agent, Episode, Place, Task, Teacher
 from embodied.seeds import stream
@@ -39,7 +39,7 @@ def train(
     note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train `agent` in place; see agents.imitation.spine.train for what is written, stopped and raised."""
+    """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised."""
     learner = HannaLearner(agent, training, teacher)
     return spine.train(learner, validation, folder, minutes=minutes, note=note, on_validation=on_validation)
 

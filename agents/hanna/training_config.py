@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from agents.hanna.asking import RULES
 from agents.hanna.config import HannaSizes
-from agents.imitation.settings import (
+from agents.common.settings import (
     AT_LEAST_ONE,
     NOT_ALL,
     NOT_NEGATIVE,
@@ -126,7 +126,7 @@ class TrainingConfig(ImitationSettings):
 
 
 JUDGED = ("again", "by_image", "search", "first_ask_threshold", "route_ask_threshold", "patience")
-"""Of TrainingConfig, those that say only how an agent is judged, besides agents.imitation.settings.MAY_CHANGE."""
+"""Of TrainingConfig, those that say only how an agent is judged, besides agents.common.settings.MAY_CHANGE."""
 
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(

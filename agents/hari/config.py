@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from agents.imitation.settings import (
+from agents.common.settings import (
     AT_LEAST_ONE,
     NOT_ALL,
     NOT_NEGATIVE,

@@ -12,7 +12,7 @@ from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
 from agents.hari.sight import eyes_of
 from agents.hari.words import feature_words
-from agents.imitation.loop import Note, Progress
+from agents.common.session import Note, Progress
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules

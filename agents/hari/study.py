@@ -23,8 +23,8 @@ from agents.hari.networks import INTENTIONS
 from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention, with_eyes
 from agents.hari.sight_study import KINDS, train_and_judge, write_sight
 from agents.hari.study_setting import HariStudySetting, estimates
-from agents.imitation.loop import Note
-from agents.imitation.studies import refuse_unknown, run_all, table, write_all, write_markdown
+from agents.common.session import Note
+from agents.common.studies import refuse_unknown, run_all, table, write_all, write_markdown
 from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import as_json, save, shown
 from embodied.interface import Ask, Episode, Move

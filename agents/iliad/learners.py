@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
-from agents.imitation.actor_critic import Decisions, actor_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss, descend
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.imitation.actor_critic import descend
-from agents.imitation.loop import Note, falling_rate
-from agents.imitation.runs import Run
+from agents.common.actor_critic import descend
+from agents.common.session import Note, falling_rate
+from agents.common.runs import Run
 from embodied.locks import locked
 from embodied.seeds import stream
 

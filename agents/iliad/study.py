@@ -22,8 +22,8 @@ from agents.iliad.figures import curves_figure, describer_figure
 from agents.iliad.regex.language import MANNERS
 from agents.iliad.subjects import Subject
 from agents.iliad.training import episodes_to
-from agents.imitation.loop import Note
-from agents.imitation.studies import (
+from agents.common.session import Note
+from agents.common.studies import (
     beside,
     history_of,
     refuse_unknown,

@@ -16,7 +16,7 @@ from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig, students_of
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import success_rate
-from agents.imitation.loop import Note
+from agents.common.session import Note
 
 
 class Subject(Protocol):

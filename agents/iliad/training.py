@@ -13,8 +13,8 @@ import torch
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
 from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
-from agents.imitation.loop import Note, falling_rate, tasks_of_update
-from agents.imitation.runs import Run
+from agents.common.session import Note, falling_rate, tasks_of_update
+from agents.common.runs import Run
 from embodied.locks import locked
 from embodied.seeds import stream
 
@@ -58,7 +58,7 @@ def train(
       keep: writes the student's weights to a path; called when validation success is the best so far.
 
     Raises:
-      CheckpointError, KeyboardInterrupt, DivergedError: see agents.imitation.
+      CheckpointError, KeyboardInterrupt, DivergedError: see agents.common.
     """
     learner = _Learner(problem, config)
     identity = {**problem.identity, **as_dict(config)}

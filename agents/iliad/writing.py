@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from agents.imitation.decoding import Choice
+from agents.common.decoding import Choice
 
 PAD = 0
 

@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.shipped import SHIPPED_ENCODER
-from agents.tensor_file import load_tensors, put, read_weights, save_tensors
+from agents.common.shipped import SHIPPED_ENCODER
+from agents.common.tensor_file import load_tensors, put, read_weights, save_tensors
 from agents.vision.designs import DESIGNS, build
 from agents.vision.network import Network
 from agents.vision.resnet import load_torchvision

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from agents.tensor_file import load_tensors, save_tensors
+from agents.common.tensor_file import load_tensors, save_tensors
 from agents.vision.bank import FeatureBank
 from agents.vision.config import PLAIN, drawing, lit_name, way_of
 from agents.vision.encoder import Encoder

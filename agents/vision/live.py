@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.shipped import SHIPPED_ENCODER
+from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import Encoder, load_encoder
 from agents.vision.features import encode_panoramas
 from embodied.gym.eyes import PanoramaStore

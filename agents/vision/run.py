@@ -13,7 +13,7 @@ from pathlib import Path
 
 import torch
 
-from agents.device import check_device
+from agents.common.device import check_device
 from agents.vision.config import VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder

@@ -21,8 +21,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
-from agents.tensor_file import save_tensors
+from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
+from agents.common.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
 from agents.vision.designs import begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening

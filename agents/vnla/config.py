@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.imitation.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
+from agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
 from embodied.records import from_json
 
 ASKERS = ("none", "first", "random", "teacher", "learned")

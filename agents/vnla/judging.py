@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import torch
 
-from agents.imitation.lessons import Lessons
+from agents.common.lessons import Lessons
 from agents.vision.bank import FeatureBank
 from agents.vnla.agent import VnlaAgent
 from embodied.evaluation.evaluate import agent as agent_without_learning

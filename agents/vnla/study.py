@@ -17,10 +17,10 @@ from typing import Any
 
 import torch
 
-from agents.imitation.lessons import Lessons
-from agents.imitation.loop import Note
-from agents.imitation.studies import refuse_unknown, run_all, seeds_with
-from agents.tables import Printed, side_by_side
+from agents.common.lessons import Lessons
+from agents.common.session import Note
+from agents.common.studies import refuse_unknown, run_all, seeds_with
+from agents.common.tables import Printed, side_by_side
 from agents.vision.encoder import Encoder
 from agents.vnla.agent import load_agent
 from agents.vnla.config import VnlaSettings

@@ -1,4 +1,4 @@
-"""The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.imitation.spine.
+"""The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.spine.
 
 episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
            learner's place it learns from what is done all the same                              (policy)
@@ -15,13 +15,13 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from agents.imitation import parallel, spine
-from agents.imitation.checkpoint import load_run, save_run
-from agents.imitation.lessons import Split
-from agents.imitation.loop import Clock, Note, Progress, seed_of, tasks_of_update
-from agents.imitation.losses import negative_log_likelihood
-from agents.imitation.playing import play_remembering
-from agents.imitation.settings import MAY_CHANGE
+from agents.common import parallel, spine
+from agents.common.checkpoint import load_run, save_run
+from agents.common.lessons import Split
+from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.common.losses import negative_log_likelihood
+from agents.common.playing import play_remembering
+from agents.common.settings import MAY_CHANGE
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training
@@ -43,7 +43,7 @@ def train(
     note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train `agent` in place; see agents.imitation.spine.train for what is written, stopped and raised.
+    """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised.
 
     Args:
       training: played under TRAINED_UNDER[config.rules], `validation` under config.rules itself.

@@ -52,7 +52,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
+    from agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
 
     if args.world == "nav":
         args.student = args.student or SHIPPED_WALKER
@@ -84,7 +84,7 @@ def episodes(args: argparse.Namespace) -> int:
     """Episodes with the student's own teacher."""
     from agents.iliad.regex.run import load_student, prepare
     from agents.iliad.regex.showing import lines_of, tell
-    from agents.shipped import SHIPPED_STUDENT
+    from agents.common.shipped import SHIPPED_STUDENT
     from embodied.seeds import stream
 
     there = args.shared is not None and (args.student == SHIPPED_STUDENT or (args.shared / "data.json").exists())

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def run_hanna(args: argparse.Namespace) -> int:
     """Tables 4.3 to 4.5, and failures."""
-    from agents import judging
+    from agents.hanna import judging
 
     return judging.run_eval(args, watch=lambda agents: bar(agents, "agents", "agent"))
 
@@ -73,9 +73,9 @@ def record_learned(args: argparse.Namespace) -> None:
 
 def run_vnla(args: argparse.Namespace) -> int:
     """The learned asker beside others, direct intervention and agents without learning."""
-    from agents.imitation.lessons import Lessons
-    from agents.imitation.parallel import use_threads
-    from agents.shipped import SHIPPED_AGENT, SHIPPED_VNLA
+    from agents.common.lessons import Lessons
+    from agents.common.parallel import use_threads
+    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_VNLA
     from agents.vision.drawn import pictures_of
     from agents.vision.run import encoder_of
     from agents.vnla.agent import load_agent
@@ -111,8 +111,8 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.agent import load_agent
     from agents.hari.judging import COLUMNS, TEST, judge
     from agents.hari.run import with_eyes
-    from agents.imitation.parallel import use_threads
-    from agents.shipped import SHIPPED_AGENT, SHIPPED_HARI
+    from agents.common.parallel import use_threads
+    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_HARI
     from agents.vision.drawn import pictures_of
     from embodied.datasets.store import Dataset
 

@@ -1,7 +1,7 @@
 """Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features`, `judge` and `study`.
 
 Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run,
-agents.hanna.run, agents.judging and agents.study.
+agents.hanna.run, agents.hanna.judging and agents.hanna.study.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES,
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
+from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES

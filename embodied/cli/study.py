@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 def run_hanna(args: argparse.Namespace) -> list[Path]:
     from agents.hanna.training_config import SCALES
-    from agents.study import StudySetting, run_study
+    from agents.hanna.study import StudySetting, run_study
     from embodied.cli.options import chosen
 
     setting = StudySetting(
@@ -87,7 +87,7 @@ def run_hanna(args: argparse.Namespace) -> list[Path]:
 
 
 def run_realism(args: argparse.Namespace) -> list[Path]:
-    from agents.realism_study import RealismSetting, run_study
+    from agents.hanna.realism import RealismSetting, run_study
 
     setting = RealismSetting(
         args.data,
@@ -112,7 +112,7 @@ def by_name(files: Sequence[tuple[str, Path]]) -> dict[str, list[Path]]:
 
 
 def run_vision(args: argparse.Namespace) -> list[Path]:
-    from agents.encoder_study import EncoderStudySetting, run_study
+    from agents.vision.study import EncoderStudySetting, run_study
     from agents.vision.config import VisionConfig
     from agents.vision.drawn import StripSource
     from embodied.cli.options import chosen

@@ -77,8 +77,8 @@ def run_hanna(args: argparse.Namespace) -> int:
 
 def run_vnla(args: argparse.Namespace) -> int:
     """Teach an agent by imitation to navigate by one view, to ask an advisor within a budget and to do what it says."""
-    from agents.imitation.lessons import Lessons
-    from agents.imitation.parallel import join_launcher, use_threads
+    from agents.common.lessons import Lessons
+    from agents.common.parallel import join_launcher, use_threads
     from agents.vision.run import encoder_of
     from agents.vnla.config import SCALES
     from agents.vnla.run import train_agent, vnla_data
@@ -97,7 +97,7 @@ def run_hari(args: argparse.Namespace) -> int:
     from agents.hari.agent import load_executor
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention, with_eyes
-    from agents.imitation.parallel import use_threads
+    from agents.common.parallel import use_threads
     from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
@@ -119,7 +119,7 @@ def run_hari(args: argparse.Namespace) -> int:
 def run_iliad(args: argparse.Namespace) -> int:
     """Teach a student to change words or to follow routes as a request says, by descriptions (ADEL), demonstrations or
     rewards."""
-    from agents.imitation.parallel import use_threads
+    from agents.common.parallel import use_threads
 
     use_threads(args.threads)
     return {"regex": run_regex, "nav": run_nav}[args.world](args)

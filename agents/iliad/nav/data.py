@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.hanna.vocabulary import build_vocabulary
+from agents.common.vocabulary import build_vocabulary
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.student import NavEyes
 from agents.iliad.nav.world import Trip, trips_of

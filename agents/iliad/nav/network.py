@@ -13,10 +13,10 @@ from torch import Tensor, nn
 
 from agents.hanna.attention import DotAttend, FeedForward, MultiAttend, SelfAttend, TextEncoder
 from agents.iliad.writing import Bridge, Remembered, Writer, before, write
-from agents.imitation.decoding import Choice
+from agents.common.decoding import Choice
 
 WORD_END = 2
-"""Of a request's words (agents.hanna.vocabulary)."""
+"""Of a request's words (agents.common.vocabulary)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
 from agents.iliad.nav.world import NavMarginal, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
-from agents.imitation.loop import Note
+from agents.common.session import Note
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import SeenPlace

@@ -10,11 +10,11 @@ import torch
 from torch import Tensor, nn
 
 from agents.hanna.percept import orientation
-from agents.hanna.vocabulary import Vocabulary
+from agents.common.vocabulary import Vocabulary
 from agents.iliad.nav.network import Follower, StepSeen
 from agents.iliad.nav.world import MOVES, NavWalk, Trip, walk_along, without_loops
 from agents.iliad.protocol import ExecutionScores
-from agents.imitation.decoding import Choice, drawn_with, likeliest
+from agents.common.decoding import Choice, drawn_with, likeliest
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.interface import Place, Pose, Sight

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.hanna.vocabulary import Vocabulary, build_vocabulary
+from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.iliad.regex.rules import ALPHABET, LETTERS, columns
 
 PAD, END = 0, 1
@@ -21,7 +21,7 @@ GAP = CHARACTERS
 LONGEST_REQUEST = 32
 """Words of a request that are read."""
 WORD_END = 2
-"""Of a request's words (agents.hanna.vocabulary); 0 is padding."""
+"""Of a request's words (agents.common.vocabulary); 0 is padding."""
 _NUMBERS = np.zeros(256, dtype=np.int64)
 _NUMBERS[np.frombuffer(ALPHABET.encode(), np.uint8)] = np.arange(2, CHARACTERS)
 _TEXT = np.array(["", "", *ALPHABET])

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD, WORD_END
 from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
-from agents.imitation.decoding import Choice
+from agents.common.decoding import Choice
 
 
 class Speller(nn.Module):

@@ -26,7 +26,7 @@ from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
 from agents.iliad.regex.words import read_words
 from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
 from agents.iliad.training import IliadProblem, train
-from agents.imitation.loop import Note
+from agents.common.session import Note
 from assets.cache import digest, write_json
 from embodied.seeds import stream
 

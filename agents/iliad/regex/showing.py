@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from agents.imitation.actor_critic import descend
+from agents.common.actor_critic import descend
 from embodied.seeds import stream
 
 if TYPE_CHECKING:

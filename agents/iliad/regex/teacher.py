@@ -15,7 +15,7 @@ from agents.iliad.regex.data import RegexData, WordTask, grammar_of, random_aske
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
 from agents.iliad.regex.world import Written
-from agents.imitation.decoding import drawn_with, likeliest
+from agents.common.decoding import drawn_with, likeliest
 
 _OWN_RULE = re.compile(r"\((\^?)\)\(([a-zCV.]{1,2})\)\((\$?)\)@((?:[a-z]|\\2){0,2})")
 Case = tuple[WordTask, Written, str]

@@ -14,7 +14,7 @@ from agents.iliad.regex.coding import PAD, Requests, characters, texts
 from agents.iliad.regex.data import WordTask
 from agents.iliad.regex.networks import Speller
 from agents.iliad.regex.rules import LONGEST, edit_distance, outputs
-from agents.imitation.decoding import Choice, drawn_with, likeliest
+from agents.common.decoding import Choice, drawn_with, likeliest
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import joblib
 
-from agents.imitation.loop import Note
+from agents.common.session import Note
 from assets.cache import digest, write_bytes
 from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import evaluate
@@ -75,7 +75,7 @@ def kept_episodes(
 
 
 def history_of(folder: Path) -> list[dict[str, Any]]:
-    """What a run of agents.imitation.runs found so far; nothing if it has not begun.
+    """What a run of agents.common.runs found so far; nothing if it has not begun.
 
     Raises:
       RecordError: result.json is damaged.

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from agents.failures import PLAINER, PRICED
+from agents.hanna.evaluation import PLAINER, PRICED
 
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "final": {},
@@ -58,7 +58,7 @@ class Line:
     variant: str
     """Key of VARIANTS, or '' for an agent that does not learn."""
     played: str = "learned"
-    """Which of agents.failures.hanna_policies, or the name of an agent without learning."""
+    """Which of agents.hanna.evaluation.hanna_policies, or the name of an agent without learning."""
     printed: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Column to the dissertation's numbers, one per split."""
 

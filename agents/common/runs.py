@@ -8,8 +8,8 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from agents.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
-from agents.imitation.loop import Note, Progress, Session
+from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
+from agents.common.session import Note, Progress, Session
 from assets.cache import write_json
 
 

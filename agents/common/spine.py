@@ -24,9 +24,9 @@ from typing import Protocol, TypeVar
 import torch
 from torch import Tensor, nn
 
-from agents.imitation import parallel
-from agents.imitation.lessons import Split
-from agents.imitation.loop import Clock, Note, Progress, TrainingError, as_good, dropout_of, falling_rate, stop_signal
+from agents.common import parallel
+from agents.common.lessons import Split
+from agents.common.session import Clock, Note, Progress, TrainingError, as_good, dropout_of, falling_rate, stop_signal
 from assets.cache import write_json
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

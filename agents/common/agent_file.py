@@ -10,7 +10,7 @@ from typing import Protocol
 
 from torch import Tensor, nn
 
-from agents.tensor_file import load_tensors, save_tensors
+from agents.common.tensor_file import load_tensors, save_tensors
 from embodied.records import from_plain, parse
 
 

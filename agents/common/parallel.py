@@ -13,7 +13,7 @@ from typing import TypeVar
 import torch
 import torch.distributed as dist
 
-from agents.device import check_device
+from agents.common.device import check_device
 
 T = TypeVar("T")
 

@@ -23,9 +23,9 @@ from typing import Any
 
 import torch
 
-from agents.device import check_device
-from agents.imitation.loop import Note
-from agents.imitation.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
+from agents.common.device import check_device
+from agents.common.session import Note
+from agents.common.studies import refuse_unknown, run_all, seeds_with, shown, table, write_markdown
 from agents.vision.config import WAYS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import Encoder, load_encoder
