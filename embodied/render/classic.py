@@ -147,6 +147,10 @@ class Renderer:
         self._choose(camera, size, True)
         return self._rgb(camera, size)
 
+    def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
+        return self._depth_and_ids(size, self._choose(camera, size, True))
+
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
@@ -162,8 +166,7 @@ class Renderer:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
         depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
         for k, camera in enumerate(face_cameras(position)):
-            drawn = self._choose(camera, (size, size), True)
-            depth[k], ids[k] = self._depth_and_ids((size, size), drawn)
+            depth[k], ids[k] = self.depth_and_ids(camera, (size, size))
         return depth, ids
 
     def close(self) -> None:

@@ -28,6 +28,7 @@ DEEPEST = 16
 FRAME = 0.02
 """Added above and below an opening, metres."""
 Point = tuple[float, float]
+Eye = tuple[float, float, float]
 
 
 class Sector(NamedTuple):
@@ -111,12 +112,7 @@ def visible_rooms(
 
 
 def _look(
-    portals: Portals,
-    eye: tuple[float, float, float],
-    room: str,
-    sector: Sector,
-    path: tuple[str, ...],
-    seen: dict[str, list[Sector]],
+    portals: Portals, eye: Eye, room: str, sector: Sector, path: tuple[str, ...], seen: dict[str, list[Sector]]
 ) -> bool:
     low, high, bottom, top = sector
     if any(s[0] <= low and high <= s[1] and s[2] <= bottom and top <= s[3] for s in seen.get(room, ())):
@@ -134,7 +130,7 @@ def _look(
     return all(_look(portals, eye, other, FULL, path, seen) for other in portals.stairs.get(room, ()))
 
 
-def _through(eye: tuple[float, float, float], portal: Passage, sector: Sector) -> list[Sector]:
+def _through(eye: Eye, portal: Passage, sector: Sector) -> list[Sector]:
     """The parts of `sector` that go out through `portal`; in plain numbers, which for so few are ten times as fast."""
     ax, ay = portal.a[0] - eye[0], portal.a[1] - eye[1]
     bx, by = portal.b[0] - eye[0], portal.b[1] - eye[1]
