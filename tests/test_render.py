@@ -181,7 +181,7 @@ def test_a_box_is_seen_in_every_sector_that_holds_a_point_of_it():
         holds = ((np.arctan2(y, x) - sector.low) % (2 * np.pi) <= 1.0) & (
             np.abs(z / np.hypot(x, y) - slope[k] - 0.25) < 0.25
         )
-        seen = spans.within([sector], np.arange(300))
+        seen = spans.within(np.tile(sector, (300, 1)), np.arange(300))
         assert seen[holds].all()
         missed += (~seen).sum()
     assert missed > 300 * 100, "most boxes lie elsewhere"

@@ -221,12 +221,15 @@ class Renderer:
         rooms = visibility.visible_rooms(self.house, self._portals, camera.position, towards)
         if rooms is None:
             return framed & self._is_visual
+        there = [
+            (s, g) for r, sectors in rooms.items() if (g := self._geoms_of_room.get(r)) is not None for s in sectors
+        ]
+        geoms = np.concatenate([g for _, g in there])
+        sectors = np.repeat([s for s, _ in there], [len(g) for _, g in there], axis=0)
         spans = visibility.spans_of(np.array(camera.position), self._middles, self._reaches)
         mask = np.zeros_like(framed)
-        for room, sectors in rooms.items():
-            g = self._geoms_of_room.get(room, np.zeros(0, int))
-            mask[g] |= framed[g] & spans.within(sectors, g)
-        return mask
+        mask[geoms[spans.within(sectors, geoms)]] = True
+        return mask & framed
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""

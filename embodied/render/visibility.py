@@ -189,14 +189,12 @@ class Spans:
     top: np.ndarray
     """Metres up per metre ahead."""
 
-    def within(self, sectors: Sequence[Sector], chosen: np.ndarray) -> np.ndarray:
-        """(k,) bool: which of the `chosen` (k,) boxes reach into one of the sectors."""
-        middle, half, bottom, top = (a[chosen] for a in (self.middle, self.half, self.bottom, self.top))
-        inside = np.zeros(len(chosen), bool)
-        for s in sectors:
-            off = np.abs((middle - (s.low + s.high) / 2 + np.pi) % TWO_PI - np.pi)
-            inside |= (off <= (s.high - s.low) / 2 + half + MARGIN) & (top >= s.bottom) & (bottom <= s.top)
-        return inside
+    def within(self, sectors: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """(k,) bool: which of the `chosen` (k,) boxes reach into their `sectors` (k, 4)."""
+        low, high, lowest, highest = sectors.T
+        off = np.abs((self.middle[chosen] - (low + high) / 2 + np.pi) % TWO_PI - np.pi)
+        beside = off <= (high - low) / 2 + self.half[chosen] + MARGIN
+        return beside & (self.top[chosen] >= lowest) & (self.bottom[chosen] <= highest)
 
 
 def spans_of(eye: np.ndarray, middles: np.ndarray, reaches: np.ndarray) -> Spans:
