@@ -224,6 +224,8 @@ class Renderer:
         there = [
             (s, g) for r, sectors in rooms.items() if (g := self._geoms_of_room.get(r)) is not None for s in sectors
         ]
+        if not there:
+            return np.zeros_like(framed)
         geoms = np.concatenate([g for _, g in there])
         sectors = np.repeat([s for s, _ in there], [len(g) for _, g in there], axis=0)
         spans = visibility.spans_of(np.array(camera.position), self._middles, self._reaches)
