@@ -37,10 +37,13 @@ def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
             size, name = (height, width), f"views of {width} x {height}"
             for shown, channels in SHOWN.items():
                 aim = {"rgb": colours, "rgb, depth and ids": everything}.get(shown)
-                yield _rate(f"{name}, {shown}", functools.partial(_look, panorama, channels, size, lambda k: k), aim)
+                yield _rate(
+                    f"{name}, {shown}",
+                    functools.partial(_look, panorama, channels, size, itertools.cycle(range(VIEWS))),
+                    aim,
+                )
             for shown in ("rgb", "rgb, depth and ids"):
-                fresh = itertools.count(VIEWS)
-                look = functools.partial(_look, panorama, SHOWN[shown], size, lambda k, fresh=fresh: next(fresh) + 0.5)
+                look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", look)
         write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
