@@ -54,10 +54,10 @@ def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Me
     return measure(name, body, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
 
 
-def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], number: Callable[[int], float]) -> None:
-    """VIEWS level views; `number` turns how many there were into how many steps of 30 degrees one looks to the left."""
-    for k in range(VIEWS):
-        grid = perspective_grid(panorama.size, number(k) * math.pi / 6, 0.0, VFOV36, *size)
+def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
+    """VIEWS level views, so many `turns` of 30 degrees to the left."""
+    for turn in itertools.islice(turns, VIEWS):
+        grid = perspective_grid(panorama.size, turn * math.pi / 6, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
 
