@@ -26,12 +26,12 @@ from agents.bandit.navigation import (
 from agents.bandit.navigation_study import NavigationSetting, gain, raters, rise, run_navigation_study, run_raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
+from agents.common.actor_critic import advantages
 from agents.common.checkpoint_file import CheckpointError, read_checkpoint
+from agents.common.lessons import Split
+from agents.common.vocabulary import build_vocabulary
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
 from agents.hanna.training_config import SCALES
-from agents.common.vocabulary import build_vocabulary
-from agents.common.actor_critic import advantages
-from agents.common.lessons import Split
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hand_data import build, small_house
 
-from agents.vision.study import EncoderStudySetting, run_study
 from agents.vision.config import WAYS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import random_encoder, save_encoder
 from agents.vision.labels import HouseStrips
 from agents.vision.resnet import ARCHITECTURES
+from agents.vision.study import EncoderStudySetting, run_study
 from embodied.cli import learning, study
 from embodied.records import read_json
 

@@ -27,15 +27,15 @@ from agents.bandit.network import Translator
 from agents.bandit.store import load_translator, save_weights
 from agents.bandit.training import NumberedCorpus
 from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
+from agents.common.session import Progress
+from agents.common.tensor_file import save_tensors
+from agents.common.vocabulary import build_vocabulary
 from agents.hanna.agent import load_agent, new_agent, save_agent
 from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.training_config import SCALES
-from agents.common.vocabulary import build_vocabulary
 from agents.hari import agent as hari
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.words import FeatureWords
-from agents.common.session import Progress
-from agents.common.tensor_file import save_tensors
 from agents.vision.encoder import random_encoder
 from agents.vision.features import load_features, save_features
 from agents.vision.labels import HouseStrips

@@ -10,6 +10,7 @@ import pytest
 import torch
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
+from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint_file import CheckpointError
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
@@ -28,7 +29,6 @@ from agents.hari.pretraining import (
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, padded, percept
-from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant

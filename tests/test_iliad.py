@@ -11,12 +11,12 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.checkpoint_file import CheckpointError
+from agents.common.runs import Run
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, reinforce, reinforce_loss
 from agents.iliad.protocol import NOTHING, ExecutionScores
 from agents.iliad.training import IliadProblem, episodes_to, success_rate, train
-from agents.common.runs import Run
 from embodied.seeds import stream
 
 silent = lambda line: None

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.common.checkpoint_file import CheckpointError
+from agents.common.decoding import likeliest
 from agents.iliad.config import LearnerConfig
 from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
 from agents.iliad.regex.config import MARGINALS, RegexConfig
@@ -49,7 +50,6 @@ from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Wr
 from agents.iliad.study import IliadStudySetting, report, run_study
 from agents.iliad.subjects import RegexSubject
 from agents.iliad.training import IliadProblem, train
-from agents.common.decoding import likeliest
 from embodied.cli import main
 from embodied.seeds import stream
 

@@ -21,6 +21,11 @@ import torch.distributed as dist
 from hand_worlds import grid_world
 
 from agents.common.checkpoint_file import CheckpointError
+from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
+from agents.common.lessons import Split
+from agents.common.session import Clock, TrainingError, as_good, falling_rate, tasks_of_update
+from agents.common.spine import ADDED, NUMBERS
+from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
@@ -36,11 +41,6 @@ from agents.hanna.losses import (
 from agents.hanna.policy import for_training
 from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import SCALES, TrainingConfig
-from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
-from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
-from agents.common.lessons import Split
-from agents.common.session import Clock, TrainingError, as_good, falling_rate, tasks_of_update
-from agents.common.spine import ADDED, NUMBERS
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna

@@ -13,18 +13,18 @@ import pytest
 import torch
 from hand_data import build
 
-from agents.hanna import study as module
-from agents.hanna.evaluation import failures, hanna_policies, predictions, request_share
-from agents.hanna.agent import load_agent, new_agent
-from agents.hanna.run import run_train_hanna, train_agent, vocabulary_of
-from agents.hanna.training_config import SCALES
 from agents.common.lessons import Lessons, split_of
-from agents.hanna.judging import run_eval
 from agents.common.processor_time import ProcessorTime
+from agents.common.shipped import WEIGHTS
+from agents.hanna import study as module
+from agents.hanna.agent import load_agent, new_agent
+from agents.hanna.evaluation import failures, hanna_policies, predictions, request_share
+from agents.hanna.judging import run_eval
 from agents.hanna.realism import RealismSetting, rank_correlation
 from agents.hanna.realism import run_study as realism
-from agents.common.shipped import WEIGHTS
+from agents.hanna.run import run_train_hanna, train_agent, vocabulary_of
 from agents.hanna.study import StudySetting, run_study
+from agents.hanna.training_config import SCALES
 from agents.vision.config import PLAIN, WAYS
 from agents.vision.encoder import SHIPPED, load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features

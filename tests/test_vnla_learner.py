@@ -12,8 +12,8 @@ import torch
 from hand_vnla import TINY, lesson, split_under
 
 from agents.common.checkpoint_file import CheckpointError
-from agents.common.session import Clock, TrainingError
 from agents.common.playing import play_remembering
+from agents.common.session import Clock, TrainingError
 from agents.vision.bank import FeatureBank
 from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent
 from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER, VnlaSettings

@@ -20,15 +20,15 @@ from torch import Tensor, nn
 from agents.bandit.config import RUN_FORMAT
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
+from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.common.lessons import Split
+from agents.common.runs import Run
+from agents.common.session import Note, seed_of, tasks_of_update
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
-from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
-from agents.common.lessons import Split
-from agents.common.session import Note, seed_of, tasks_of_update
-from agents.common.runs import Run
 from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -14,11 +14,11 @@ from agents.bandit.figures import gains_figure
 from agents.bandit.navigation import fingerprint, learn_from_stars, score_of
 from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.bandit.ratings import CLEAN, Rater, rater_of
+from agents.common.lessons import Split, split_of
+from agents.common.studies import history_of
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
-from agents.common.lessons import Split, split_of
-from agents.common.studies import history_of
 from agents.vision.encoder import Encoder
 from assets.cache import write_bytes, write_json
 from embodied.datasets.store import dataset_of

@@ -30,8 +30,8 @@ from agents.bandit.translate import Numbered, batches, decode, greedy, numbered,
 from agents.bandit.words import BUILDERS, WordNumbers
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
 from agents.common.decoding import drawn_with
-from agents.common.session import Note
 from agents.common.runs import Run
+from agents.common.session import Note
 from embodied.locks import locked
 from embodied.seeds import stream
 

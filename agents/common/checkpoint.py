@@ -7,8 +7,8 @@ from pathlib import Path
 
 import torch
 
-from agents.common.checkpoint_file import CheckpointError, read_checkpoint, refuse_changes, write_checkpoint
 from agents.common.agent_file import TrainedAgent
+from agents.common.checkpoint_file import CheckpointError, read_checkpoint, refuse_changes, write_checkpoint
 from agents.common.session import Progress
 from agents.common.tensor_file import put
 from embodied.records import from_json, from_plain

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import torch
 
+from agents.common.agent_file import read_agent, refuse_features, write_agent
+from agents.common.choosing import choose_at
+from agents.common.shipped import SHIPPED_AGENT
+from agents.common.tensor_file import put
+from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
 from agents.hanna.training_config import TrainingConfig
-from agents.common.vocabulary import Vocabulary
-from agents.common.agent_file import read_agent, refuse_features, write_agent
-from agents.common.choosing import choose_at
-from agents.common.shipped import SHIPPED_AGENT
-from agents.common.tensor_file import put
 from agents.vision.bank import FeatureBank
 
 FORMAT, OLD_FORMAT = "embodied-agent-2", "embodied-agent-1"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import torch
 
-from agents.hanna.agent import HannaAgent
-from agents.hanna.training_config import JUDGED
 from agents.common.checkpoint import load_run, save_run
 from agents.common.session import Progress
 from agents.common.settings import MAY_CHANGE
+from agents.hanna.agent import HannaAgent
+from agents.hanna.training_config import JUDGED
 
 FORMAT = "embodied-checkpoint-1"
 

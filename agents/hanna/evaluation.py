@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from agents.common.choosing import choose_at
 from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_with
 from agents.hanna.policy import PerfectInterpretation
-from agents.common.choosing import choose_at
 from agents.vision.bank import FeatureBank
 from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
 from embodied.navigation.graph import nearest

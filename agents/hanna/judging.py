@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import torch
 
-from agents.hanna.evaluation import failures, hanna_policies, plainer_policies, predictions, request_share
-from agents.hanna.agent import load_agent
 from agents.common.lessons import split_of
+from agents.hanna.agent import load_agent
+from agents.hanna.evaluation import failures, hanna_policies, plainer_policies, predictions, request_share
 from agents.vision.config import Looked
 from agents.vision.drawn import pictures_of
 from agents.vision.run import encoder_of

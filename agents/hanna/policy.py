@@ -12,13 +12,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from agents.common.choosing import Chooser, choose_likeliest, choose_sampled
+from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
 from agents.hanna.trail import Trail, weigh, weigh_by_image
-from agents.common.vocabulary import Vocabulary
-from agents.common.choosing import Chooser, choose_likeliest, choose_sampled
 from agents.vision.bank import FeatureBank
 from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
 from embodied.teachers.shortest import shortest_action

@@ -20,10 +20,10 @@ import scipy.stats
 import torch
 
 from agents.common.figures import realism_figure
-from agents.hanna.agent import load_agent
 from agents.common.lessons import split_of
 from agents.common.session import Note
 from agents.common.studies import kept_episodes, table, write_markdown
+from agents.hanna.agent import load_agent
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import load_encoder

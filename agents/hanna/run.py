@@ -8,13 +8,13 @@ from pathlib import Path
 
 import torch
 
+from agents.common.lessons import Lessons
+from agents.common.parallel import join_launcher, one_voice
+from agents.common.session import Progress
+from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.hanna.training import train
 from agents.hanna.training_config import TrainingConfig
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.lessons import Lessons
-from agents.common.session import Progress
-from agents.common.parallel import join_launcher, one_voice
 from agents.vision.run import encoder_of
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import Episode

@@ -16,17 +16,17 @@ from typing import Any
 import joblib
 import torch
 
-from agents.hanna.evaluation import PRICED, hanna_policies, plainer_policies, priced_policies
 from agents.common.figures import conditions_figure, curves_figure, houses_figure, requests_curves, requests_figure
-from agents.hanna.agent import load_agent
-from agents.hanna.run import train_agent
-from agents.hanna.training_config import TrainingConfig
 from agents.common.lessons import Lessons, drawings, split_of
-from agents.common.studies import kept_episodes, refuse_unknown
-from agents.hanna.judging import about
 from agents.common.processor_time import ProcessorTime
-from agents.hanna.study_tables import COMPARED, PRICES, SHORTER, TABLES, TEST, VARIANTS, Line, Table
+from agents.common.studies import kept_episodes, refuse_unknown
 from agents.common.tables import side_by_side as beside
+from agents.hanna.agent import load_agent
+from agents.hanna.evaluation import PRICED, hanna_policies, plainer_policies, priced_policies
+from agents.hanna.judging import about
+from agents.hanna.run import train_agent
+from agents.hanna.study_tables import COMPARED, PRICES, SHORTER, TABLES, TEST, VARIANTS, Line, Table
+from agents.hanna.training_config import TrainingConfig
 from agents.vision.bank import FeatureBank
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder, load_encoder

@@ -11,8 +11,6 @@ import dataclasses
 import json
 from dataclasses import dataclass
 
-from agents.hanna.asking import RULES
-from agents.hanna.config import HannaSizes
 from agents.common.settings import (
     AT_LEAST_ONE,
     NOT_ALL,
@@ -23,6 +21,8 @@ from agents.common.settings import (
     require,
     require_word,
 )
+from agents.hanna.asking import RULES
+from agents.hanna.config import HannaSizes
 from embodied.records import from_json
 
 MODELS = ("hanna", "lstm")

@@ -12,11 +12,11 @@ import numpy as np
 import torch
 from torch import nn
 
+from agents.common.tensor_file import load_tensors, save_tensors
 from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.sight import Seeing
 from agents.hari.words import FeatureWords
-from agents.common.tensor_file import load_tensors, save_tensors
 from embodied.interface import FeatureSource, Sight
 from embodied.records import from_plain, parse
 

@@ -19,13 +19,13 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss, descend
 from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
+from agents.common.session import Note, Progress, Session, seed_of, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent
 from agents.hari.config import as_dict
 from agents.hari.networks import INTENTIONS, RecurrentHead
 from agents.hari.policy import Choice, policy_of
-from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss, descend
-from agents.common.session import Note, Progress, Session, seed_of, tasks_of_update
 from assets.cache import write_json
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import shaped_costs

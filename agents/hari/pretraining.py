@@ -23,12 +23,12 @@ import torch
 from torch import Tensor
 
 from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
+from agents.common.session import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig, as_dict
 from agents.hari.networks import Encoded
 from agents.hari.sight import hidden_channels
 from agents.hari.words import Inputs, collate, padded, percept
-from agents.common.session import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
 from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped

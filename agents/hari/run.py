@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from agents.common.session import Note, Progress
 from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
 from agents.hari.sight import eyes_of
 from agents.hari.words import feature_words
-from agents.common.session import Note, Progress
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules

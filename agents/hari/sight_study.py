@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from agents.common.session import Note
+from agents.common.studies import table, write_markdown
 from agents.hari.agent import Executor, load_executor
 from agents.hari.config import SEES
 from agents.hari.judging import TEST
 from agents.hari.rules import RULES, RuleAgent
 from agents.hari.run import hari_data, rules_of, train_execution, with_eyes
 from agents.hari.study_setting import HariStudySetting, estimates
-from agents.common.session import Note
-from agents.common.studies import table, write_markdown
 from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play

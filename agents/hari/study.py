@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from agents.common.session import Note
+from agents.common.studies import refuse_unknown, run_all, table, write_all, write_markdown
 from agents.hari.agent import load_agent, load_executor
 from agents.hari.figures import costs_figure, requests_figure, times_figure
 from agents.hari.judging import TEST, judge
@@ -23,8 +25,6 @@ from agents.hari.networks import INTENTIONS
 from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention, with_eyes
 from agents.hari.sight_study import KINDS, train_and_judge, write_sight
 from agents.hari.study_setting import HariStudySetting, estimates
-from agents.common.session import Note
-from agents.common.studies import refuse_unknown, run_all, table, write_all, write_markdown
 from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import as_json, save, shown
 from embodied.interface import Ask, Episode, Move

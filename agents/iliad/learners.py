@@ -14,8 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
 from agents.common.actor_critic import Decisions, actor_loss, descend
+from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
 
 
 @dataclass(frozen=True, eq=False)

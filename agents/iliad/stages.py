@@ -15,8 +15,8 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.actor_critic import descend
-from agents.common.session import Note, falling_rate
 from agents.common.runs import Run
+from agents.common.session import Note, falling_rate
 from embodied.locks import locked
 from embodied.seeds import stream
 

@@ -17,11 +17,6 @@ from pathlib import Path
 
 import torch
 
-from agents.iliad.config import LearnerConfig, folder_name
-from agents.iliad.figures import curves_figure, describer_figure
-from agents.iliad.regex.language import MANNERS
-from agents.iliad.subjects import Subject
-from agents.iliad.training import episodes_to
 from agents.common.session import Note
 from agents.common.studies import (
     beside,
@@ -34,6 +29,11 @@ from agents.common.studies import (
     write_all,
     write_markdown,
 )
+from agents.iliad.config import LearnerConfig, folder_name
+from agents.iliad.figures import curves_figure, describer_figure
+from agents.iliad.regex.language import MANNERS
+from agents.iliad.subjects import Subject
+from agents.iliad.training import episodes_to
 from assets.cache import write_json
 from embodied.evaluation.tables import Estimate, across_seeds
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, Self
 
+from agents.common.session import Note
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav import run as nav
 from agents.iliad.nav.config import NavConfig, nav_students_of
@@ -16,7 +17,6 @@ from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig, students_of
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import success_rate
-from agents.common.session import Note
 
 
 class Subject(Protocol):

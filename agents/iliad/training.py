@@ -10,11 +10,11 @@ from typing import Generic
 import numpy as np
 import torch
 
+from agents.common.runs import Run
+from agents.common.session import Note, falling_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
 from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
-from agents.common.session import Note, falling_rate, tasks_of_update
-from agents.common.runs import Run
 from embodied.locks import locked
 from embodied.seeds import stream
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import torch
 
-from agents.common.vocabulary import Vocabulary
 from agents.common.agent_file import read_agent, refuse_features, write_agent
 from agents.common.choosing import choose_at
 from agents.common.tensor_file import put
+from agents.common.vocabulary import Vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vnla.config import ASK_RULES, VnlaSettings
 from agents.vnla.network import VnlaNetwork

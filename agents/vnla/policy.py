@@ -15,8 +15,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.vocabulary import Vocabulary, tokenize
 from agents.common.choosing import Chooser, choose_likeliest, choose_sampled
+from agents.common.vocabulary import Vocabulary, tokenize
 from agents.vision.bank import FeatureBank
 from agents.vnla.network import (
     ASK,

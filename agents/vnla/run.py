@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.lessons import Lessons
-from agents.common.session import Progress
 from agents.common.parallel import one_voice
+from agents.common.session import Progress
+from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.vnla.agent import new_agent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from agents.vnla.training import train

@@ -18,9 +18,9 @@ from torch import Tensor
 from agents.common import parallel, spine
 from agents.common.checkpoint import load_run, save_run
 from agents.common.lessons import Split
-from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
 from agents.common.losses import negative_log_likelihood
 from agents.common.playing import play_remembering
+from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
 from agents.common.settings import MAY_CHANGE
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER

@@ -137,8 +137,8 @@ def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, .
 def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
-    from agents.hanna.evaluation import hanna_policies
     from agents.hanna.agent import load_agent
+    from agents.hanna.evaluation import hanna_policies
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas

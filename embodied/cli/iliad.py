@@ -82,9 +82,9 @@ def own_request(args: argparse.Namespace) -> int:
 
 def episodes(args: argparse.Namespace) -> int:
     """Episodes with the student's own teacher."""
+    from agents.common.shipped import SHIPPED_STUDENT
     from agents.iliad.regex.run import load_student, prepare
     from agents.iliad.regex.showing import lines_of, tell
-    from agents.common.shipped import SHIPPED_STUDENT
     from embodied.seeds import stream
 
     there = args.shared is not None and (args.student == SHIPPED_STUDENT or (args.shared / "data.json").exists())

@@ -108,11 +108,11 @@ def run_vnla(args: argparse.Namespace) -> int:
 
 def run_hari(args: argparse.Namespace) -> int:
     """Rows of Table 4.7 for one agent."""
+    from agents.common.parallel import use_threads
+    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_HARI
     from agents.hari.agent import load_agent
     from agents.hari.judging import COLUMNS, TEST, judge
     from agents.hari.run import with_eyes
-    from agents.common.parallel import use_threads
-    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_HARI
     from agents.vision.drawn import pictures_of
     from embodied.datasets.store import Dataset
 

@@ -14,12 +14,12 @@ from pathlib import Path
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import DECISIONS, RatingConfig
+from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.hanna.training_config import SCALES, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
 from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES

@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_hanna(args: argparse.Namespace) -> list[Path]:
-    from agents.hanna.training_config import SCALES
     from agents.hanna.study import StudySetting, run_study
+    from agents.hanna.training_config import SCALES
     from embodied.cli.options import chosen
 
     setting = StudySetting(
@@ -112,9 +112,9 @@ def by_name(files: Sequence[tuple[str, Path]]) -> dict[str, list[Path]]:
 
 
 def run_vision(args: argparse.Namespace) -> list[Path]:
-    from agents.vision.study import EncoderStudySetting, run_study
     from agents.vision.config import VisionConfig
     from agents.vision.drawn import StripSource
+    from agents.vision.study import EncoderStudySetting, run_study
     from embodied.cli.options import chosen
 
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights)

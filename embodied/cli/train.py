@@ -94,10 +94,10 @@ def run_vnla(args: argparse.Namespace) -> int:
 
 def run_hari(args: argparse.Namespace) -> int:
     """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
+    from agents.common.parallel import use_threads
     from agents.hari.agent import load_executor
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention, with_eyes
-    from agents.common.parallel import use_threads
     from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 

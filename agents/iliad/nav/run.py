@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.common.session import Note
 from agents.iliad.config import LearnerConfig, as_dict, folder_name
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import UNSEEN, NavData, nav_data
@@ -15,7 +16,6 @@ from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
 from agents.iliad.nav.world import NavMarginal, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
-from agents.common.session import Note
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.interface import SeenPlace

@@ -10,10 +10,10 @@ from itertools import groupby
 
 import torch
 
+from agents.common.actor_critic import descend
 from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
-from agents.common.actor_critic import descend
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, FollowRoute, Move, Reply, Stop, Task
 from embodied.seeds import stream

@@ -10,6 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from agents.common.decoding import likeliest
+from agents.common.session import Note
+from agents.common.tensor_file import load_tensors, put, save_tensors
 from agents.common.vocabulary import Vocabulary
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
@@ -20,9 +23,6 @@ from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
 from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.training import success_rate
 from agents.iliad.writing import log_likelihood
-from agents.common.decoding import likeliest
-from agents.common.session import Note
-from agents.common.tensor_file import load_tensors, put, save_tensors
 from embodied.seeds import stream
 
 WEIGHTS = ("embodied-nav-1",)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.common.session import Note
 from agents.iliad.config import LearnerConfig, as_dict, folder_name
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.regex.coding import Requests, request_words
@@ -26,7 +27,6 @@ from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
 from agents.iliad.regex.words import read_words
 from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
 from agents.iliad.training import IliadProblem, train
-from agents.common.session import Note
 from assets.cache import digest, write_json
 from embodied.seeds import stream
 

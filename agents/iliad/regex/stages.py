@@ -13,6 +13,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from agents.common.decoding import likeliest
+from agents.common.session import Note
+from agents.common.tensor_file import load_tensors, put, save_tensors
 from agents.common.vocabulary import Vocabulary
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import Requests, changes, characters, texts
@@ -22,9 +25,6 @@ from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import outputs
 from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.writing import log_likelihood
-from agents.common.decoding import likeliest
-from agents.common.session import Note
-from agents.common.tensor_file import load_tensors, put, save_tensors
 from embodied.seeds import stream
 
 WEIGHTS = ("embodied-regex-1",)
