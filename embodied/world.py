@@ -24,7 +24,7 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import TRACED, PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
@@ -82,6 +82,11 @@ class World:
     def owners(self) -> tuple[str, ...]:
         """Instance id i + 1 belongs to owners[i]."""
         return owners(self.house)
+
+    @functools.cached_property
+    def classes(self) -> tuple[str, ...]:
+        """The class of each instance id: `world.classes[view.ids[y, x]]` is what a pixel shows."""
+        return instance_classes(self.house)
 
     @functools.cached_property
     def _origin(self) -> dict[str, object]:
