@@ -247,6 +247,7 @@ def generate_house(
     Raises:
       HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
     """
+    catalogue = (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
         draft = Draft(seed, config, catalogue, first=first, stages=stages)
