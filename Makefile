@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test quick setup lint docs wheel clean
+.PHONY: help demo test quick setup lint docs wheels clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -11,7 +11,7 @@ help:
 	@echo 'make quick   the tests that take less than a minute together'
 	@echo 'make lint    ruff, its formatter, import-linter, mypy'
 	@echo 'make docs    API pages from the docstrings, in docs/api'
-	@echo 'make wheel   build the wheel into dist/'
+	@echo 'make wheels  build embodied-houses and embodied-houses-furniture into dist/'
 
 setup:
 	@PYTHON='$(PYTHON)' ./setup.sh
@@ -35,8 +35,9 @@ docs: setup
 	@.venv/bin/python -c 'import pdoc' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt -e '.[docs]'
 	@.venv/bin/python docs/build_api.py
 
-wheel: setup
-	@.venv/bin/python -m pip wheel -q --no-deps -w dist .
+wheels: setup
+	@.venv/bin/python packaging/furniture/collect.py
+	@.venv/bin/python -m pip wheel -q --no-deps -w dist . ./packaging/furniture
 
 clean:
 	rm -rf .venv build dist out docs/api *.egg-info

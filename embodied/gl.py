@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from embodied import software
 from embodied.errors import UnableError
 
 BACKENDS = ("egl", "osmesa")
@@ -40,7 +41,7 @@ ELSEWHERE = (
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
-    "or OSMesa (apt-get install libosmesa6) and set MUJOCO_GL=osmesa"
+    "or, without root on Linux x86-64, software OpenGL by pip: pip install embodied-houses[software]"
 )
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
 """Words by which a device name tells that no graphics hardware is used."""
@@ -78,6 +79,8 @@ def choose() -> str:
     backend = asked or _first_available()
     os.environ["MUJOCO_GL"] = backend
     os.environ["PYOPENGL_PLATFORM"] = backend
+    if backend == "osmesa":
+        software.bind_osmesa()
     return backend
 
 
@@ -97,7 +100,7 @@ def prepare() -> None:
 def _first_available() -> str:
     if _egl_works():
         return "egl"
-    if ctypes.util.find_library("OSMesa"):
+    if ctypes.util.find_library("OSMesa") or software.bundled("OSMesa"):
         return "osmesa"
     raise GLError(f"neither EGL nor OSMesa works here. {REMEDY}")
 

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from embodied.errors import UnableError
 from embodied.light import scalar
 from embodied.light.arrays import Array, RayScene
+from embodied.software import bundled
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -50,7 +51,7 @@ def find_llvm() -> str | None:
             version = re.search(r"libLLVM(?:[-.]so[-.]|[-.])?(?:so\.)?(\d+)", os.path.basename(path))
             if version and OLDEST_LLVM <= int(version[1]) < 40:
                 found.append((int(version[1]), path))
-    return max(found)[1] if found else ctypes.util.find_library("LLVM")
+    return max(found)[1] if found else ctypes.util.find_library("LLVM") or (str(bundled("LLVM") or "") or None)
 
 
 @functools.cache
