@@ -47,7 +47,7 @@ def parse(text: str | bytes, what: str = "a record") -> object:
             text, object_pairs_hook=_object, parse_constant=_no_number, parse_float=_finite, parse_int=_whole
         )
         _refuse_deep(value)
-        if ("\\u" if isinstance(text, str) else b"\\u") in text:  # half a pair of surrogates is no text
+        if "\\u" in (text if isinstance(text, str) else text.decode()):  # half a pair of surrogates is no text
             json.dumps(value, ensure_ascii=False).encode()
         return value
     except (ValueError, RecursionError) as e:

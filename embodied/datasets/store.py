@@ -91,6 +91,7 @@ class Dataset:
                 "run the command that began it once more, it goes on from there"
             )
         self.index = read_index(self.folder, self.config)
+        self._places: dict[str, StoredPlace] = {}
 
     @property
     def kind(self) -> str:
@@ -115,9 +116,13 @@ class Dataset:
         wanted = self._split(split)
         return tuple(u.name for u in units(self.scale) if u.group in wanted.all_groups)
 
-    @functools.cache  # noqa: B019 - a data set lives as long as its program
     def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
+        if name not in self._places:
+            self._places[name] = self._read_place(name)
+        return self._places[name]
+
+    def _read_place(self, name: str) -> StoredPlace:
         home = self.folder / "houses" / name
         for file in ("house.json", "connectivity.json"):
             self._content(name, file)
@@ -204,7 +209,7 @@ class Dataset:
             check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
             tasks += mine
         if self.kind == "vnla" and split != "train":
-            limits = self._vnla_limits()
+            limits = self._vnla_limits
             tasks = [self._with_limit(t, limits) for t in tasks]
         return tuple(tasks)
 
@@ -263,7 +268,7 @@ class Dataset:
                 return split
         raise DatasetError(f"unknown split {name!r}; {self.folder} has {list(self.splits)}")
 
-    @functools.cache  # noqa: B019 - as above
+    @functools.cached_property
     def _vnla_limits(self) -> dict[tuple[str, str], int]:
         lengths = [
             (*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon)
