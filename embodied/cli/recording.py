@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Iterator
 
 from embodied.cli.common import note
-from embodied.cli.options import file_to_write
+from embodied.cli.options import file_ending_in
 
 
 def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -19,7 +19,7 @@ def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> No
     group = parser.add_argument_group("recording")
     group.add_argument(
         "--rrd",
-        type=file_to_write,
+        type=file_ending_in(".rrd"),
         metavar="FILE",
         help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
     )

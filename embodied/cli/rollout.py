@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import LOOK_HELP, any_path, face, file_to_write, video_side, whole
+from embodied.cli.options import LOOK_HELP, face, file_ending_in, house_folder, video_side, whole
 from embodied.cli.recording import add_sinks, viewers_of
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
@@ -30,7 +30,7 @@ AGENTS = ("shortest", "random", "forward10")
 
 def add(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--house", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    where.add_argument("--house", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
     parser.add_argument(
@@ -41,7 +41,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument("--video", type=file_to_write, metavar="MP4", help="write what the agent sees as a video")
+    parser.add_argument(
+        "--video", type=file_ending_in(".mp4"), metavar="MP4", help="write what the agent sees as a video"
+    )
     parser.add_argument(
         "--video-size",
         type=video_side,

@@ -108,6 +108,9 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
       RecordError: a file that does not hold episodes.
     """
     folder, files = Path(folder), []
+    names = {Path(p): re.sub(r"\W+", "_", Path(p).stem) for p in episodes}
+    if twice := [str(p) for p, n in names.items() if list(names.values()).count(n) > 1]:
+        raise ValueError(f"{' and '.join(twice)} would become one table; give the files different names")
     for split in data.splits:
         names = data.names(split)
         files += [
@@ -126,8 +129,7 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
                     (route_row(r, n) for n in names for r in data.routes(n)),
                 )
             )
-    for path in episodes:
-        name = re.sub(r"\W+", "_", Path(path).stem)
+    for path, name in names.items():
         files.append(
             _write(folder / "episodes" / f"{name}.parquet", EPISODES, map(episode_row, load_lines(Path(path), Episode)))
         )
