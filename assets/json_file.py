@@ -160,6 +160,8 @@ def _hints(kind: type) -> dict[str, object]:
 
 def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
     origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if kind in (object, typing.Any):
+        return value
     if origin in (types.UnionType, typing.Union):
         return _build_choice(args, value, where)
     if origin is tuple:

@@ -14,15 +14,17 @@ Tasks and people are in embodied.interface; read it first when you write an agen
 
 Each name is imported when it is first used, so that `import embodied` costs nothing; and off-screen
 OpenGL is chosen before mujoco is imported, whichever name comes first. The Gymnasium environments
-embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0 are registered by `import embodied`; Gymnasium
+embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0 and Drive-v0 are registered by `import embodied`; Gymnasium
 itself is not imported for that (embodied.gym.registration).
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 from typing import TYPE_CHECKING
 
+from embodied.distribution import DISTRIBUTION
 from embodied.gym.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
@@ -70,6 +72,8 @@ HOMES = {
 
 def __getattr__(name: str) -> object:
     """A public name, imported on first use (PEP 562)."""
+    if name == "__version__":
+        return importlib.metadata.version(DISTRIBUTION)
     if name not in HOMES:
         raise AttributeError(f"module 'embodied' has no attribute {name!r}; it offers {__all__}")
     value = globals()[name] = getattr(importlib.import_module(HOMES[name]), name)

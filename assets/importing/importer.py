@@ -8,7 +8,6 @@ Sweet Home 3D does itself. The asset frame (assets.records.MeshPart) is (x, -z, 
 from __future__ import annotations
 
 import io
-import json
 import struct
 import warnings
 import zipfile
@@ -27,6 +26,7 @@ from assets.importing.mtl_finish import corrected, finish_of
 from assets.importing.obj import MeshError, MtlMaterial, libraries, parse_mtl, parse_obj
 from assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from assets.importing.sh3f import Pack, PackError
+from assets.json_file import read_json
 from assets.records import Finish, ImportRecipe, MeshPart, bounds
 
 READER = "assets.importing.own"
@@ -312,7 +312,7 @@ def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | Non
 def _load(folder: Path, stem: str) -> tuple[MeshPart, ...] | None:
     """The cached parts, or None where a file is missing or does not match its checksum."""
     try:
-        manifest = json.loads((folder / f"{stem}.json").read_text())
+        manifest = read_json(folder / f"{stem}.json")
         files = {name: (folder / name).read_bytes() for name in manifest["sha256"]}
         if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
             return None

@@ -187,6 +187,8 @@ def run_lerobot(args: argparse.Namespace) -> int:
     data = Dataset(args.data)
     if args.episodes:
         episodes = [e for path in args.episodes for e in load_lines(path, Episode)]
+        for episode in episodes:
+            data.place_of(episode)
     else:
         whole_split = data.split(args.split)
         expert = agent(data.kind, "shortest")

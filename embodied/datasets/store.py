@@ -13,6 +13,7 @@ from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import missing_units, units
 from embodied.datasets.checks import (
     DatasetError,
+    check_episode,
     check_place,
     check_routes,
     check_tasks,
@@ -25,7 +26,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
-from embodied.interface import FindObject, Language, Place, Route, Task
+from embodied.interface import Episode, FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import RecordError, from_plain, read_lines
 from embodied.render.pictures import PictureSettings
@@ -121,6 +122,20 @@ class Dataset:
         if name not in self._places:
             self._places[name] = self._read_place(name)
         return self._places[name]
+
+    def place_of(self, episode: Episode) -> StoredPlace:
+        """The house in which an episode was played.
+
+        Raises:
+          DatasetError: it was played elsewhere.
+        """
+        name = episode.task.world
+        if f"{name}/house.json" not in self.index.files:
+            raise DatasetError(
+                f"{self.folder} has no house {name!r}, where {episode.task.id!r} was played; give its own data set"
+            )
+        check_episode(episode, self.place(name))
+        return self.place(name)
 
     def _read_place(self, name: str) -> StoredPlace:
         home = self.folder / "houses" / name

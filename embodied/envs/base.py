@@ -158,7 +158,13 @@ class HelpEnv:
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
         return Episode(
-            task=self.task, steps=tuple(self._steps), ended=self.ended, seed=self.seed, agent=agent, budget=self.budget
+            task=self.task,
+            steps=tuple(self._steps),
+            ended=self.ended,
+            seed=self.seed,
+            agent=agent,
+            budget=self.budget,
+            house=self.world.house.digest[:16],
         )
 
     # What a rule with help overrides -------------------------------------------------------------

@@ -7,12 +7,13 @@ first row is the `ix` of the format, which counts excluded viewpoints too.
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from embodied.navigation.graph import read_viewpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,16 +127,9 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
 
 def _read(path: Path) -> list[dict]:
     try:
-        text = path.read_text(encoding="utf-8")
+        return read_viewpoints(path)
     except OSError as e:
         raise ValueError(f"MatterSim: Could not open navigation graph file: {path}, is path valid?") from e
-    try:
-        items = json.loads(text)
-        if all(len(i["pose"]) == 16 and len(i["unobstructed"]) == len(items) and "included" in i for i in items):
-            return items
-    except (ValueError, KeyError, TypeError) as e:
-        raise ValueError(f"{path} is not a connectivity file ({e!r}); write one with `embodied export`") from e
-    raise ValueError(f"{path}: every viewpoint needs 16 numbers of pose and {len(items)} of 'unobstructed'")
 
 
 def _padded(rows: Sequence[Sequence[int]]) -> np.ndarray:

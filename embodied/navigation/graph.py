@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -16,6 +17,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
+from assets.json_file import RecordError, parse_file, shown
 from embodied.house.house import DOORS, House, HouseError, Room
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
@@ -438,16 +440,7 @@ def from_matterport(path: Path) -> NavGraph:
     Raises:
       HouseError: not such a file, an asymmetric matrix, viewpoints of one name, or a graph in several pieces.
     """
-    try:
-        items = json.loads(Path(path).read_bytes())
-        wrong = [k for k, i in enumerate(items) if not _is_viewpoint(i, len(items))]
-    except (ValueError, TypeError, RecursionError) as e:
-        raise HouseError(f"{path} is not a Matterport connectivity file ({e!r}); write one with to_matterport") from e
-    if wrong:
-        raise HouseError(
-            f"{path} is not a Matterport connectivity file: viewpoint {wrong[0]} should have an image_id, a pose of 16 "
-            f"finite numbers, 'included', and {len(items)} booleans 'unobstructed'; write one with to_matterport"
-        )
+    items = read_viewpoints(path)
     keep = [k for k, i in enumerate(items) if i["included"]]
     ids = tuple(items[k]["image_id"] for k in keep)
     if not keep or len(set(ids)) < len(ids):
@@ -458,6 +451,26 @@ def from_matterport(path: Path) -> NavGraph:
         raise HouseError(f"{path}: 'unobstructed' should be symmetric")
     edges = np.argwhere(np.triu(matrix, 1))
     return graph_of(positions, edges, ids, tuple(items[k].get("room", "") for k in keep))
+
+
+def read_viewpoints(path: Path) -> list[dict[str, Any]]:
+    """The viewpoints of a connectivity file, each checked.
+
+    Raises:
+      HouseError: not such a file.
+    """
+    try:
+        items = parse_file(path, "viewpoints")
+    except RecordError as e:
+        raise HouseError(f"{e}; it is no Matterport connectivity file, write one with to_matterport") from e
+    if not isinstance(items, list):
+        raise HouseError(f"{path} is not a Matterport connectivity file: it should be a list, got {shown(items)}")
+    if wrong := [k for k, i in enumerate(items) if not _is_viewpoint(i, len(items))]:
+        raise HouseError(
+            f"{path} is not a Matterport connectivity file: viewpoint {wrong[0]} should have an image_id, a pose of 16 "
+            f"finite numbers, 'included', and {len(items)} booleans 'unobstructed'; write one with to_matterport"
+        )
+    return items
 
 
 def _is_viewpoint(item: object, count: int) -> bool:

@@ -28,6 +28,8 @@ FACES = (
 """Forward and up direction of every face, world."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
+MOST_TURNS = 4 * math.pi
+"""Largest angle that is taken for radians; larger ones are most often degrees."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -190,6 +192,8 @@ class Pad:
 
 @functools.lru_cache(maxsize=96)
 def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> PixelGrid:
+    if not (abs(yaw) <= MOST_TURNS and abs(pitch) <= math.pi):
+        raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
     """The grid of an upright perspective picture on faces of side `s`."""
     return _grid(s, *_pinhole_rays(yaw, pitch, vfov, height, width))
 
