@@ -183,6 +183,10 @@ class House:
     disorder: float = 0.4
     """0 is tidy, 1 is thoroughly lived in."""
 
+    def __repr__(self) -> str:
+        rooms, things = len(self.rooms), len(self.placements)
+        return f"<House {self.name!r}: {rooms} rooms, {self.area:.0f} m2, {things} objects, seed {self.seed}>"
+
     @functools.cached_property
     def digest(self) -> str:
         """Hex SHA-256 of the canonical JSON: two houses with one digest are the same house."""
