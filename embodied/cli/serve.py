@@ -78,9 +78,7 @@ def run(args: argparse.Namespace) -> int:
     links = opened.links(address, args.invitations or 0)
     write_secret(out / "links.json", json.dumps(links, indent=1))
     if args.host not in (LOOPBACK, "localhost", "::1"):
-        note(
-            f"listening on {args.host}: everybody who reaches this machine can connect; without TLS, answers can be read"
-        )
+        note(f"listening on {args.host}: everybody who reaches this machine can connect; without TLS, answers can be read")
     few = {k: v if len(v) <= 3 else [*v[:3], f"... {len(v)} in {out / 'links.json'}"] for k, v in links.items() if v}
     show(args, links, "\n".join(f"{name}: {link}" for name, many in few.items() for link in many))
     import sys

@@ -202,9 +202,6 @@ class House:
         """The placements by their ids."""
         return {p.id: p for p in self.placements}
 
-    def __repr__(self) -> str:
-        return f"House({self.name!r}, {len(self.rooms)} rooms, {len(self.placements)} objects, {self.digest[:16]})"
-
     def storey_of(self, room: Room) -> Storey:
         """The storey that a room is on."""
         return self.storeys[room.storey]

@@ -134,7 +134,8 @@ class PanoramaFile:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
         if picture is None or picture.shape[:2] != (self.size, 6 * self.size):
             raise PanoramaFileError(
-                f"{self.path}: the {channel} of node {node} is no picture of its size; delete the file to have it made anew"
+                f"{self.path}: the {channel} of node {node} is no picture of its size; "
+                "delete the file, it is made again"
             )
         return picture
 

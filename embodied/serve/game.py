@@ -153,10 +153,7 @@ class Game:
     @property
     def episode(self) -> Episode:
         """The finished episode, with the seconds of its steps."""
-        names = [
-            self.people.get("agent", self.table.part.agent),
-            self.people.get("assistant", self.table.part.assistant),
-        ]
+        names = [self.people.get("agent", self.table.part.agent), self.people.get("assistant", self.table.part.assistant)]
         return dataclasses.replace(self.env.episode(" with ".join(names)), steps=tuple(self._steps))
 
     @property

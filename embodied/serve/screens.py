@@ -62,11 +62,7 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     """What both roles see."""
     world = game.task.world
     said = [
-        {
-            "who": s["who"],
-            "text": s["text"],
-            "pano": None if s["picture"] is None else pictures.name(world, s["picture"]),
-        }
+        {"who": s["who"], "text": s["text"], "pano": None if s["picture"] is None else pictures.name(world, s["picture"])}
         for s in game.said
     ]
     return {
