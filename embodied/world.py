@@ -19,12 +19,13 @@ from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.interface import Sight, Sighting
 from embodied.navigation.graph import NavGraph, build_graph
+from embodied.navigation.poses import FreePoses
 from embodied.render.classic import Renderer
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import TRACED, PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, classes, house_parts, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
@@ -83,6 +84,25 @@ class World:
     def owners(self) -> tuple[str, ...]:
         """Instance id i + 1 belongs to owners[i]."""
         return owners(self.house)
+
+    @functools.cached_property
+    def classes(self) -> tuple[str, ...]:
+        """What each instance id is: 'sofa', 'wall', 'door'; '' for 0. `np.array(world.classes)[view.ids]` names pixels.
+        """
+        return classes(self.house)
+
+    @functools.cached_property
+    def _poses(self) -> FreePoses:
+        return FreePoses(self.house, self.graph)
+
+    def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
+        """Whether the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        return self._poses.is_free(position)
+
+    def random_pose(self, *, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+        """(3,) of an eye, metres, and yaw, radians, drawn evenly over the floor where the agent can stand:
+        `world.renderer.view(*world.random_pose(rng=rng))` is a picture from there."""
+        return self._poses.draw(rng=rng)
 
     @functools.cached_property
     def _origin(self) -> dict[str, object]:

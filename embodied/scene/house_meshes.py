@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import typing
 
 from assets.records import Finish, MeshPart
@@ -9,7 +10,7 @@ from embodied.house.house import House
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts
 
-__all__ = ["Meshes", "Part", "house_parts", "owners"]
+__all__ = ["Meshes", "Part", "classes", "house_parts", "owners"]
 
 
 class Meshes(typing.Protocol):
@@ -43,3 +44,17 @@ def owners(house: House) -> tuple[str, ...]:
     Placements come first, in the house's order, then the shell.
     """
     return tuple(p.id for p in house.placements) + shell_owners(house)
+
+
+def classes(house: House) -> tuple[str, ...]:
+    """What each instance id is, '' for 0: `np.array(classes(house))[view.ids]` names every pixel.
+
+    Placements have their object class, openings their kind ('door', 'window'), stairs 'stairs', and the rest of the
+    house what it is: 'wall', 'floor', 'ceiling', 'skirting', 'roof', 'ground' and so on.
+    """
+    kinds = {o.id: o.kind.replace("_", " ") for o in house.openings} | {s.id: "stairs" for s in house.stairs}
+    names = []
+    for owner in owners(house)[len(house.placements) :]:
+        whole, _, part = owner.partition("/")
+        names.append(kinds.get(whole) or re.sub(r"_\d+$", "", part or whole))
+    return ("", *(p.object_class for p in house.placements), *names)
