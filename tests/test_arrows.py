@@ -73,7 +73,7 @@ embodied.records <- embodied.interface
 embodied.render <- embodied.gl assets.catalogue assets.materials embodied.house embodied.navigation embodied.scene
     embodied.interface
 embodied.light <- assets.catalogue embodied.house embodied.scene embodied.render
-embodied.mattersim <- embodied.render
+embodied.mattersim <- embodied.navigation embodied.render
 embodied.teachers <- embodied.navigation embodied.interface embodied.action_spaces
 embodied.policies <- embodied.interface embodied.action_spaces embodied.language embodied.teachers
 embodied.tasks <- embodied.house embodied.interface embodied.teachers
