@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import binascii
 import io
-import json
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from assets.importing.meshing import face_normals
 from assets.importing.obj import FARTHEST, MAX_FACES, MeshError
 from assets.importing.sh3f import MAX_ENTRY
 from assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
+from assets.json_file import parse, shown
 from assets.records import Finish
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -88,7 +88,9 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     length, kind = struct.unpack_from("<II", data, 12)
     if magic != b"glTF" or version != 2 or kind != JSON_CHUNK or 20 + length > len(data):
         raise ValueError("the file does not begin as glTF 2.0 does")
-    header = json.loads(data[20 : 20 + length].decode("utf-8"))
+    header = parse(data[20 : 20 + length], "a header")
+    if not isinstance(header, dict):
+        raise ValueError(f"its header should be an object, got {shown(header)}")
     start = 20 + length + (-length) % 4
     if start + 8 > len(data):
         return header, b""

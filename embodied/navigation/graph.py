@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from assets.cache import write_bytes
+from assets.json_file import RecordError, parse_file, shown
 from embodied.house.house import DOORS, House, HouseError, Room
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
@@ -485,13 +486,12 @@ def viewpoints_of(path: Path) -> list[dict[str, Any]]:
       HouseError: not such a file; says which viewpoint is not one.
     """
     try:
-        items = json.loads(Path(path).read_bytes())
-        if not isinstance(items, list) or not items:
-            raise TypeError("not a list of viewpoints")
-        wrong = next((k for k, i in enumerate(items) if not _is_viewpoint(i, len(items))), None)
-    except (ValueError, TypeError, RecursionError) as e:
-        why = "it is nested too deeply" if isinstance(e, RecursionError) else repr(e)
-        raise HouseError(f"{path} is not a Matterport connectivity file ({why}); write one with to_matterport") from e
+        items = parse_file(path, "a Matterport connectivity file")
+    except RecordError as e:
+        raise HouseError(f"{e}; write one with to_matterport") from e
+    if not isinstance(items, list) or not items:
+        raise HouseError(f"{path} should hold a list of viewpoints, got {shown(items)}; write one with to_matterport")
+    wrong = next((k for k, i in enumerate(items) if not _is_viewpoint(i, len(items))), None)
     if wrong is not None:
         raise HouseError(
             f"{path} is not a Matterport connectivity file: viewpoint {_named(items, wrong)} should have an image_id, "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import typing
 
 from assets.records import Finish, MeshPart
@@ -10,7 +9,7 @@ from embodied.house.house import House
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts
 
-__all__ = ["Meshes", "Part", "classes", "house_parts", "owners"]
+__all__ = ["Meshes", "Part", "house_parts", "instance_classes", "owners"]
 
 
 class Meshes(typing.Protocol):
@@ -46,15 +45,14 @@ def owners(house: House) -> tuple[str, ...]:
     return tuple(p.id for p in house.placements) + shell_owners(house)
 
 
-def classes(house: House) -> tuple[str, ...]:
-    """What each instance id is, '' for 0: `np.array(classes(house))[view.ids]` names every pixel.
+def instance_classes(house: House) -> tuple[str, ...]:
+    """The class of each instance id: 'nothing' (0), the furniture's classes, then 'floor', 'wall', 'door', ..."""
+    kinds = {opening.id: opening.kind for opening in house.openings}
 
-    Placements have their object class, openings their kind ('door', 'window'), stairs 'stairs', and the rest of the
-    house what it is: 'wall', 'floor', 'ceiling', 'skirting', 'roof', 'ground' and so on.
-    """
-    kinds = {o.id: o.kind.replace("_", " ") for o in house.openings} | {s.id: "stairs" for s in house.stairs}
-    names = []
-    for owner in owners(house)[len(house.placements) :]:
-        whole, _, part = owner.partition("/")
-        names.append(kinds.get(whole) or re.sub(r"_\d+$", "", part or whole))
-    return ("", *(p.object_class for p in house.placements), *names)
+    def of_shell(owner: str) -> str:
+        whole, _, piece = owner.rpartition("/")
+        if whole == "outdoor":
+            return "outdoors"
+        return kinds.get(whole) or piece.partition("_")[0]
+
+    return ("nothing", *(p.object_class for p in house.placements), *map(of_shell, shell_owners(house)))
