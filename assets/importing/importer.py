@@ -92,14 +92,14 @@ def import_model(pack: Pack, recipe: ImportRecipe, cache: Path, obj: str | None 
     the cache if it is there and sound."""
     obj = obj or pack.entries[recipe.model or recipe.key].model
     read = functools.partial(read_obj, pack.read, obj, f"{pack.path.name}: {obj}")
-    return cached(recipe, pack.digest, cache, lambda tell: read())  # the packs are reviewed: nothing is told
+    return cached(recipe, pack.digest, cache, lambda tell: read(), quiet=True)  # the packs are reviewed
 
 
 def cached(
-    recipe: ImportRecipe, source: str, cache: Path, read: Callable[[Tell], tuple[RawPart, ...]]
+    recipe: ImportRecipe, source: str, cache: Path, read: Callable[[Tell], tuple[RawPart, ...]], *, quiet: bool = False
 ) -> tuple[MeshPart, ...]:
     """The finished parts of `recipe`; `read` and the import run only when the cache lacks them. What they tell is
-    logged each time.
+    logged each time, unless `quiet`.
 
     Args:
       source: digest of the pack or file that `read` reads.
@@ -115,7 +115,7 @@ def cached(
         parts = _load(folder, stem)
     if parts is None:
         raise PackError(f"{folder / stem} cannot be read back after writing; check the disk and delete {folder}")
-    for words in parts[1]:
+    for words in () if quiet else parts[1]:
         log.warning("model %s: %s", recipe.key, words)
     return parts[0]
 
