@@ -57,6 +57,14 @@ def test_a_panorama_from_the_file_is_the_one_that_was_drawn(world):
     assert error.mean() < 1.25 and np.square(error).mean() < 255**2 / 10**4, "40 dB; files are JPEG of quality 90"
 
 
+def test_a_camera_at_a_node_sees_a_face_of_its_panorama(world):
+    face, size = world.panorama(0), (world.pictures.size,) * 2
+    view = world.camera(world.graph.positions[0], math.pi / 2, 0.0, math.pi / 2, size)
+    np.testing.assert_array_equal(view.ids, face.ids[1])
+    np.testing.assert_array_equal(view.depth, face.depth[1])
+    assert np.abs(view.rgb.astype(int) - face.rgb[1]).max() <= 2
+
+
 def test_sightings_agree_with_the_panorama(world, house):
     seen = {s.placement: s for s in world.sightings(0)}
     assert {"red_box_1", "flag_1", "table_1", "mug_1"} <= set(seen)
