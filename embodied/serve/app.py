@@ -332,7 +332,7 @@ class Server:
             self._plans[name] = plan_of(self._houses[name], self.pictures)
         socket = self._sockets.get(person.id)
         if socket is not None:
-            await socket.send_text(json.dumps({"house": self._plans[name]}))
+            await socket.send_text(json.dumps({"plan": self._plans[name]}))
 
     async def _admin(self, socket: WebSocket, word: str) -> None:
         if not hmac.compare_digest(word.encode(), self.token("results").encode()):

@@ -103,12 +103,13 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
 
 def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> list[Screen]:
     """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
-    c = seen.candidates
+    c, at = seen.candidates, situation.world.graph.positions
     return [
         {
             "candidate": i,
             "yaw": round(float(situation.pose.yaw + c.bearing[i]), 4),
             "pitch": round(float(c.slope[i]), 4),
+            "distance": round(float(np.linalg.norm(at[node] - at[situation.pose.node])), 2),
             "pano": pictures.name(situation.task.world, node),
         }
         for i, node in enumerate(situation.candidate_nodes)
