@@ -166,7 +166,9 @@ class Server:
             except Exception as e:  # of anybody's policy or assistant: the episode ends, the study goes on
                 log.exception("the machine of game %s failed", game.id)
                 if not game.over and not self.failed:
-                    await self.happen(Event("broken", time.time(), body={"game": game.id, "why": f"machine: {e!r:.200}"}))
+                    await self.happen(
+                        Event("broken", time.time(), body={"game": game.id, "why": f"machine: {e!r:.200}"})
+                    )
             for person in people:
                 await self.show(person)
 
@@ -220,7 +222,9 @@ class Server:
         person.connected = 1
         if older is not None:
             with suppress(RuntimeError, WebSocketDisconnect):
-                await older.send_text(json.dumps({"screen": "refused", "text": "This study is open in another window."}))
+                await older.send_text(
+                    json.dumps({"screen": "refused", "text": "This study is open in another window."})
+                )
                 await older.close(4409)
         await socket.send_text(json.dumps({"token": token}))
         await self.settle(person)

@@ -104,7 +104,7 @@ def agreement(ratings: Iterable[tuple[str, float]]) -> float | None:
 
 def summary(sessions: Sessions, now: float) -> dict[str, Any]:
     """The figures of a study so far."""
-    people = [p for p in sessions.people.values()]
+    people = list(sessions.people.values())
     ends = Counter(p.ended for p in people)
     active = sum(p.connected > 0 and p.ended is None for p in people)
     away = sum(p.connected == 0 and p.ended is None for p in people)

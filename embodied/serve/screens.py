@@ -61,10 +61,8 @@ def coming(sessions: Sessions, person: Person) -> Screen:
 def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     """What both roles see."""
     world = game.task.world
-    said = [
-        {"who": s["who"], "text": s["text"], "pano": None if s["picture"] is None else pictures.name(world, s["picture"])}
-        for s in game.said
-    ]
+    shown = lambda node: None if node is None else pictures.name(world, node)
+    said = [{"who": s["who"], "text": s["text"], "pano": shown(s["picture"])} for s in game.said]
     return {
         "screen": role,
         "game": game.id,

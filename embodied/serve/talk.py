@@ -148,4 +148,3 @@ def loaded(name: str) -> Any:
         return getattr(importlib.import_module(module), attribute)()
     except (ImportError, AttributeError, TypeError) as e:
         raise ValueError(f"{name!r} should name a module and a class without arguments, 'module:Class' ({e})") from e
-
