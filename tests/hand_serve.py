@@ -13,7 +13,7 @@ import time
 import uuid
 from pathlib import Path
 
-from hand_data import build, paint
+from hand_data import build, paint, small_house
 from websockets.sync.client import connect
 
 from embodied.render.pictures import PictureSettings
@@ -25,7 +25,7 @@ TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 
 def make_data(folder: Path, cache: Path, kind: str = "hanna"):
     """A data set with small painted panoramas in folder/data."""
-    data = build(folder / "data", cache, kind)
+    data = build(folder / "data", cache, kind, make_house=small_house)
     paint(data, PictureSettings(size=32))
     return data
 

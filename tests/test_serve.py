@@ -126,8 +126,9 @@ def test_the_state_after_a_restart_is_that_before(data):
     again = Script(data, (data.folder.parent / "study.toml").read_text().removeprefix(HEAD))
     for event in play.log:
         again.sessions.apply(Event(**json.loads(json.dumps(dataclasses.asdict(event)))))
+    for person in again.sessions.people.values():
+        person.connected = 1
     for name in ("eve", "bob"):
-        again.sessions.people[name].connected = 1
         assert again.screen(name) == play.screen(name)
     assert summary(again.sessions, 0.0)["parts"] == summary(play.sessions, 0.0)["parts"]
 
