@@ -85,7 +85,8 @@ class Human:
     def enter(self) -> None:
         """Connect, as at first or again."""
         address = f"ws://127.0.0.1:{self.server.port}/ws"
-        self.socket = connect(address, origin=self.server.address, max_size=None)
+        self.stack = contextlib.ExitStack()
+        self.socket = self.stack.enter_context(connect(address, origin=self.server.address, max_size=None))
         self.socket.send(json.dumps({"token": self.token} if self.token else self.hello))
         self.read(lambda m: m.get("screen"))
 
@@ -117,7 +118,7 @@ class Human:
         return self.say(do, game=self.screen["game"], turn=self.screen["turn"], **more)
 
     def close(self) -> None:
-        self.socket.close()
+        self.stack.close()
 
 
 def pair(server: Served) -> tuple[Human, Human]:

@@ -9,7 +9,8 @@ view of each is, to it, from the path tracer's (--quality, --look, --no-traced; 
 where it was stopped). Close other programs first: the numbers are only as good
 as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features
 in OUT/freeze and writes their digests; with --against it says of every part whether it is the same as in a
-file of them (docs/freeze.json), or differs and why that is meant.
+file of them (docs/freeze.json), or differs and why that is meant. serve lets --people take part in a study at
+once for --seconds, in pairs, and prints how long a step takes from the browser to the disk and back.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ PARTS = (
     "codecs",
     "look",
     "freeze",
+    "serve",
 )
 
 
@@ -69,6 +71,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against", type=any_path, metavar="FILE", help="digests that freeze compares with (its digests.json)"
     )
+    parser.add_argument("--people", type=whole(2), default=50, help="who take part at once, for serve (default: 50)")
+    parser.add_argument("--seconds", type=whole(), default=60, help="how long, for serve (default: 60)")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -89,6 +93,8 @@ def run(args: argparse.Namespace) -> int:
         return growth(args, catalogue)
     if "look" in parts:
         return look(args, catalogue)
+    if "serve" in parts:
+        return serve(args)
     if "freeze" in parts:
         return freeze(args, catalogue)
     lines = {
@@ -158,6 +164,15 @@ def growth(args: argparse.Namespace, catalogue: Catalogue) -> int:
     quality = args.quality if args.quality in QUALITIES else "fast"
     facts = measured(catalogue, args.cache, args.out, seed=args.seed, quality=quality, progress=note)
     show(args, facts, table(facts))
+    return 0
+
+
+def serve(args: argparse.Namespace) -> int:
+    """People at once on a server."""
+    from embodied.bench.serve import measure
+
+    report = measure(args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note)
+    show(args, report.facts, report.text)
     return 0
 
 
