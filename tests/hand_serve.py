@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import time
 import uuid
 from pathlib import Path
 
-from hand_data import build, paint, small_house
+import numpy as np
+from hand_data import build, small_house
 from websockets.sync.client import connect
 
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import PictureSettings
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,8 +31,22 @@ TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 def make_data(folder: Path, cache: Path, kind: str = "hanna"):
     """A data set with small painted panoramas in folder/data."""
     data = build(folder / "data", cache, kind, make_house=small_house)
-    paint(data, PictureSettings(size=32))
+    pictures = PictureSettings(size=64)
+    for name in {n for s in data.splits for n in data.names(s)}:
+        place = data.place(name)
+        meta = {"house": place.house.digest, **dataclasses.asdict(pictures), "look": pictures.shown_with}
+        nodes = [gradient(k) for k in range(len(place.graph.ids))]
+        write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
     return data
+
+
+def gradient(node: int, side: int = 64) -> Panorama:
+    """A panorama that tells face, row, column and node: faces in red, rows in green, columns in blue."""
+    rgb = np.zeros((6, side, side, 3), np.uint8)
+    rgb[..., 0] = (40 * np.arange(6) + node)[:, None, None]
+    rgb[..., 1] = np.linspace(20, 235, side)[:, None]
+    rgb[..., 2] = np.linspace(20, 235, side)
+    return Panorama(rgb, np.ones((6, side, side), np.float32), np.ones((6, side, side), np.int32))
 
 
 def write_study(folder: Path, parts: str = TOGETHER, head: str = HEAD, name: str = "study") -> Path:
@@ -63,6 +82,12 @@ class Served:
     def word(self) -> str:
         """Of the link for everybody."""
         return self.links["join"][0].split("=")[1]
+
+    def begun(self) -> list[dict]:
+        """What the log says of the games that began."""
+        with contextlib.closing(sqlite3.connect(self.people / "people.db")) as db:
+            rows = db.execute("SELECT body FROM events WHERE kind = 'began' ORDER BY number").fetchall()
+        return [json.loads(body) for (body,) in rows]
 
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
