@@ -309,13 +309,13 @@ class Server:
         elif do == "asked":
             event.body["question"] = self._question(game, words(message["text"]))
         elif do == "answered":
-            picture = message.get("picture")
+            part, picture = game.table.part, message.get("picture")
             if picture is not None:
-                if not game.table.part.send_pictures:
+                if not part.send_pictures:
                     raise ActionError("no pictures are sent here")
                 if picture not in range(len(game.situation.world.graph.positions)):
                     raise ActionError("there is no such viewpoint")
-            reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said))
+            reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said), part.way)
             event.body["reply"] = parse(to_json(reply))
         await self.happen(event)
         return [self.sessions.people[p] for p in game.people.values()]

@@ -12,6 +12,7 @@ from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.sessions import STARS, Person, Sessions
 from embodied.serve.study import Part
+from embodied.serve.talk import way_to_goal
 
 Screen = dict[str, Any]
 
@@ -118,16 +119,13 @@ def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> lis
 def assistant_of(game: Game, pictures: Pictures) -> Screen:
     """What the assistant sees."""
     part, s = game.table.part, game.situation
-    goals = s.task.goal_nodes
-    graph = s.world.graph
-    goal = min(goals, key=lambda g: (graph.distance[s.pose.node, g], g))
     show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
     return {
         "house": s.task.world,
         "node": s.pose.node,
         "trail": list(s.trail),
-        "goals": list(goals) if show_goal else [],
-        "way": list(graph.path(s.pose.node, goal)) if show_way else [],
+        "goals": list(s.task.goal_nodes) if show_goal else [],
+        "way": list(way_to_goal(s, part.way)) if show_way else [],
         "sendPictures": part.send_pictures,
     }
 
