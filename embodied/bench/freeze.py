@@ -2,7 +2,7 @@
 
 Taken before and after a change that should alter nothing, on one machine with one set of libraries
 (floating-point results, and so these digests, may differ between machines). A file of them may say
-which parts are meant to differ from then on, and why; `docs/freeze.json` is the one of this project.
+which parts are meant to differ from then on, and why; `tests/data/freeze.json` is the one of this project.
 """
 
 from __future__ import annotations

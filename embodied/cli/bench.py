@@ -9,7 +9,7 @@ view of each is, to it, from the path tracer's (--quality, --look, --no-traced; 
 where it was stopped). Close other programs first: the numbers are only as good
 as the quiet. freeze measures nothing: it makes houses, a lit flat, data sets, episodes, tables and features
 in OUT/freeze and writes their digests; with --against it says of every part whether it is the same as in a
-file of them (docs/freeze.json), or differs and why that is meant.
+file of them (tests/data/freeze.json), or differs and why that is meant.
 """
 
 from __future__ import annotations
