@@ -20,8 +20,9 @@ from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.interface import Sight, Sighting
 from embodied.navigation.graph import NavGraph, build_graph
+from embodied.render.camera import View
 from embodied.render.classic import Renderer
-from embodied.render.panorama import Panorama
+from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import TRACED, PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
@@ -184,6 +185,27 @@ class World:
         if not 0 <= node < len(self.graph.positions):
             raise IndexError(f"world {self.name!r} has the nodes 0 to {len(self.graph.positions) - 1}, not {node}")
         return self._recent(node)
+
+    def camera(
+        self,
+        position: Sequence[float] | np.ndarray,
+        yaw: float,
+        pitch: float = 0.0,
+        vfov: float = VFOV36,
+        size: tuple[int, int] = (480, 640),
+    ) -> View:
+        """What a camera anywhere sees, drawn now: rgb, depth and ids.
+
+        Args:
+          position: (x, y, z) metres, world.
+          yaw, pitch: radians, counter-clockwise from +x and up.
+          vfov: vertical field of view, radians.
+          size: (height, width), pixels.
+
+        Raises:
+          ValueError: the world was opened without pictures.
+        """
+        return self.renderer.view(position, yaw, pitch, vfov, size)
 
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
