@@ -1,4 +1,4 @@
-"""Writes docs/reference/command_line.md: what every command says with --help."""
+"""Writes the page of the command line: what every command says with --help."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 os.environ["COLUMNS"] = "100"
 
-from embodied.cli import COMMANDS, parser  # noqa: E402 - help is as wide as COLUMNS
+from embodied.cli import COMMANDS, parser
 
 PAGE = Path(__file__).parent / "reference" / "command_line.md"
 

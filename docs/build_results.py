@@ -1,4 +1,4 @@
-"""Writes the tables of docs/results/data/*.json into the pages that show them, and docs/results/details.md with all.
+"""Writes the tables of docs/results/data/*.json into the pages that show them, and a page with all tables.
 
     python docs/build_results.py            # writes
     python docs/build_results.py --check    # exits 1 where a page is not what the data say
@@ -20,7 +20,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 DATA = HERE / "results" / "data"
 DETAILS = HERE / "results" / "details.md"
-PLACE = re.compile(r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))? -->\n).*?(<!-- end -->)", re.DOTALL)
+PLACE = re.compile(
+    r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))? -->\n).*?(<!-- end -->)", re.DOTALL
+)
 OLDER = "Measured with an earlier version of the program."
 
 
