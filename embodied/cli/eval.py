@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
     add_rules(parser)
     add_hari_rules(parser)
+    parser.add_argument(
+        "--assistant", metavar="MODULE:CLASS", help="who answers requests, instead of the kind's own assistant"
+    )
     parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where to write the table and the episodes")
@@ -53,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     from assets.cache import write_bytes
     from embodied.datasets.store import Dataset
+    from embodied.envs.make import assistant_of
     from embodied.evaluation import as_programs, tables
     from embodied.evaluation.evaluate import LOOKING, agent, agent_names, evaluate
     from embodied.records import episodes_file, fingerprint, save_lines
@@ -61,6 +66,9 @@ def run(args: argparse.Namespace) -> int:
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names, variants = args.agent or agent_names(args.kind), hari_rules_of(args)
+    if args.assistant:
+        sys.path.insert(0, "")  # a module in the folder one stands in
+    assistant = assistant_of(args.assistant)
 
     def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")
@@ -79,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
         agents = {name: agent(args.kind, name, worlds, args.rules) for name in names}
-        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants)
+        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants, assistant=assistant)
         rows += evaluate(whole, agents, seed=args.seed, limit=args.tasks, keep=keep, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
@@ -93,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
             tasks=args.tasks,
             rules=args.rules,
             hari=dataclasses.asdict(variants),
+            assistant=args.assistant,
         )
         write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))
