@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
+import json
 import re
 import shlex
 import sys
@@ -11,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from embodied.cli import main
+from embodied.cli import main, parser
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDER = ("your_agent", "your_assistant", "train_from_pixels", "imitation_lerobot", "your_furniture", "evaluate")
@@ -29,6 +31,37 @@ def run(page: Path) -> str:
             for line in code.splitlines():
                 assert main(shlex.split(line)[1:]) == 0, line
     return said.getvalue()
+
+
+def commands() -> list[tuple[str, list[str]]]:
+    """(file, words) of every command of ours in a code block of the README, the weights' page and the site, and in
+    the tables of results."""
+    pages = [ROOT / "README.md", ROOT / "agents/weights/README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    lines = [
+        (page.name, line.removeprefix(".venv/bin/"))
+        for page in pages
+        if page.name not in ("command_line.md", "details.md")  # made from the code, and from the data of all tables
+        for block in re.findall(r"^```(?:sh)?\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+        for line in block.splitlines()
+    ]
+    tables = sorted((ROOT / "docs/results/data").glob("*.json"))
+    lines += [(table.name, line) for table in tables for line in json.loads(table.read_text())["command"].splitlines()]
+    return [
+        (name, shlex.split(line, comments=True)[1:])
+        for name, line in dict.fromkeys(lines)
+        if line.startswith("embodied ") and "..." not in line
+    ]
+
+
+def test_every_command_in_the_documentation_is_one_that_the_program_takes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    wrong, parser_of = [], functools.cache(parser)
+    for page, words in commands():
+        try:
+            parser_of(words[0]).parse_args(words)
+        except SystemExit:
+            wrong.append(f"{page}: embodied {shlex.join(words)}: {capsys.readouterr().err}")
+    assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.gl
