@@ -49,7 +49,7 @@ def client_of(server: ChatServer, answers: Path, **settings) -> Client:
 def find_tasks(n: int) -> list:
     pool = find_pool(grid_world(), seed=0)
     tasks = [find_task(pool, i, seed=0, language=PlainLanguage()) for i in range(n)]
-    return [dataclasses.replace(t, horizon=8) for t in tasks]
+    return [dataclasses.replace(t, horizon=5) for t in tasks]
 
 
 def find_env() -> HelpEnv:
