@@ -272,7 +272,7 @@ class Intention(enum.Enum):
     DISAMBIGUATE = "disambiguate"
     """Which of those that I see do you mean?"""
     FREE = "free"
-    """A question in the agent's own words (Ask.text)."""
+    """A question in the agent's own words (Ask.question)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,8 +324,8 @@ class Ask:
 
     intention: Intention = Intention.HELP
     thought: Thought | None = field(default=None, compare=False, repr=False)
-    text: str = ""
-    """The words of a free question."""
+    question: str | None = None
+    """The question in words, where a person or a language model put it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -497,7 +497,9 @@ class Step:
     reply: Reply | None
     next_pose: Pose
     cost: float = 0.0
-    """HARI: the cost of this step, shaping excluded; Ask-v0: the price of the question."""
+    """HARI: the cost of this step, shaping excluded; Ask-v0 and with people: the price of the question."""
+    seconds: float | None = None
+    """When it was taken, since the episode began; None where no person took part."""
 
 
 @dataclass(frozen=True)

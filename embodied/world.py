@@ -12,23 +12,24 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import digest
+from assets.cache import default_cache, digest
+from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.interface import Sight, Sighting
 from embodied.navigation.graph import NavGraph, build_graph
+from embodied.render.camera import View
 from embodied.render.classic import Renderer
-from embodied.render.panorama import Panorama
+from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import TRACED, PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
     from embodied.light import Bake
     from embodied.light.reference import Tracer
     from embodied.render.gloss import Gloss, Shine
@@ -82,6 +83,11 @@ class World:
     def owners(self) -> tuple[str, ...]:
         """Instance id i + 1 belongs to owners[i]."""
         return owners(self.house)
+
+    @functools.cached_property
+    def classes(self) -> tuple[str, ...]:
+        """The class of each instance id: `world.classes[view.ids[y, x]]` is what a pixel shows."""
+        return instance_classes(self.house)
 
     @functools.cached_property
     def _origin(self) -> dict[str, object]:
@@ -180,6 +186,27 @@ class World:
             raise IndexError(f"world {self.name!r} has the nodes 0 to {len(self.graph.positions) - 1}, not {node}")
         return self._recent(node)
 
+    def camera(
+        self,
+        position: Sequence[float] | np.ndarray,
+        yaw: float,
+        pitch: float = 0.0,
+        vfov: float = VFOV36,
+        size: tuple[int, int] = (480, 640),
+    ) -> View:
+        """What a camera anywhere sees, drawn now: rgb, depth and ids.
+
+        Args:
+          position: (x, y, z) metres, world.
+          yaw, pitch: radians, counter-clockwise from +x and up.
+          vfov: vertical field of view, radians.
+          size: (height, width), pixels.
+
+        Raises:
+          ValueError: the world was opened without pictures.
+        """
+        return self.renderer.view(position, yaw, pitch, vfov, size)
+
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
         return self._sightings.at(node, self.house)
@@ -264,8 +291,8 @@ class World:
 
 def open_world(
     house: House,
-    catalogue: Catalogue,
-    cache: Path,
+    catalogue: Catalogue | None = None,
+    cache: Path | None = None,
     pictures: PictureSettings = PictureSettings(),
     *,
     graph: NavGraph | None = None,
@@ -274,25 +301,30 @@ def open_world(
     """A world over `house`; nothing is drawn until asked for.
 
     Args:
-      catalogue: where meshes and materials come from.
-      cache: folder for what is expensive; may be deleted at any time.
+      catalogue: where meshes and materials come from; the shipped one where not given.
+      cache: folder for what is expensive, which may be deleted at any time; the user's cache folder where not given.
       pictures: how the house is drawn.
       graph: the navigation graph; built when not given.
       changes: fields of PictureSettings, instead of those of `pictures`: size=512, quality="normal".
     """
-    graph = graph or build_graph(house)
-    return World(house, catalogue, graph, cache, dataclasses.replace(pictures, **changes))
+    graph, cache = graph or build_graph(house), cache or default_cache()
+    return World(house, catalogue or load_catalogue(cache), graph, cache, dataclasses.replace(pictures, **changes))
 
 
 def open_folder(
-    folder: Path, catalogue: Catalogue, cache: Path, pictures: PictureSettings = PictureSettings(), **changes: Any
+    folder: Path,
+    catalogue: Catalogue | None = None,
+    cache: Path | None = None,
+    pictures: PictureSettings = PictureSettings(),
+    **changes: Any,
 ) -> World:
     """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there.
 
     Args:
-      pictures, changes: as in `open_world`.
+      catalogue, cache, pictures, changes: as in `open_world`.
     """
-    folder = Path(folder)
+    folder, cache = Path(folder), cache or default_cache()
+    catalogue = catalogue or load_catalogue(cache)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)

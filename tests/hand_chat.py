@@ -37,6 +37,16 @@ def first_allowed(request: dict[str, Any]) -> Response:
     return said(json.dumps(value))
 
 
+class Parrot:
+    """An assistant of somebody's own."""
+
+    def intentions(self, situation: Any) -> tuple:
+        return ()
+
+    def answer(self, situation: Any, question: Any, *, rng: Any) -> Any:
+        raise NotImplementedError
+
+
 class ChatServer:
     """Runs while the `with` block does."""
 

@@ -152,9 +152,9 @@ def test_without_grounding_answers_come_in_words_alone(world, tasks):
 def test_a_free_question_is_answered_by_what_it_means_or_not_at_all(tasks, make_env):
     env = make_env()
     env.reset(tasks[0])
-    env.step(Ask(Intention.FREE, text="In which room should I look?"))
+    env.step(Ask(Intention.FREE, question="In which room should I look?"))
     assert env.last_step.reply.text.startswith("It is in")
-    env.step(Ask(Intention.FREE, text="Do you like me?"))
+    env.step(Ask(Intention.FREE, question="Do you like me?"))
     assert env.last_step.reply.text == "I do not know." and not env.last_step.reply.ruled_out
     assert understood("How do I get there?") is Intention.ROUTE
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_chat import ChatServer, first_allowed, said
+from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import grid_world
 
 from embodied.assistants.ask import AskAssistant
@@ -247,7 +247,7 @@ def test_template_model_and_person_answer_through_one_interface(answers):
             "template": assistant_maker("template", lambda: None, None),
             "llm": assistant_maker("llm", lambda: client_of(server, answers), None),
             "person": lambda base: PersonAssistant(base, lambda text: told.append(text) or "over there"),
-            "own": assistant_maker("agents.language_models.assistant:PersonAssistant", lambda: None, None),
+            "own": assistant_maker("hand_chat:Parrot", lambda: None, None),
         }
         said_by = {}
         for name in ("template", "llm", "person"):
@@ -260,7 +260,7 @@ def test_template_model_and_person_answer_through_one_interface(answers):
     assert said_by["llm"].text == "Look in the kitchen, dear." and said_by["person"].text == "over there"
     assert {r.ruled_out for r in said_by.values()} == {said_by["template"].ruled_out}, "the facts are the same"
     assert said_by["template"].text in request["messages"][1]["content"] and said_by["template"].text in told[0]
-    assert said_by["llm"].usage.calls == 1 and isinstance(makers["own"](AskAssistant(look_of(None))), PersonAssistant)
+    assert said_by["llm"].usage.calls == 1 and isinstance(makers["own"](AskAssistant(look_of(None))), Parrot)
     with pytest.raises(ValueError, match="module:Class"):
         assistant_maker("nobody", lambda: None, None)
 
@@ -284,7 +284,7 @@ def test_a_free_question_reaches_the_model_with_true_facts_only(answers):
         env = make_env()
         env.assistant = ModelAssistant(env.assistant, client_of(server, answers))
         env.reset(tasks[0])
-        env.step(Ask(Intention.FREE, text="Is there a cat in the house?"))
+        env.step(Ask(Intention.FREE, question="Is there a cat in the house?"))
         content = server.requests[0]["messages"][1]["content"]
     assert "Is there a cat in the house?" in content and content.count("\n- ") == 3
-    assert env.last_step.action.text == "Is there a cat in the house?"
+    assert env.last_step.action.question == "Is there a cat in the house?"

@@ -79,7 +79,7 @@ class Story:
         if isinstance(step.action, Ask):
             self.requests += 1
             self.dialogue.append(
-                f"**Agent** (step {self.count}): {step.action.text or QUESTIONS[step.action.intention]}"
+                f"**Agent** (step {self.count}): {step.action.question or QUESTIONS[step.action.intention]}"
             )
             if step.reply is not None:
                 self._heard(step.reply, step.pose)

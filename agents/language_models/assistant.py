@@ -6,16 +6,15 @@ Whoever words it is told what the assistant would say and, where it told a route
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from agents.language_models.client import Client, object_schema
 from agents.language_models.prompts import read_prompt
 from embodied.assistants.ask import AskAssistant
+from embodied.envs.make import assistant_of
 from embodied.interface import Assistant, Intention, Reply, Situation
 from embodied.language import PlainLanguage
 
@@ -105,8 +104,6 @@ class PersonAssistant:
 def assistant_maker(name: str, client: Callable[[], Client], prompts: Path | None) -> Callable[[Assistant], Assistant]:
     """How the assistant of an environment is replaced: 'template' (not at all), 'llm', 'person', or 'module:Class'.
 
-    A class of one's own is called with the assistant that knows the answers.
-
     Raises:
       ValueError: no such class.
     """
@@ -116,9 +113,5 @@ def assistant_maker(name: str, client: Callable[[], Client], prompts: Path | Non
         return lambda base: ModelAssistant(base, client(), prompts)
     if name == "person":
         return PersonAssistant
-    module, _, attribute = name.partition(":")
-    try:
-        made: Any = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as e:
-        raise ValueError(f"--assistant should be template, llm, person or module:Class, got {name!r} ({e})") from e
-    return made
+    own = assistant_of(name)
+    return lambda base: own or base

@@ -73,14 +73,14 @@ def action_in(o: Observation, value: Mapping[str, Any]) -> Action:
     """The action that a valid answer names."""
     action = actions_of(o)[value["action"]]
     if isinstance(action, Ask) and action.intention is Intention.FREE:
-        return dataclasses.replace(action, text=value["question"])
+        return dataclasses.replace(action, question=value["question"])
     return action
 
 
 def told(o: Observation, action: Action) -> str:
     """What was done, for the history."""
     if isinstance(action, Ask):
-        return f"You asked: {action.text or action.intention.value}."
+        return f"You asked: {action.question or action.intention.value}."
     if isinstance(action, Stop):
         return "You stopped."
     if o.candidates.words:

@@ -39,6 +39,7 @@ COMMANDS = (
     "eval",
     "judge",
     "evaluate",
+    "serve",
     "study",
     "iliad",
     "bench",

@@ -70,7 +70,12 @@ def run(args: argparse.Namespace) -> int:
         sky = lambda h: dataclasses.asdict(h.sky) | {"on": [x.id for x in h.lights if x.on]}
         write_json(args.folder / "lights.json", [sky(h) | f for h, f in zip(lightings, facts)], indent=1)
     text = "; ".join(f"{h.sky.hour:g} h, {h.sky.weather}" for h in lightings)
-    show(args, facts[0] if args.lights == 1 else {"lights": facts}, f"{changed.name} is lit at {text}")
+    told = (
+        f"{changed.name} is lit at {text}\n"
+        f"pictures: embodied render {args.folder} --quality {args.quality}\n"
+        f"MuJoCo:   embodied export mjcf --house {args.folder} --light {args.quality} --out {args.folder / 'lit'}"
+    )
+    show(args, facts[0] if args.lights == 1 else {"lights": facts}, told)
     return 0
 
 

@@ -25,7 +25,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
-from embodied.interface import FindObject, Language, Place, Route, Task
+from embodied.interface import Assistant, FindObject, Language, Place, Route, Task
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import RecordError, from_plain, read_lines
 from embodied.render.pictures import PictureSettings
@@ -217,6 +217,7 @@ class Dataset:
         worlds: Mapping[str, Place] | None = None,
         hari: HariRules = AS_PRINTED,
         vnla: str = AS_PUBLISHED,
+        assistant: Assistant | None = None,
     ) -> SplitData:
         """Everything that playing a split needs.
 
@@ -226,6 +227,7 @@ class Dataset:
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
           vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
+          assistant: who answers, instead of the kind's own assistant.
 
         Raises:
           DatasetError: an unknown split, or files that were lost or changed.
@@ -241,6 +243,7 @@ class Dataset:
             describer=self.describer() if self.kind == "hari" else None,
             hari=hari,
             vnla=vnla,
+            assistant=assistant,
         )
         tasks = [t for t in self.tasks(name) if t.world in places]
         return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla, hari), make_env)

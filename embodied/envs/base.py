@@ -112,7 +112,7 @@ class HelpEnv:
             self._moved()
         elif isinstance(action, Ask):
             rng = stream(self.seed, "assistant", self.task.id, self.time)
-            asked = dataclasses.replace(situation, question=action.text)
+            asked = dataclasses.replace(situation, question=action.question or "")
             reply = required(self.assistant, "assistant").answer(asked, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)

@@ -166,7 +166,7 @@ def observed(o: Observation) -> dict[str, object]:
 
 
 def acted(o: Observation, answer: bytes) -> Action:
-    """The action of an answer: 'go 0', 'ask region', 'stop'; with 'text' for a free question. Anything else stops."""
+    """The action of an answer: 'go 0', 'ask region', 'stop'; with 'question' for a free one. Anything else stops."""
     try:
         said = parse(answer[: MOST_BYTES + 1], "an action")
     except RecordError:
@@ -176,6 +176,6 @@ def acted(o: Observation, answer: bytes) -> Action:
     if kind == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
         return Move(int(what))
     if kind == "ask" and what in {i.value for i in o.can_ask}:
-        text = said.get("text", "") if isinstance(said, dict) else ""
-        return Ask(Intention(what), text=text[:300] if isinstance(text, str) else "")
+        question = said.get("question") if isinstance(said, dict) else None
+        return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)
     return Stop()

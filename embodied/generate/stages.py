@@ -109,6 +109,11 @@ def rooms(draft: Draft) -> Draft:
     )
 
 
+def with_plan(plan: Plan) -> Stage:
+    """A stage that takes the place of `rooms`: the plan as it is."""
+    return lambda draft: dataclasses.replace(draft, plan=plan)
+
+
 def openings(draft: Draft) -> Draft:
     """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
     config, begun = draft.config, draft.first

@@ -24,7 +24,7 @@ from assets.cache import default_cache
 from embodied.assistants.ask import QUESTIONS
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
-from embodied.envs.make import AS_PUBLISHED
+from embodied.envs.make import AS_PUBLISHED, assistant_of
 from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
@@ -44,8 +44,10 @@ from embodied.gym.playground import Playground, Variants, flat_playground, split
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
-from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.house.house import House
+from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.render.pictures import PictureSettings
+from embodied.scene.house_meshes import instance_classes
 from embodied.world import World
 
 STEP_COST = 0.01
@@ -68,6 +70,9 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     An action that the mask forbids leaves everything as it was and is reported in
     info["invalid_action"]; after `patience` of them the episode is truncated. With `strict` it
     raises ActionError instead.
+
+    Every info has the words of the moment: "request" (the task), "instruction" (the request, or what the
+    assistant said last) and "candidates", one {"action", "heading", "text"} for each possible move.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -111,7 +116,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         chosen = drawn if options is None else int(options.get("task", drawn))
         self._o = self._env.reset(self._tasks[chosen], seed=int(self.np_random.integers(2**31)))
         self._invalid = 0
-        return self._encoded(self._o), {"task": self._tasks[chosen].id}
+        return self._encoded(self._o), {"task": self._tasks[chosen].id} | self._words()
 
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self._potential() if self._shaping else 0.0
@@ -126,7 +131,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
                 -STEP_COST,
                 False,
                 self._invalid >= self._patience,
-                {"invalid_action": str(e)},
+                {"invalid_action": str(e)} | self._words(),
             )
         ended = self._env.ended
         info = {} if ended is None else self._judged()
@@ -135,7 +140,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         if self._shaping:
             reward += before - (0.0 if ended is not None and hari else self._potential())
         self._o = o if o is not None else self._o
-        info |= self._env.facts()
+        info |= self._env.facts() | self._words()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
@@ -155,6 +160,48 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         """What was handed out last, before it became numbers."""
         return self._o
 
+    @property
+    def task(self) -> Task:
+        """The task that is being played. Privileged, like what follows: to judge and to look, not for a policy."""
+        return self._env.task
+
+    @property
+    def pose(self) -> Pose:
+        """Where the agent is: node, turn and tilt."""
+        return self._env.pose
+
+    @property
+    def world(self) -> Place:
+        """The world that the task is played in: `world.house`, `world.graph`."""
+        return self._env.world
+
+    @property
+    def house(self) -> House:
+        """The house that the task is played in."""
+        return self._env.world.house
+
+    @property
+    def room(self) -> str:
+        """Id of the room that the agent is in."""
+        return self._env.world.graph.room_of_node[self._env.pose.node]
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The class of each instance id: `classes[i]` is what pixels with id i of observation["ids"] show."""
+        return instance_classes(self.house)
+
+    def _words(self) -> dict[str, Any]:
+        o = self._o
+        return {
+            "request": self._env.task.request,
+            "instruction": o.instruction,
+            "candidates": tuple(
+                {"action": k, "heading": float(o.candidates.bearing[k]), "text": direction_of(o, k)}
+                for k in range(len(o.candidates))
+                if o.candidates.allowed[k]
+            ),
+        }
+
     def _encoded(self, o: Observation) -> dict[str, Any]:
         return encode(o, self._eyes, self._layout)
 
@@ -167,6 +214,21 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     def _judged(self) -> dict[str, float]:
         episode = self._env.episode()
         return {name.replace(" ", "_"): f(episode, self._env.world.graph) for name, f in PER_EPISODE.items()}
+
+
+def direction_of(o: Observation, candidate: int) -> str:
+    """A candidate in words: 'turn 60 degrees left', or VNLA's own word for it."""
+    if o.candidates.words:
+        return o.candidates.words[candidate]
+    return _direction(round(float(np.degrees(o.candidates.bearing[candidate])) / 10) * 10)
+
+
+@functools.cache
+def _direction(degrees: int) -> str:
+    """In steps of ten degrees, left positive."""
+    if not degrees:
+        return "straight ahead"
+    return "turn back" if abs(degrees) >= 170 else f"turn {abs(degrees)} degrees {'left' if degrees > 0 else 'right'}"
 
 
 def picture(env: HelpEnv, o: Observation) -> np.ndarray:
@@ -296,6 +358,8 @@ class StageSettings:
     """Whether VNLA's requests in a generated flat name the room; those of a data set are as it was built."""
     hari: HariRules = AS_PRINTED
     """Variants of HARI: costs, stack, sub-goals' length, horizon, a willing assistant, what is told unasked."""
+    assistant: Assistant | str | None = None
+    """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
     wheels: bool = False
     """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
 
@@ -314,6 +378,7 @@ def set_stage(kind: str, **settings: Any) -> Stage:
         "pictures": wanted.pictures,
         "sees": seen,
         "variants": Variants(wanted.rules, wanted.rooms, wanted.hari),
+        "assistant": assistant_of(wanted.assistant),
     }
     if wanted.data:
         play = split_playground(kind, Path(wanted.data), wanted.split, **asked)

@@ -138,7 +138,7 @@ def same_atlas(folder: Path, atlas: Atlas) -> None:
     ]
     mark, path = digest(pages), folder / "atlas.txt"
     if not path.exists() or path.read_text() != mark:
-        for old in sorted(folder.iterdir()):
+        for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
             old.unlink()
         write_bytes(path, mark.encode())
 
@@ -240,7 +240,7 @@ def _drop_damaged(folder: Path) -> None:
     path = folder / "manifest.json"
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         for name, mark in json.loads(path.read_text())["files"].items():
-            if _mark(folder / name) != mark:
+            if Path(name).name == name and _mark(folder / name) != mark:  # nothing outside
                 (folder / name).unlink(missing_ok=True)
     path.unlink(missing_ok=True)
 

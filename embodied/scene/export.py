@@ -43,10 +43,8 @@ def export_mjcf(
     spec = build_spec(house, catalogue, free=free, lit=lit)
     compile_spec(spec)
     (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
-    for name, pattern in ((MESHES, "*.msh"), (TEXTURES, "*.png")):
+    for name in (MESHES, TEXTURES):
         (folder / name).mkdir(parents=True, exist_ok=True)
-        for old in sorted((folder / name).glob(pattern)):
-            old.unlink()
     for name, data in spec.assets.items():
         (folder / MESHES / name).write_bytes(data)
     for texture in spec.textures:
