@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import io
 import json
 import sqlite3
 from pathlib import Path
@@ -11,16 +13,21 @@ import numpy as np
 import pytest
 from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import grid_world
+from PIL import Image
 
+from assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.errors import UnableError
 from embodied.evaluation import metrics, tables
 from embodied.evaluation.rollout import play
-from embodied.interface import Ask, Intention, Move, Usage
+from embodied.gym.env import HelpGymEnv
+from embodied.gym.eyes import Closed
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Step, Subtask, Usage
 from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
+from embodied.render.panorama import Panorama
 from embodied.tasks.ask import ask_pool, ask_tasks
 from embodied.tasks.find import find_pool, find_task
 
@@ -29,8 +36,13 @@ pytest.importorskip("openai", reason="the optional extra [llm] is not installed"
 from agents.language_models.agent import LanguageModelAgent
 from agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from agents.language_models.cache import AnswerCache
+from agents.language_models.checking import arrives, understood
 from agents.language_models.client import MOST_BYTES, Client, ServerSettings, misfit, object_schema
+from agents.language_models.judge import ModelJudge
+from agents.language_models.messages import Messages
+from agents.language_models.paraphrase import paraphrased
 from agents.language_models.prompts import read_prompt
+from agents.language_models.telling import Teller
 
 ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
 ASKED = [{"role": "user", "content": "say it"}]
@@ -288,3 +300,99 @@ def test_a_free_question_reaches_the_model_with_true_facts_only(answers):
         content = server.requests[0]["messages"][1]["content"]
     assert "Is there a cat in the house?" in content and content.count("\n- ") == 3
     assert env.last_step.action.question == "Is there a cat in the house?"
+
+
+# Other roles ------------------------------------------------------------------------------------
+
+
+class Seen:
+    """The grid with a catalogue, for whoever reads words of things; nothing but rooms is seen."""
+
+    def __init__(self) -> None:
+        world = grid_world()
+        self.house, self.graph, self.name = world.house, world.graph, world.house.name
+        self.catalogue = load_catalogue()
+
+    def sightings(self, node: int) -> tuple:
+        return ()
+
+
+@pytest.fixture(scope="module")
+def seen() -> Seen:
+    return Seen()
+
+
+def a_route(world: Seen, k: int) -> Route:
+    path = world.graph.path(0, 20)
+    return Route(f"grid_{k}", path, 0, 0, PlainLanguage().route(world, path, 0.0, rng=np.random.default_rng(0)))
+
+
+def test_paraphrases_that_lead_elsewhere_are_dropped_and_counted(seen, answers):
+    routes = [("grid", a_route(seen, k)) for k in range(4)]
+    good = "Leave the kitchen and go into the living room. Stop in the living room."
+    texts = [f'{{"instruction": "{good}"}}', '{"instruction": "Fly to the moon."}', "<html>"]
+    texts.append(json.dumps({"instruction": routes[0][1].instruction}))
+    with ChatServer(lambda r: said(texts[len(server.requests) - 1])) as server:
+        found = paraphrased(routes, {"grid": seen}, client_of(server, answers, together=1))
+        told = [r["messages"][1]["content"] for r in server.requests]
+    assert (found.asked, found.lost, found.invalid, found.unchanged) == (4, 1, 1, 1)
+    assert [r.instruction for r in found.routes] == [good] and found.failing == 0.75 and found.usage.calls == 4
+    assert found.routes[0].path == routes[0][1].path and len(set(told)) == 4, "every one in another style"
+
+
+def test_the_listener_tells_how_often_told_ways_are_understood(seen):
+    route = a_route(seen, 0)
+    assert arrives(seen, "Go into the living room. Stop in the living room.", route.path, 0.0)
+    assert not arrives(seen, "blah blah", route.path, 0.0)
+    reply = Reply("blah", subtask=Subtask("r", 20, path=route.path))
+    stopped = Step(Pose(0), Mode.MAIN, "", (0,), "none", (), (1,), Ask(), reply, Pose(0))
+    episode = Episode(find_tasks(1)[0], (stopped,), "limit")
+    assert understood([episode], {"grid": seen}) == (0, 1)
+
+
+def test_a_judge_rates_in_stars_and_describes(seen, answers):
+    path = seen.graph.path(0, 20)
+    replies = iter(['{"stars": 4}', '{"stars": 9}', '{"description": "Walk to the living room."}', "<html>"])
+    with ChatServer(lambda r: said(next(replies))) as server:
+        judge = ModelJudge(client_of(server, answers))
+        assert judge.rate(seen, "go to the living room", path, 0.0) == 0.75
+        assert judge.rate(seen, "go to the kitchen", path, 0.0) is None
+        assert "living room" in server.requests[0]["messages"][1]["content"].split("Walk:")[1]
+        rng = np.random.default_rng(0)
+        assert judge.describe(seen, path, 0.0, rng=rng) == "Walk to the living room."
+        assert judge.describe(seen, path[::-1], 0.0, rng=rng) == "" and judge.usage.invalid == 2
+
+
+def test_the_gymnasium_wrapper_speaks_in_messages():
+    env = Messages(HelpGymEnv(find_env, find_tasks(3), Closed()))
+    text, info = env.reset(seed=1)
+    assert env.observation_space.contains(text) and "find" in text
+    assert [m["role"] for m in info["messages"]] == ["system", "user"]
+    names = info["schema"]["properties"]["action"]["enum"]
+    assert "stop" in names and "go 0" in names
+    after, reward, ended, cut, info = env.step("go 0")
+    assert "You went" in after and not ended and not cut
+    _, _, _, _, info = env.step("fly")
+    assert "invalid_action" in info
+    _, _, ended, _, info = env.step("stop")
+    assert ended and "success" in info
+
+
+def test_a_model_that_sees_is_shown_numbered_views(answers):
+    class Grey:
+        def at(self, sight):
+            return Panorama(
+                np.full((6, 64, 64, 3), 90, np.uint8), np.ones((6, 64, 64), np.float32), np.zeros((6, 64, 64), np.int32)
+            )
+
+    with ChatServer() as server:
+        for how in ("strip", "panorama"):
+            agent = LanguageModelAgent(client_of(server, answers), Teller(panoramas=Grey(), pictures=how))
+            play(find_env, agent, [dataclasses.replace(find_tasks(1)[0], horizon=1)], seed=0)
+        sizes = []
+        for request in server.requests:
+            text, picture = request["messages"][1]["content"]
+            data = base64.b64decode(picture["image_url"]["url"].partition(",")[2])
+            sizes.append(Image.open(io.BytesIO(data)).size)
+            count = text["text"].count("go ") // 2
+    assert sizes[0] == (224 * count + 4 * (count - 1), 224) and sizes[1] == (768, 384)

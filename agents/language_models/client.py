@@ -33,6 +33,9 @@ AGAIN = (408, 409, 425, 429, 500, 502, 503, 504, 529)
 TOOL = "answer"
 """Name of the one tool that is offered with the form 'tools'."""
 
+KINDS: Mapping[str, Any] = {"object": dict, "string": str, "integer": int, "number": (int, float), "boolean": bool}
+"""Types of JSON Schema that answers are made of."""
+
 Message = Mapping[str, Any]
 """Of the chat-completions protocol: 'role' and 'content', a text or parts ('text', 'image_url')."""
 
@@ -218,8 +221,7 @@ def understood(kept: _Kept, schema: Mapping[str, Any]) -> Answer:
 
 def misfit(value: object, schema: Mapping[str, Any], where: str = "the answer") -> str:
     """What is wrong with a value by the part of JSON Schema that is used here; '' for nothing."""
-    kinds = {"object": dict, "string": str, "integer": int, "number": (int, float), "boolean": bool, "array": list}
-    kind = kinds[schema["type"]]
+    kind = KINDS[schema["type"]]
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         return f"{where} should be of type {schema['type']}"
     if "enum" in schema and value not in schema["enum"]:

@@ -16,7 +16,7 @@ LONGEST = 20_000
 """Characters of a text."""
 
 
-class Messages(gym.Wrapper[str, str, Any, Any]):
+class Messages(gym.Wrapper[str, str, dict[str, Any], Any]):
     """The observation is the text that a model is told; info holds 'messages' and 'schema' for its server.
 
     An action is one of the names in the text, such as 'go 0' or 'ask help'; any other word is an invalid action, as the

@@ -43,8 +43,8 @@ def part_tasks(
     if kind == "vln":
         return {part: _vln(world, routes, part, n) for part, n in parts}
     if kind == "ask":
-        pool = ask_pool(world, look_of(getattr(world, "catalogue", None)), seed=seed)
-        return {part: ask_tasks(pool, n, seed=seed) for part, n in parts}
+        asked = ask_pool(world, look_of(getattr(world, "catalogue", None)), seed=seed)
+        return {part: ask_tasks(asked, n, seed=seed) for part, n in parts}
     if kind == "hari":
         return {part: _hari(world, part, n, seed=seed, language=language) for part, n in parts}
     if kind == "find":

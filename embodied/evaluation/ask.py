@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from embodied.datasets.store import StoredPlace
 from embodied.errors import UnableError
 from embodied.evaluation.tables import Row, row
 from embodied.interface import (
@@ -60,7 +59,7 @@ def read_seeds(path: Path) -> list[int]:
 
 
 def ask_split(
-    houses: Mapping[str, StoredPlace], look: Look, per_house: int, *, seed: int, unseen: bool | None = None
+    houses: Mapping[str, Place], look: Look, per_house: int, *, seed: int, unseen: bool | None = None
 ) -> list[Task]:
     """So many tasks of every house.
 

@@ -115,8 +115,8 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     }
     if layout.detections:
         rows = np.zeros((layout.detections, 4), dtype=np.float32)
-        for i, d in enumerate(o.detections[: layout.detections]):
-            rows[i] = np.sin(d.bearing), np.cos(d.bearing), d.distance, d.score
+        for i, seen in enumerate(o.detections[: layout.detections]):
+            rows[i] = np.sin(seen.bearing), np.cos(seen.bearing), seen.distance, seen.score
         whole["detections"] = rows
         whole["advised"] = np.int64(0 if o.advised is None else 1 + number(o.advised, layout))
     if layout.descriptions:

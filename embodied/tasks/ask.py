@@ -122,7 +122,7 @@ def request(goal: FindDescribed) -> str:
 def _in_turn(pairs: list[tuple[int, int]], classes: list[str], *, rng: np.random.Generator) -> np.ndarray:
     """(m, 2) int64: shuffled pairs, one of every class before a second of any."""
     seen: dict[str, int] = {}
-    ranked = []
+    ranked: list[tuple[int, int, tuple[int, int]]] = []
     for i in rng.permutation(len(pairs)):
         name = classes[pairs[i][0]]
         seen[name] = seen.get(name, 0) + 1
