@@ -14,15 +14,20 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
+from agents.ask.foresight import CHOICES, Foresight
+from agents.ask.learned import LearnedAsker, facts, train
 from embodied.assistants.ask import in_view, understood
+from embodied.cli import main as start
 from embodied.envs.ask import AskRules, Prices
 from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation import tables
 from embodied.evaluation.ask import acted, ask_row, observed, read_seeds, submitted
 from embodied.evaluation.metrics import price, success, success_progress, weighted_success
 from embodied.evaluation.rollout import play
+from embodied.gym.env import HelpGymEnv, layout_of
+from embodied.gym.eyes import Closed
 from embodied.interface import Ask, Intention, Move, Pose, Stop
-from embodied.policies.ask import RULES, Asker, baselines
+from embodied.policies.ask import RULES, Asker, Trail, baselines
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AskConfig, ask_pool, ask_tasks
 
@@ -198,12 +203,13 @@ def test_measures_by_hand(world, tasks, make_env):
     assert "weighted success (%)" in tables.markdown([row])
 
 
-def test_the_environment_checker_has_nothing_to_say(tmp_path):
+def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        options = {"cache": str(tmp_path), "worlds": {"grid": grid_world()}, "sees": "oracle"}
-        env = gym.make("embodied/Ask-v0", render_mode="rgb_array", **options)
-        check_env(env.unwrapped, skip_render_check=False)
+        env = HelpGymEnv(make_env, tasks, Closed(), layout=layout_of("ask"), render_mode="rgb_array")
+        check_env(env, skip_render_check=True)
+    assert env.render().ndim == 3
+    assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}
 
 
 # Judging others ---------------------------------------------------------------------------------
@@ -267,3 +273,52 @@ def test_a_list_of_seeds_is_read_and_checked(tmp_path):
 
 def test_looks_without_a_catalogue_are_empty(world):
     assert look_of(None)(world.house.placements[0]) == ()
+
+
+# Who learns to ask ------------------------------------------------------------------------------
+
+
+def test_the_oracle_of_asking_improves_on_the_rule_that_it_thinks_ahead_with(world, tasks, make_env):
+    def value(agent) -> float:
+        return float(np.mean([weighted_success(e, world.graph) for e in play(make_env, agent, tasks[:6], seed=0)]))
+
+    assert value(Foresight(make_env)) > value(Asker(RULES["confirm on sight"])), "which it goes on with in its head"
+
+
+def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
+    env = make_env()
+    env.reset(tasks[0])
+    before = (len(env._steps), env.time, env.pose, env._fitting, set(env._denied))
+    Foresight(make_env)._value(env, env.observation, Trail(), Intention.APPEARANCE, np.random.default_rng(0))
+    assert (len(env._steps), env.time, env.pose, env._fitting, set(env._denied)) == before
+
+
+def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
+    """It is taught to ask for the way at once, and does so."""
+    shown = [(o := make_env().reset(t), facts(o, Trail()))[1] for t in tasks]
+    labels = np.full(len(shown), CHOICES.index(Intention.ROUTE))
+    net = train(np.stack(shown), labels, seed=0)
+    episodes = play(make_env, LearnedAsker(net), tasks[:4], seed=0)
+    assert all(isinstance(e.steps[0].action, Ask) and e.steps[0].action.intention is Intention.ROUTE for e in episodes)
+    quiet = play(make_env, LearnedAsker(net, reserve=100.0), tasks[:4], seed=0)
+    assert not any(e.requests for e in quiet)
+
+
+@pytest.mark.slow
+def test_the_command_judges_in_houses_of_hidden_seeds_and_does_not_tell_the_seeds(tmp_path, shared_cache, capsys):
+    (tmp_path / "seeds.txt").write_text("918273645\n")
+    words = [
+        "evaluate",
+        "ask",
+        "--seeds",
+        str(tmp_path / "seeds.txt"),
+        "--agent",
+        "never ask",
+        "oracle",
+        "--tasks",
+        "4",
+    ]
+    assert start([*words, "--cache", str(shared_cache), "--out", str(tmp_path / "out"), "--sees", "nothing"]) == 0
+    assert "weighted success" in capsys.readouterr().out
+    written = "".join(p.read_text() for p in (tmp_path / "out").rglob("*") if p.is_file())
+    assert "918273645" not in written and '"world":"ask_0"' in written
