@@ -325,8 +325,13 @@ def log_aim(recording: rr.RecordingStream, world: World, state: Story, views: Vi
 def log_thought(recording: rr.RecordingStream, step: Step) -> None:
     """The policy's own probabilities, where it gives them."""
     thought = step.action.thought
+    for usage in (thought.usage if thought else None, step.reply.usage if step.reply else None):
+        if usage is not None:
+            recording.log("events", rr.TextLog(f"language model: {usage}"))
     if thought is None:
         return
+    if thought.words:
+        recording.log("events", rr.TextLog(f"because: {thought.words}"))
     if thought.moves is not None:
         recording.log("plot/moves", rr.BarChart(np.asarray(thought.moves)))
     for name, p in (thought.asks or {}).items():
