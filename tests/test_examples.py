@@ -50,7 +50,7 @@ def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
 @pytest.mark.slow
 def test_own_policy_stands_in_the_table_beside_the_baselines(tmp_path, flats):
     said = run("own_policy.py", tmp_path, "--data", str(flats))
-    assert re.search(r"\| least tried \|.*\n.*random walk", said) and "| shortest | test_unseen | 100.0" in said
+    assert re.search(r"\| onward \|.*\n.*random walk", said) and "| shortest | test_unseen | 100.0" in said
 
 
 @pytest.mark.gl

@@ -127,7 +127,7 @@ class HannaPolicy:
         asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
         reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
 
-        trails = [t.here(o) for t, o in zip(memory.trails, seen, strict=True)] if memory.trails else []
+        trails = self._trails(memory.trails, seen) if memory.trails else []
         actions: list[Action | None] = [None] * len(observations)
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
@@ -169,6 +169,15 @@ class HannaPolicy:
             moments,
             tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
+
+    def _trails(self, trails: Sequence[Trail], observations: Sequence[Observation]) -> list[Trail]:
+        """The trails when a step begins, by what the agents see."""
+        current = self.bank.gather([o.sight for o in observations]).cpu().numpy()
+        target = self.bank.gather([o.target for o in observations]).cpu().numpy()
+        return [
+            t.here(o, panorama, None if o.target is None else picture)
+            for t, o, panorama, picture in zip(trails, observations, current, target, strict=True)
+        ]
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
