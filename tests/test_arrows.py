@@ -108,8 +108,8 @@ agents.common <- agents.common.device agents.common.checkpoint_file agents.commo
     embodied.records embodied.locks embodied.envs embodied.datasets embodied.evaluation
 agents.common.figures <- embodied.evaluation
 agents.common.tables <- embodied.evaluation
-agents.vision <- agents.common.shipped agents.common.device assets.catalogue embodied.house embodied.scene embodied.interface
-    embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.common.tensor_file
+agents.vision <- agents.common.shipped agents.common.device assets.catalogue embodied.house embodied.scene
+    embodied.interface embodied.generate embodied.light embodied.render embodied.world embodied.datasets embodied.gym agents.common.tensor_file
     agents.common.checkpoint_file embodied.locks embodied.records
 agents.vision.study <- agents.common.device agents.common agents.vision embodied.datasets embodied.evaluation
     embodied.locks embodied.records
