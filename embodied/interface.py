@@ -281,6 +281,8 @@ class Thought:
     """Probability of each help action: {'help': 0.2, 'nothing': 0.8}."""
     reasons: tuple[float, ...] | None = None
     """HANNA: probabilities of (lost, uncertain_wrong, never_asked)."""
+    match: float | None = None
+    """HANNA: how well the picture that it was shown matches what it sees, up to 1."""
 
 
 @dataclass(frozen=True, slots=True)

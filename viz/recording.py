@@ -332,6 +332,8 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
     for name, p in (thought.asks or {}).items():
         if name != "nothing":  # what remains to one
             recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
+    if thought.match is not None:
+        recording.log("plot/probability/match of the picture", rr.Scalars(thought.match))
 
 
 def mode_name(step: Step) -> str:

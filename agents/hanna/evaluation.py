@@ -110,7 +110,8 @@ class Forgetting:
 def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """What sight is worth, by name: the learned agent without it, and its rules with sight but without learning.
 
-    'blind' sees black with network and matcher alike; the last two draw moves evenly, stop by the picture alone and ask every 5 steps.
+    'blind' sees black with network and matcher alike; the last two draw moves evenly, stop by the picture alone and
+    ask every 5 steps.
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]

@@ -67,8 +67,9 @@ def run_eval(
             bank = showing(
                 bank, data, list(whole.worlds), OCCASIONS[args.shown], encoder.digest, args.cache, args.quality
             )
-            learned = {**hanna_policies(agent, bank), **sight_policies(agent, bank)}
-            plainer = plainer_policies(agent, bank)
+            sight = sight_policies(agent, bank)
+            learned = {**hanna_policies(agent, bank), **{name: sight.pop(name) for name in ("blind", "rules only")}}
+            plainer = {**plainer_policies(agent, bank), **sight}
             judged = _asked_for({**_without_learning(), **learned}, plainer, args.only)
             drawn = {n: pictures_of(data, n, args.quality) for n in whole.worlds}
             looked = Looked((*learned, *plainer), {**looked.pictures, **drawn})

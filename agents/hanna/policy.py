@@ -134,7 +134,7 @@ class HannaPolicy:
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
             n, rng = len(o.candidates), rngs[position]
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
-            thought = thought_of(moves[row], asks[row], reason, n)
+            thought = thought_of(moves[row], asks[row], reason, n, trails[row].match if trails else None)
             weights = moves[row, : n + 1]
             known = False
             if trails:
@@ -244,12 +244,15 @@ class HannaPolicy:
         return self._encoded[text]
 
 
-def thought_of(moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int) -> Thought:
+def thought_of(
+    moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int, match: float | None = None
+) -> Thought:
     """What the networks said, as it is written down: `moves` has stop first, a Thought has it last."""
     return Thought(
         moves=np.append(moves[1 : candidates + 1], moves[0]),
         asks={"help": float(ask), "nothing": float(1 - ask)},
         reasons=reasons,
+        match=match,
     )
 
 
