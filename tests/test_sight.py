@@ -16,6 +16,7 @@ from test_imitation import agent_for, setting
 
 from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
+from agents.hanna.places import Query, auc, precision_recall, threshold
 from agents.vision.bank import FeatureBank
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -117,3 +118,26 @@ def test_with_black_pictures_the_rules_of_an_agent_are_worth_nothing():
         return float(np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes]))
 
     assert success("rules only") > success("rules only, blind") + 0.3
+
+
+def test_pictures_are_of_another_time_and_what_is_seen_is_of_now():
+    own, later = {"a": np.ones((2, 36, 4), np.float32)}, {"a": np.full((2, 36, 4), 5.0, np.float32)}
+    bank = FeatureBank(own, "digest").showing(later)
+    seen, picture = Sight("a", 1), Sight("a", 1, picture=True)
+    assert bank.features(seen)[0, 0] == 1 and bank.features(picture)[0, 0] == 5
+    assert bank.gather([picture, None, seen])[:, 0, 0].tolist() == [5, 0, 1]
+    assert not bank.blind().features(picture).any()
+    with pytest.raises(ValueError, match="same worlds"):
+        FeatureBank(own, "digest").showing({"b": own["a"]})
+
+
+def test_precision_and_recall_count_places_that_are_found_where_they_are():
+    near, far = np.array([0.0, 2.0]), np.array([3.0, 5.0])
+    asked = [
+        Query("h", np.array([0.9, 0.2]), near),
+        Query("h", np.array([0.3, 0.6]), near),
+        Query("h", np.array([0.4, 0.1]), far),
+    ]
+    assert precision_recall(asked, 0.35) == (1 / 3, 1 / 2), "right once, wrong twice, of two that are on the map"
+    assert precision_recall(asked, 0.8) == (1.0, 1 / 2) and 0.6 < threshold(asked) < 0.9
+    assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4

@@ -333,7 +333,7 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
         if name != "nothing":  # what remains to one
             recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
     if thought.match is not None:
-        recording.log("plot/probability/match of the picture", rr.Scalars(thought.match))
+        recording.log("plot/probability/match", rr.Scalars(thought.match))
 
 
 def mode_name(step: Step) -> str:

@@ -89,7 +89,7 @@ def main() -> None:
                 if not path.exists():
                     played = play(split.make_env, judged[name], tasks, seed=args.seed, batch=32, agent=name)
                     save_lines(path, played)
-                episodes = [e for e in load_lines(path, Episode)]
+                episodes = list(load_lines(path, Episode))
                 made = row(name, args.split, episodes, graphs, seed=args.seed)
                 scale = lambda key: 100.0 if key in ("success", "spl") else 1.0
                 values = {
