@@ -18,6 +18,8 @@ from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
 from agents.hanna.places import Query, auc, precision_recall, threshold
 from agents.vision.bank import FeatureBank
+from agents.vision.occasions import OCCASIONS
+from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
@@ -141,3 +143,7 @@ def test_precision_and_recall_count_places_that_are_found_where_they_are():
     assert precision_recall(asked, 0.35) == (1 / 3, 1 / 2), "right once, wrong twice, of two that are on the map"
     assert precision_recall(asked, 0.8) == (1.0, 1 / 2) and 0.6 < threshold(asked) < 0.9
     assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4
+
+
+def test_the_command_line_names_every_occasion():
+    assert tuple(OCCASIONS) == SHOWN

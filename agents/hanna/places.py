@@ -176,14 +176,19 @@ def thresholds(asked: Asked) -> dict[str, float]:
     """By what is shown: the agent's own panoramas, panoramas of another time, single views."""
     pooled = {
         "own": asked.get("again", []),
-        "panorama": [q for word in ("later", "later-camera") for q in asked.get(word, [])],
-        "view": asked.get("later-view", []),
+        "panorama": [
+            q
+            for word, some in asked.items()
+            if word.startswith(("day", "later")) and kind_of(word) == "panorama"
+            for q in some
+        ],
+        "view": [q for word, some in asked.items() if kind_of(word) == "view" for q in some],
     }
     return {kind: threshold(some) for kind, some in pooled.items() if some}
 
 
 def kind_of(word: str) -> str:
-    return "own" if word == "again" else "view" if word == "later-view" else "panorama"
+    return "own" if word == "again" else "view" if word.endswith("view") else "panorama"
 
 
 def main() -> None:

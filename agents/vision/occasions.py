@@ -65,6 +65,8 @@ OCCASIONS: Mapping[str, Occasion] = {
     "camera": Occasion(camera="robot"),
     "hour": Occasion(lighting=1),
     "day": Occasion(day=1),
+    "day-camera": Occasion(day=1, camera="robot"),
+    "day-view": Occasion(day=1, camera="robot", view=True),
     "later": Occasion(lighting=1, day=1),
     "later-camera": Occasion(lighting=1, day=1, camera="robot"),
     "later-view": Occasion(lighting=1, day=1, camera="robot", view=True),

@@ -192,7 +192,7 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
 
 
-SHOWN = ("same", "camera", "hour", "day", "later", "later-camera", "later-view")
+SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
 """As in agents.vision.occasions, which --help should not import."""
 
 
@@ -203,8 +203,8 @@ def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         nargs="+" if several else None,
         default=() if several else SHOWN[0],
         help="when the pictures that helpers show were taken: as the agent sees the place (same), by a robot's camera, "
-        "at another hour, on another day with people elsewhere and small things moved, later (hour and day), later by "
-        "that camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
+        "at another hour, on another day with people elsewhere and small things moved, later (hour and day); by that "
+        "camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
     )
 
 
