@@ -14,9 +14,11 @@ import numpy as np
 
 from agents.hanna.percept import HEADINGS, VIEWS
 
-MATCH = 0.5
-"""Least match at which two panoramas count as one place: the best F1 over pictures taken at another time in validation
-houses (agents.hanna.places)."""
+SAME = 0.8
+"""Least match at which two panoramas of the agent's own, whose headings it knows, are of one place."""
+MATCH, VIEW_MATCH = 0.5, 0.5
+"""Least match at which a picture, a panorama or a single view, was taken at a place: of best F1 over pictures of another
+day and hour in validation houses, as SAME is over panoramas through a noisy camera (agents.hanna.places)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +29,6 @@ class PlaceMap:
     """(k, 36, D) features of each place, as first seen."""
     pictures: np.ndarray = field(default_factory=lambda: np.zeros((0, VIEWS, 1), np.float32))
     """(p, 36, D) features of each picture, rows that it does not show are zero."""
-    least: float = MATCH
-    """Matches below this are of different places."""
 
     @property
     def mean(self) -> np.ndarray:
@@ -51,15 +51,15 @@ class PlaceMap:
     def find(self, picture: int) -> tuple[int | None, np.ndarray]:
         """The place where a picture was taken, None where it is not on the map, and the match (k,) of every place."""
         scores = matches(self.pictures[picture], self.panoramas, self.mean)
-        best = int(scores.argmax()) if len(scores) else -1
-        return (best if best >= 0 and scores[best] >= self.least else None), scores
+        best, alone = int(scores.argmax()), np.count_nonzero(self.pictures[picture].any(-1)) == 1
+        return (best if scores[best] >= (VIEW_MATCH if alone else MATCH) else None), scores
 
     def _known(self, among: np.ndarray, one: np.ndarray, *, turned: bool) -> int | None:
         if not len(among):
             return None
         scores = matches(one, among, self.mean, turned=turned)
         best = int(scores.argmax())
-        return best if scores[best] >= self.least else None
+        return best if scores[best] >= SAME else None
 
 
 def matches(picture: np.ndarray, panoramas: np.ndarray, mean: np.ndarray, *, turned: bool = True) -> np.ndarray:
