@@ -18,11 +18,14 @@ from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
 from agents.hanna.places import Query, auc, precision_recall, threshold
 from agents.vision.bank import FeatureBank
-from agents.vision.occasions import OCCASIONS
+from agents.vision.features import VIEW_SIZE, strip_of
+from agents.vision.occasions import OCCASIONS, strip_around
+from agents.vision.strip import VFOV
 from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
+from embodied.render.panorama import Panorama, face_rays
 
 ROOT = Path(__file__).resolve().parent.parent
 SEEING = {"agents/vision/bank.py", "agents/vision/live.py"}
@@ -147,3 +150,14 @@ def test_precision_and_recall_count_places_that_are_found_where_they_are():
 
 def test_the_command_line_names_every_occasion():
     assert tuple(OCCASIONS) == SHOWN
+
+
+def test_a_single_view_lies_in_its_strip_where_a_panorama_shows_it():
+    """Directions as colours: within the view's field the strip around it is that of the whole panorama."""
+    size = 64
+    rays = face_rays(size)
+    rgb = np.round((rays / np.linalg.norm(rays, axis=-1, keepdims=True) + 1) * 127).astype(np.uint8)
+    panorama = Panorama(rgb, np.ones((6, size, size), np.float32), np.zeros((6, size, size), np.int32))
+    whole, part = strip_of(panorama), strip_around(panorama.view_rgb(0.0, 0.0, VFOV, VIEW_SIZE))
+    field = slice(60, 132), slice(288 - 55, 288 + 55)
+    assert part.shape == whole.shape and np.abs(part[field].astype(int) - whole[field]).max() <= 4

@@ -6,10 +6,12 @@ camera, and of the viewpoint's field of view.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from agents.vision.bank import FeatureBank
@@ -24,7 +26,7 @@ from agents.vision.features import (
     margin,
     save_features,
 )
-from agents.vision.strip import VFOV
+from agents.vision.strip import HEIGHT, VFOV, WIDTH
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.generate.another_day import another_day
@@ -111,12 +113,32 @@ def photographed(encoder: Encoder, panoramas: Iterator[Panorama], occasion: Occa
             yaw = float(stream(0, "occasion", occasion.name, house, node).uniform(0, 2 * np.pi))
             picture = camera.photographed(panorama.view_rgb(yaw, 0.0, VFOV, VIEW_SIZE), VFOV, house, node)
             features = np.zeros((VIEWS, encoder.size), np.float32)
-            features[TURNS] = encoder.encode_views(picture[None, None])[0, 0]
+            features[TURNS] = encoder.encode_strips(strip_around(picture)[None])[0, TURNS]
         else:
             strip = camera.photographed(panorama.equirect(EQUIRECT), None, house, node)[margin()]
             features = encoder.encode_strips(strip[None])[0]
         out.append(features)
     return np.stack(out).astype(np.float16)
+
+
+def strip_around(picture: np.ndarray) -> np.ndarray:
+    """(192, 576, 3) uint8 with a perspective view (240, 320, 3) in its middle, mirrored over and over where nothing is
+    known: encoders of strips see it as they see that part of a panorama."""
+    height, width = picture.shape[:2]
+    focal, rows, columns = height / 2 / math.tan(VFOV / 2), round(math.degrees(VFOV) * EQUIRECT / 180), 120
+    up, left = (np.radians((np.arange(n) - (n - 1) / 2) * 180 / EQUIRECT) for n in (rows, columns))
+    x = np.tile(np.tan(left) * focal, (rows, 1)) + (width - 1) / 2
+    y = np.tan(up)[:, None] / np.cos(left) * focal + (height - 1) / 2
+    sharp = height / rows  # pixels of the picture for one of the strip
+    patch = cv2.remap(
+        cv2.GaussianBlur(picture, (0, 0), 0.4 * sharp),
+        x.astype(np.float32),
+        y.astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REFLECT,
+    )
+    beyond = [((whole - part) // 2,) * 2 for whole, part in zip((HEIGHT, WIDTH), patch.shape)]
+    return np.pad(patch, [*beyond, (0, 0)], mode="symmetric")
 
 
 def shown_path(data: Dataset, name: str, occasion: Occasion, encoder: str, pictures: PictureSettings) -> Path:
