@@ -9,7 +9,7 @@ help:
 	@echo 'make test    the whole test suite'
 	@echo 'make setup   only the set-up: system packages, .venv, Python packages'
 	@echo 'make quick   the tests that take less than a minute together'
-	@echo 'make lint    ruff, its formatter, mypy'
+	@echo 'make lint    ruff, its formatter, import-linter, mypy'
 	@echo 'make docs    API pages from the docstrings, in docs/api'
 	@echo 'make wheel   build the wheel into dist/'
 
@@ -25,6 +25,7 @@ test: setup
 lint: setup
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
+	@mkdir -p build; .venv/bin/lint-imports --no-cache > build/imports.log 2>&1 || { cat build/imports.log; false; }
 	@.venv/bin/mypy
 
 quick: setup

@@ -300,6 +300,8 @@ class Ask:
 
     intention: Intention = Intention.HELP
     thought: Thought | None = field(default=None, compare=False, repr=False)
+    question: str | None = None
+    """The question in words, where a person or a language model put it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -450,7 +452,9 @@ class Step:
     reply: Reply | None
     next_pose: Pose
     cost: float = 0.0
-    """HARI: the cost of this step, shaping excluded."""
+    """HARI: the cost of this step, shaping excluded; with people, the price of the question."""
+    seconds: float | None = None
+    """When it was taken, since the episode began; None where no person took part."""
 
 
 @dataclass(frozen=True)
@@ -463,6 +467,8 @@ class Episode:
     agent: str = ""
     budget: int | None = None
     """The whole number of requests that this episode was given; None without a budget."""
+    house: str = ""
+    """The start of the digest of the house it was played in: houses of other data sets have the same names."""
 
     @property
     def nodes(self) -> tuple[int, ...]:

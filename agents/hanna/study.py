@@ -1,5 +1,5 @@
-"""The dissertation's tables on our houses (agents.hanna.study_tables): train the agents of each row, judge all on the same
-tasks, print both."""
+"""The dissertation's tables on our houses (agents.hanna.study_tables): train the agents of each row, judge all on the
+same tasks, print both."""
 
 from __future__ import annotations
 

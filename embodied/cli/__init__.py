@@ -38,6 +38,7 @@ COMMANDS = (
     "train",
     "eval",
     "judge",
+    "serve",
     "study",
     "iliad",
     "bench",
