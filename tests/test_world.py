@@ -11,7 +11,6 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.interface import Sight
 from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
@@ -127,14 +126,11 @@ def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplo
         assert file.meta["house"] == edited.digest
 
 
-def test_unknown_nodes_folders_and_sights_are_refused(world, tmp_path):
+def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
     with pytest.raises(IndexError, match="0 to 2"):
         world.panorama(3)
     with pytest.raises(FileNotFoundError, match=r"house\.json"):
         open_folder(tmp_path, HandCatalogue(), tmp_path)
-    assert world.node_of(Sight(world.name, 2)) == 2
-    with pytest.raises(ValueError, match="other house"):
-        world.node_of(Sight("other house", 2))
 
 
 def test_a_world_without_pictures_says_so(house, tmp_path):

@@ -33,6 +33,7 @@ from embodied.interface import (
     Stop,
     Subtask,
     Task,
+    Viewpoint,
 )
 from embodied.seeds import checked_seed, stream
 
@@ -84,7 +85,7 @@ class HelpEnv:
         self.task, self.seed, self.world = task, checked_seed(seed), self.worlds[task.world]
         self.pose = task.start
         self.mode, self.instruction = Mode.MAIN, task.request
-        self.target: Sight | None = None
+        self.target: Viewpoint | None = None
         self.targets = task.goal_nodes
         self.subtask: Subtask | None = None
         self.time = self.time_on_task = self.requests = 0
@@ -261,7 +262,7 @@ class HelpEnv:
             tilt=self.pose.tilt,
             candidates=candidates,
             instruction=self.instruction,
-            target=self.target,
+            target=None if self.target is None else Sight(self.target.world, self.target.node, picture=True),
             mode=self.mode,
             can_ask=self._askable(self.situation),
             requests_left=left,
@@ -271,6 +272,7 @@ class HelpEnv:
             goal_descriptions=goals,
             detections=self._detections(),
             advised=self._advised(),
+            moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
         )
         return self.observation
 
