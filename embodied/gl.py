@@ -90,6 +90,15 @@ def choose() -> str:
     return backend
 
 
+def available() -> bool:
+    """Whether some off-screen OpenGL is here."""
+    try:
+        choose()
+    except GLError:
+        return False
+    return True
+
+
 def prepare() -> None:
     """Set MuJoCo's switch before mujoco is imported; that nothing can draw is said only when asked to draw.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import functools
+import importlib
 import importlib.util
 from pathlib import Path
 from unittest import mock
@@ -51,8 +52,9 @@ def _try(path: Path) -> bool:
 
 
 def bind_osmesa() -> None:
-    """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa; call it before either draws."""
-    library, find = bundled("OSMesa"), ctypes.util.find_library
-    if library is not None and find("OSMesa") is None:
-        with mock.patch("ctypes.util.find_library", lambda name: str(library) if name in ("OSMesa", "GL") else find(name)):
-            importlib.import_module("OpenGL.osmesa")
+    """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa where the system has none; call it before they are imported."""
+    library, load = bundled("OSMesa"), ctypes.CDLL
+    if library is not None and ctypes.util.find_library("OSMesa") is None:
+        found = lambda name, mode: load(str(library) if "OSMesa" in str(name) else name, mode)
+        with mock.patch.object(ctypes.cdll, "_dlltype", found):
+            importlib.import_module("OpenGL.platform")

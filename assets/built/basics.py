@@ -151,7 +151,10 @@ def bathtub(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
         box([x1, y0, 0], [w / 2, y1, h], 0.012),
         box([x0, y0, 0], [x1, y1, deep]),
     ]
-    tap = [bar([x0 - 0.02, 0, h], [x0 - 0.02, 0, h + 0.12], 0.03, 0.03), bar([x0 - 0.02, 0, h + 0.12], [x0 + 0.12, 0, h + 0.1], 0.026, 0.02)]
+    tap = [
+        bar([x0 - 0.02, 0, h], [x0 - 0.02, 0, h + 0.12], 0.03, 0.03),
+        bar([x0 - 0.02, 0, h + 0.12], [x0 + 0.12, 0, h + 0.1], 0.026, 0.02),
+    ]
     return parts_of((PORCELAIN, shell), (metal(look, finish, "chrome"), tap))
 
 

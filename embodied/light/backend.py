@@ -60,12 +60,12 @@ def _module() -> types.ModuleType:
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
     try:
+        import drjit as dr
         import mitsuba as mi
-    except ImportError as e:
-        raise LightError(
-            f"light needs mitsuba ({e}); `pip install mitsuba`, or look at the house with quality='unlit'"
-        ) from e
-    import drjit as dr
+    except (ImportError, NameError) as e:  # NameError: Dr.Jit's own, where a library of the system is missing
+        why = str(e.__context__ or e)
+        remedy = "apt-get install libatomic1" if "libatomic" in why else "pip install mitsuba"
+        raise LightError(f"light needs mitsuba ({why}); {remedy}, or look at houses without light (unlit)") from e
 
     mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
     if (threads := threads_allowed()) is not None:

@@ -1,7 +1,7 @@
 """Collect the furniture models that the catalogue uses into this folder, so that `pip wheel` makes a package of them.
 
-Reads the libraries of Debian's package sweethome3d-furniture (or those named) and writes one .sh3f of each with the OBJ, MTL
-and picture files that are needed, byte for byte as they are, beside their licences and ATTRIBUTION.md.
+Reads the libraries of Debian's package sweethome3d-furniture (or those named) and writes one .sh3f of each with the
+OBJ, MTL and picture files that are needed, byte for byte as they are, beside their licences and ATTRIBUTION.md.
 """
 
 from __future__ import annotations
