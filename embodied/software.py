@@ -1,7 +1,7 @@
 """Libraries of software OpenGL (OSMesa) and of LLVM that came by pip, for machines where nobody may install packages.
 
-The wheel lavavu-osmesa (Linux, x86-64) carries both. `pip install embodied-houses[software]` brings it; nothing of LavaVu
-itself is used.
+The wheel lavavu-osmesa (Linux, x86-64) carries both. `embodied doctor --fix` brings it; nothing of LavaVu itself is
+used.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _try(path: Path) -> bool:
 
 
 def bind_osmesa() -> None:
-    """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa where the system has none; call it before they are imported."""
+    """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa where the system has none; call it before importing them."""
     library, load = bundled("OSMesa"), ctypes.CDLL
     if library is not None and ctypes.util.find_library("OSMesa") is None:
         found = lambda name, mode: load(str(library) if "OSMesa" in str(name) else name, mode)

@@ -1,4 +1,4 @@
-"""Beds, sofas, tables, chairs, a toilet and a television of simple shape, for installations without furniture models."""
+"""Beds, sofas, tables, chairs, a toilet and a television of simple shape, where no furniture models are installed."""
 
 from __future__ import annotations
 

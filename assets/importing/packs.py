@@ -12,7 +12,7 @@ from assets.importing.sh3f import Pack, PackError, open_pack
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
 WHEEL = "embodied_furniture"
-"""The package of `pip install embodied-houses[furniture]`: the models that the catalogue uses, out of the same libraries."""
+"""The package of `pip install embodied-houses[furniture]`: the models of those libraries that the catalogue uses."""
 
 
 def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 
-from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, show
+from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, note, show
 from embodied.cli.options import add_fields, any_path, chosen, folder_to_write
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
