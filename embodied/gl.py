@@ -43,7 +43,7 @@ ELSEWHERE = (
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
-    "or, without root on Linux x86-64, software OpenGL by pip: pip install embodied-houses[software]"
+    "or, without root on Linux x86-64, run: embodied doctor --fix"
 )
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
 """Words by which a device name tells that no graphics hardware is used."""
