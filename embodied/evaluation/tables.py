@@ -170,12 +170,21 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
         name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
         for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
     }
+    values |= {name: _at_the_end(v) for name, v in values.items() if name in PERCENT}
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
     if episodes[0].task.kind == "vnla":  # where turning on the spot is no mistake
         del repeats["mistake repeat"]
     for name, f in repeats.items():
         values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
     return Row(agent, split, seed, len(episodes), len(set(groups)), values)
+
+
+def _at_the_end(share: Estimate) -> Estimate:
+    """A share of 0 or 1 tells nothing of its spread: half its width is how far the exact interval reaches (Clopper and
+    Pearson 1934), for n independent episodes."""
+    if share.n == 0 or share.half > 0 or share.mean not in (0.0, 1.0):
+        return share
+    return Estimate(share.mean, 1.0 - 0.025 ** (1.0 / share.n), share.n)
 
 
 def shown(name: str, value: Estimate) -> str:
