@@ -199,7 +199,7 @@ def _write_shown(folder: Path) -> None:
     """What is made to be looked at, and the sightings in a cache."""
     values = {"success": tables.Estimate(0.5, 0.1, 40)}
     (folder / "table.json").write_text(tables.as_json([tables.Row("shortest path", "val_seen", 0, 40, 4, values)]))
-    save_table(folder / "sightings.npz", sightings_table([np.zeros((6, 4, 4), np.int32)], 3))
+    save_table(folder / "sightings.npz", sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3))
     with open_recording(Sinks(folder / "a.rrd"), rrb.Blueprint(), name="fuzz", properties={}) as recording:
         recording.log("text", rr.TextDocument("a"))
 
@@ -359,7 +359,7 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
 BESIDE = [
     (hari.load_agent, hari.FORMAT, {}, "missing fields"),
     (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": "{"}, "as JSON"),
-    (hari.load_agent, hari.FORMAT, {"names": "[1]", "settings": '{"execution": {}}'}, r"names\[0\] should be str"),
+    (hari.load_agent, hari.FORMAT, {"names": "[1]", "settings": '{"execution": {}}'}, r"names\[0\] should be a text"),
     (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"wings": 2}}'}, "unknown fields"),
     (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"heads": 0}}'}, "at least 1"),
     (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {}}'}, "execution policy alone"),
