@@ -32,6 +32,9 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
 
     Returns:
       A fresh PCG64 generator.
+
+    Raises:
+      TypeError: a seed that is no whole number.
     """
     text = "\x1f".join([f"{checked_seed(seed):d}", *(f"{type(n).__name__}:{n}" for n in names)])
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")

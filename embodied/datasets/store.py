@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -27,6 +27,8 @@ from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
 from embodied.interface import Assistant, Episode, FindObject, Language, Place, Route, Task
+from embodied.language.plain import PlainLanguage
+from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import RecordError, from_plain, read_lines
 from embodied.render.pictures import PictureSettings
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
     from embodied.world import World
 
 T = TypeVar("T")
+SUBGOALS = "subgoals.jsonl"
+"""In a house's folder: sub-goals in people's words (`embodied dataset from-people`)."""
 ANNA_SPLIT = {
     "train": "train_seen",
     "val_seen": "train_unseen",
@@ -243,7 +247,7 @@ class Dataset:
 
         Args:
           houses: only its first so many houses; all if None.
-          language: of VNLA's advisor.
+          language: of VNLA's advisor; people's words where the data set holds some, else plain, if None.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
           vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
@@ -253,12 +257,13 @@ class Dataset:
           DatasetError: an unknown split, or files that were lost or changed.
         """
         names = self.names(name)[:houses]
+        said = self.said(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
         make_env = environment_maker(
             self.kind,
             places,
             wording=ANNA_SPLIT.get(name, ""),
-            language=language,
+            language=language or (PeoplesWords(said, PlainLanguage()) if said else None),
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
             hari=hari,
@@ -267,6 +272,11 @@ class Dataset:
         )
         tasks = [t for t in self.tasks(name) if t.world in places]
         return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla, hari), make_env)
+
+    def said(self, names: Iterable[str]) -> tuple[Said, ...]:
+        """Sub-goals in the words of people who spoke of these houses."""
+        spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
+        return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""

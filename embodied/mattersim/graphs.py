@@ -10,10 +10,11 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from embodied.navigation.graph import read_viewpoints
+from embodied.navigation.graph import viewpoints_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +86,7 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
     """Read the connectivity files of some scans; kept, since a hundred simulators may want the same.
 
     Raises:
-      ValueError: a file is missing, as there, or is none of the format.
+      ValueError: a file is missing, as there, or none of the format: says which viewpoint.
     """
     items = [(scan, item) for scan in scans for item in _read(Path(folder) / f"{scan}_connectivity.json")]
     sizes = {scan: sum(s == scan for s, _ in items) for scan in scans}
@@ -125,9 +126,9 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
     )
 
 
-def _read(path: Path) -> list[dict]:
+def _read(path: Path) -> list[dict[str, Any]]:
     try:
-        return read_viewpoints(path)
+        return viewpoints_of(path)
     except OSError as e:
         raise ValueError(f"MatterSim: Could not open navigation graph file: {path}, is path valid?") from e
 
