@@ -265,7 +265,7 @@ def _group(name: str, polygons: list[Polygon], points: np.ndarray, uv_count: int
 def _index(word: str, before: int, count: int) -> int:
     """From 0 on, of `count`; a negative one counts back from the `before` that stand above it in the file."""
     i = int(word)
-    i = i - 1 if i > 0 else before + i
+    i = i - 1 if i > 0 else before + i if i < 0 else -1
     if not 0 <= i < count:
         raise IndexError(f"index {word} of {count}")
     return i
