@@ -157,7 +157,7 @@ def read_obj(
             material = MtlMaterial(group.material, diffuse=(grey[0], grey[1], grey[2]))
         _tell_of(material, say)
         image = pictures.of(material)
-        there = (group.uv_corners >= 0).all(axis=1)
+        there = np.asarray((group.uv_corners >= 0).all(axis=1))
         if own and image is not None and not there.all():
             say(f"some faces of material {material.name!r} have no texture coordinates; they have the mean colour")
         if not own and not there.all():

@@ -201,7 +201,7 @@ def _map(text: str) -> MtlMap:
     found: dict[str, Any] = {}
     while option := re.match(r"-(\w+)\s+", text):
         text, number = text[option.end() :], re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+")
-        values = []
+        values: list[float] = []
         while len(values) < OPTIONS.get(option[1], 1) and (m := number.match(text)):
             values.append(float(m[1]))
             text = text[m.end() :]
