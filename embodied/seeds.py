@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import operator
-from typing import SupportsIndex
 
 import numpy as np
 
 
-def whole(seed: SupportsIndex) -> int:
-    """A seed as Python's own integer, NumPy's included.
+def checked_seed(seed: object) -> int:
+    """`seed` as a plain integer; NumPy's integers are, too.
 
     Raises:
-      TypeError: it is no whole number.
+      TypeError: a text, a number with a point, None.
     """
     try:
-        return operator.index(seed)
-    except TypeError as e:
-        raise TypeError(f"a seed should be a whole number, got {seed!r}; pass an integer such as 7") from e
+        return operator.index(seed)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"a seed should be an integer, got {seed!r:.60} ({type(seed).__name__})") from None
 
 
-def stream(seed: SupportsIndex, *names: str | int) -> np.random.Generator:
+def stream(seed: int, *names: str | int) -> np.random.Generator:
     """The generator that belongs to `names` under `seed`.
 
     The same arguments give the same draws in every process and on every machine; different
@@ -37,6 +36,6 @@ def stream(seed: SupportsIndex, *names: str | int) -> np.random.Generator:
     Raises:
       TypeError: a seed that is no whole number.
     """
-    text = "\x1f".join([f"{whole(seed)}", *(f"{type(n).__name__}:{n}" for n in names)])
+    text = "\x1f".join([f"{checked_seed(seed):d}", *(f"{type(n).__name__}:{n}" for n in names)])
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import io
-import json
 import logging
 import struct
 import warnings
@@ -32,6 +31,7 @@ from assets.importing.obj import Group, MeshError, MtlMaterial, Obj, decoded, li
 from assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from assets.importing.sh3f import Pack, PackError
 from assets.importing.textures import cut, filled, palette, shrunk, tinted
+from assets.json_file import read_json
 from assets.records import Finish, ImportRecipe, MeshPart, bounds
 
 log = logging.getLogger(__name__)
@@ -472,7 +472,7 @@ def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | Non
 def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | None:
     """The cached parts and what they tell, or None where a file is missing or does not match its checksum."""
     try:
-        manifest = json.loads((folder / f"{stem}.json").read_text())
+        manifest = read_json(folder / f"{stem}.json")
         files = {name: (folder / name).read_bytes() for name in manifest["sha256"]}
         if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
             return None

@@ -24,7 +24,7 @@ from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
-from embodied.cli.options import add_fields, any_path, folder_to_write, positive, whole
+from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -168,7 +168,11 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
         "--split", default="val_unseen", help="whose houses encoders are judged on (default: %(default)s)"
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=1, metavar="N", help="encoders per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=1,
+        metavar="N",
+        help="encoders per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="encoders trained side by side (default: %(default)s)"
@@ -187,8 +191,25 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
     )
+    add_shown(parser, several=True)
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_device(parser)
+
+
+SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
+"""As in agents.vision.occasions, which --help should not import."""
+
+
+def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    parser.add_argument(
+        "--shown",
+        choices=SHOWN,
+        nargs="+" if several else None,
+        default=() if several else SHOWN[0],
+        help="when the pictures that helpers show were taken: as the agent sees the place (same), by a robot's camera, "
+        "at another hour, on another day with people elsewhere and small things moved, later (hour and day); by that "
+        "camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
+    )
 
 
 def add_train_hanna(parser: argparse.ArgumentParser) -> None:
@@ -235,7 +256,7 @@ def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_scale(parser, VNLA_SCALES)
     parser.add_argument(
         "--seeds",
-        type=whole(),
+        type=whole(1, REPEATS),
         default=3,
         metavar="N",
         help="agents of the learned asker, from --seed on (default: %(default)s)",
@@ -296,7 +317,11 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
         help="a trained execution policy (default: trained in --out first)",
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=3,
+        metavar="N",
+        help="agents per row, from --seed on (default: %(default)s)",
     )
     add_judged_tasks(parser)
     add_agents_side_by_side(parser)
@@ -330,7 +355,11 @@ def add_study(parser: argparse.ArgumentParser) -> None:
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=1, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=1,
+        metavar="N",
+        help="agents per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--judged-in",
@@ -428,6 +457,7 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
         default=32,
         help="episodes side by side; no influence on results (default: %(default)s)",
     )
+    add_shown(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where tables and episodes go")
     add_json(parser)
 
@@ -449,7 +479,7 @@ def add_study_bandit(parser: argparse.ArgumentParser) -> None:
         help="runs, tables and figures; the same command goes on",
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     add_scale(parser, BANDIT_SCALES)
     parser.add_argument(
@@ -491,7 +521,11 @@ def add_study_iliad(parser: argparse.ArgumentParser) -> None:
     _add_regex_files(parser)
     add_nav_data(parser, required=False)
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="students per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=3,
+        metavar="N",
+        help="students per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="students side by side (default: %(default)s)"
@@ -556,7 +590,7 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--only", nargs="+", metavar="RATER", help="which raters, such as 'skew 4' (default: all)")
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
     parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")

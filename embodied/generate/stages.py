@@ -27,7 +27,7 @@ from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
 from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
-from embodied.seeds import stream, whole
+from embodied.seeds import checked_seed, stream
 
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
@@ -251,7 +251,7 @@ def generate_house(
       HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
       TypeError: a seed that is no whole number.
     """
-    seed = whole(seed)
+    seed = checked_seed(seed)
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
         draft = Draft(seed, config, catalogue, first=first, stages=stages)
