@@ -430,6 +430,7 @@ def test_draco_that_nothing_is_told_of_is_refused_by_name_too(tmp_path):
     ("material", "more", "words"),
     [
         (pbr() | {"normalTexture": {"index": 0}}, {}, "normalTexture"),
+        ({"name": "paint", "pbrMetallicRoughness": {}}, {}, "give it a metallicFactor"),
         (pbr() | {"emissiveFactor": [1, 1, 0]}, {}, "'glow'"),
         (pbr(), {"extensionsUsed": ["KHR_materials_sheen"]}, "KHR_materials_sheen"),
         (pbr(), {"animations": [{}]}, "animations are not played"),

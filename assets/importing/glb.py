@@ -350,6 +350,8 @@ class _Reader:
             factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
             roughness, metallic, both = 1 - older.get("glossinessFactor", 1.0), 0.0, None
         shown = f"material {name!r}"
+        if metallic == 1.0 and both is None and "metallicFactor" not in core:
+            self.tell(f"{shown} says nothing of metal, which makes it metal in glTF; give it a metallicFactor")
         for field in ("normalTexture", "emissiveTexture"):
             if field in material:
                 self.tell(f"the {field} of {shown} is not drawn")
