@@ -437,6 +437,8 @@ class Episode:
     agent: str = ""
     budget: int | None = None
     """The whole number of requests that this episode was given; None without a budget."""
+    house: str = ""
+    """The start of the digest of the house it was played in: houses of other data sets have the same names."""
 
     @property
     def nodes(self) -> tuple[int, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import av
 import numpy as np
 import pytest
 from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
@@ -38,6 +39,7 @@ from embodied.policies.baselines import (
 )
 from embodied.seeds import stream
 from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, lost_as_written, segments
+from viz.video import _captions, film_episode
 
 # ANNA
 
@@ -281,3 +283,19 @@ def test_entropy_in_base_37_spans_zero_to_one():
     sure, even = np.array([1.0, 0, 0]), np.full(3, 1 / 3)
     assert base37_entropy(sure, candidates) == 0
     assert base37_entropy(even, candidates) == pytest.approx(math.log(3) / math.log(VIEWS + 1))
+
+
+def test_a_film_of_an_episode_shows_the_request_and_then_what_the_assistant_said(tmp_path):
+    env = line_env()
+    env.reset(LINE_TASK)
+    while env.ended is None:
+        asks = bool(env.observation.can_ask) and not env.requests
+        env.step(Ask() if asks else Stop() if env.time else Move(0))
+    episode = env.episode()
+    reply = next(s.reply.text for s in episode.steps if s.reply)
+    words, first = _captions(episode), f"Task: {LINE_TASK.request}"
+    assert words[0] == first and f"Agent asks. Assistant: {reply}" in words and first in words[-1]
+    black = np.zeros((48, 64, 3), np.uint8)
+    frames = film_episode(env.world.graph, episode, lambda i, c: black, tmp_path / "film.mp4", (48, 64))
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == frames > len(episode.steps)

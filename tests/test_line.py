@@ -165,7 +165,7 @@ def test_the_film_starts_and_ends_where_the_walk_does_and_never_jumps(world, tmp
     task = tasks_of(world, 1)[0]
     episode = play(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)[0]
     poses = [task.start, *(s.next_pose for s in episode.steps)]
-    track = camera_track(world.graph.positions, poses)
+    track = np.concatenate(camera_track(world.graph.positions, poses))
     assert track[0, :3] == pytest.approx(world.graph.positions[poses[0].node])
     assert track[-1, :3] == pytest.approx(world.graph.positions[poses[-1].node])
     assert np.linalg.norm(np.diff(track[:, :3], axis=0), axis=1).max() < 0.1

@@ -112,8 +112,9 @@ def make_products(
     Args:
       progress: told each product before it is made.
     """
-    if folder.exists():
-        shutil.rmtree(folder)
+    if folder.exists() and any(folder.iterdir()) and not (folder / "houses.json").exists():
+        raise ValueError(f"{folder} holds other things than freeze makes; choose another --out")
+    shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     progress("houses")
     write_json(folder / "houses.json", dict(_houses(catalogue)), indent=1)

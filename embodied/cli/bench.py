@@ -82,21 +82,15 @@ def run(args: argparse.Namespace) -> int:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, seen, timing, world
 
-    catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
+    parts = args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
-    if "light" in parts:
-        return light(args, catalogue)
-    if "codecs" in parts:
-        return codecs(args, catalogue)
-    if "growth" in parts:
-        return growth(args, catalogue)
-    if "look" in parts:
-        return look(args, catalogue)
-    if "serve" in parts:
-        return serve(args)
-    if "freeze" in parts:
-        return freeze(args, catalogue)
+    alone = {"light": light, "codecs": codecs, "growth": growth, "look": look, "freeze": freeze, "serve": serve}
+    if len(parts) > 1 and (reports := sorted(set(parts) & set(alone))):
+        raise ValueError(f"{reports[0]} makes a report of its own; run it without {sorted(set(parts) - {reports[0]})}")
+    catalogue = catalogue_of(args)
+    if parts[0] in alone:
+        return alone[parts[0]](args, catalogue)
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality, args.look),
@@ -167,7 +161,7 @@ def growth(args: argparse.Namespace, catalogue: Catalogue) -> int:
     return 0
 
 
-def serve(args: argparse.Namespace) -> int:
+def serve(args: argparse.Namespace, catalogue: Catalogue) -> int:
     """People at once on a server."""
     from embodied.bench.serve import measure
 

@@ -15,8 +15,8 @@ import argparse
 import dataclasses
 from collections.abc import Iterable
 
-from embodied.cli.common import add_cache, add_json, add_packs, note, show
-from embodied.cli.options import LOOK_HELP, any_path, face, folder_to_write, whole
+from embodied.cli.common import add_cache, add_json, add_packs, note, pause, show
+from embodied.cli.options import HOUSES, LOOK_HELP, any_path, face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import LOOKS, QUALITIES, PictureSettings
 
@@ -38,7 +38,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--houses",
-        type=whole(),
+        type=whole(1, HOUSES),
         metavar="N",
         help="instead of --scale: houses to learn from; a tenth to validate, a fifth to test in",
     )
@@ -46,7 +46,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--tasks", type=whole(), metavar="N", help="with --houses: training tasks (default: 100 per house)"
     )
     parser.add_argument(
-        "--test-houses", type=whole(), metavar="N", help="with --houses: houses to test in, with as many tasks each"
+        "--test-houses",
+        type=whole(1, HOUSES),
+        metavar="N",
+        help="with --houses: houses to test in, with as many tasks each",
     )
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
     parser.add_argument(
@@ -74,7 +77,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--ood",
-        type=whole(0),
+        type=whole(0, HOUSES),
         default=0,
         metavar="N",
         help="houses out of distribution besides (split 'test_ood'), with furniture, looks, speakers and words that "
@@ -166,7 +169,7 @@ def run(args: argparse.Namespace) -> int:
     )
 
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
-        return tqdm(jobs, "houses", total=total, unit="house")
+        return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
 
     build_dataset(
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray

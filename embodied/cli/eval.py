@@ -7,6 +7,7 @@ the episodes, to --out.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -16,6 +17,8 @@ from embodied.cli.options import add_hari_rules, add_rules, any_path, folder_to_
 from embodied.datasets.scale import KINDS
 
 if TYPE_CHECKING:
+    from embodied.datasets.store import Dataset
+    from embodied.envs.hari import HariRules
     from embodied.interface import Episode
 
 COLUMNS = {
@@ -49,18 +52,30 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    import json
-
-    from assets.cache import write_bytes
     from embodied.datasets.store import Dataset
-    from embodied.evaluation import as_programs, tables
-    from embodied.evaluation.evaluate import LOOKING, agent, agent_names, evaluate
-    from embodied.records import episodes_file, fingerprint, save_lines
+    from embodied.evaluation.evaluate import agent_names
+    from embodied.locks import locked
 
     data = Dataset(args.data)
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names, variants = args.agent or agent_names(args.kind), hari_rules_of(args)
+    for split in args.split:
+        data.names(split)
+    if unknown := sorted(set(names) - set(agent_names(args.kind))):
+        raise ValueError(f"unknown agents {unknown}; those of {args.kind!r} are {list(agent_names(args.kind))}")
+    with locked(args.out) if args.out else contextlib.nullcontext():
+        return judge(args, data, names, variants)
+
+
+def judge(args: argparse.Namespace, data: Dataset, names: Sequence[str], variants: HariRules) -> int:
+    """The table, and what goes into --out."""
+    import json
+
+    from assets.cache import write_bytes
+    from embodied.evaluation import as_programs, tables
+    from embodied.evaluation.evaluate import LOOKING, agent, evaluate
+    from embodied.records import episodes_file, fingerprint, save_lines
 
     def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")

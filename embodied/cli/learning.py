@@ -24,7 +24,7 @@ from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
-from embodied.cli.options import add_fields, any_path, folder_to_write, positive, whole
+from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -168,7 +168,11 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
         "--split", default="val_unseen", help="whose houses encoders are judged on (default: %(default)s)"
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=1, metavar="N", help="encoders per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=1,
+        metavar="N",
+        help="encoders per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="encoders trained side by side (default: %(default)s)"
@@ -235,7 +239,7 @@ def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_scale(parser, VNLA_SCALES)
     parser.add_argument(
         "--seeds",
-        type=whole(),
+        type=whole(1, REPEATS),
         default=3,
         metavar="N",
         help="agents of the learned asker, from --seed on (default: %(default)s)",
@@ -296,7 +300,11 @@ def add_study_hari(parser: argparse.ArgumentParser) -> None:
         help="a trained execution policy (default: trained in --out first)",
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=3,
+        metavar="N",
+        help="agents per row, from --seed on (default: %(default)s)",
     )
     add_judged_tasks(parser)
     add_agents_side_by_side(parser)
@@ -330,7 +338,11 @@ def add_study(parser: argparse.ArgumentParser) -> None:
         "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=1, metavar="N", help="agents per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=1,
+        metavar="N",
+        help="agents per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--judged-in",
@@ -449,7 +461,7 @@ def add_study_bandit(parser: argparse.ArgumentParser) -> None:
         help="runs, tables and figures; the same command goes on",
     )
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     add_scale(parser, BANDIT_SCALES)
     parser.add_argument(
@@ -491,7 +503,11 @@ def add_study_iliad(parser: argparse.ArgumentParser) -> None:
     _add_regex_files(parser)
     add_nav_data(parser, required=False)
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="students per row, from --seed on (default: %(default)s)"
+        "--seeds",
+        type=whole(1, REPEATS),
+        default=3,
+        metavar="N",
+        help="students per row, from --seed on (default: %(default)s)",
     )
     parser.add_argument(
         "--workers", type=whole(), default=1, metavar="N", help="students side by side (default: %(default)s)"
@@ -556,7 +572,7 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--only", nargs="+", metavar="RATER", help="which raters, such as 'skew 4' (default: all)")
     parser.add_argument(
-        "--seeds", type=whole(), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
+        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
     parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")

@@ -130,9 +130,8 @@ def run_regex(args: argparse.Namespace) -> int:
     from agents.iliad.regex.run import learn, prepare
     from embodied.cli.options import chosen
 
-    regex = chosen(args, REGEX_SCALES[args.scale])
+    regex, learner = chosen(args, REGEX_SCALES[args.scale]), chosen(args, LEARNER_SCALES[args.scale])
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
-    learner = chosen(args, LEARNER_SCALES[args.scale])
     learn(grounds, learner, args.out / "students" / students_of(regex), minutes=args.minutes, note=note)
     return 0
 
@@ -143,10 +142,9 @@ def run_nav(args: argparse.Namespace) -> int:
     from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
-    nav = chosen(args, NAV_SCALES[args.scale])
+    nav, learner = chosen(args, NAV_SCALES[args.scale]), chosen(args, NAV_LEARNER_SCALES[args.scale])
     source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
     grounds = prepare(nav, source, args.out / "shared", note=note)
-    learner = chosen(args, NAV_LEARNER_SCALES[args.scale])
     learn(grounds, learner, args.out / "students" / nav_students_of(nav), minutes=args.minutes, note=note)
     return 0
 

@@ -31,7 +31,7 @@ from embodied.interface import (
     Subtask,
     Task,
 )
-from embodied.seeds import stream
+from embodied.seeds import checked_seed, stream
 
 T = TypeVar("T")
 
@@ -78,7 +78,7 @@ class HelpEnv:
           TaskError: unknown world, nodes outside the graph, a goal that is not in the house.
         """
         check_task(task, self.worlds)
-        self.task, self.seed, self.world = task, seed, self.worlds[task.world]
+        self.task, self.seed, self.world = task, checked_seed(seed), self.worlds[task.world]
         self.pose = task.start
         self.mode, self.instruction = Mode.MAIN, task.request
         self.target: Sight | None = None
@@ -136,6 +136,10 @@ class HelpEnv:
         )
         return self._look() if self.ended is None else None
 
+    def cut_short(self) -> None:
+        """End the episode here, as its horizon does; nothing where it has ended."""
+        self.ended = self.ended or "limit"
+
     def facts(self) -> dict[str, float]:
         """Numbers about the episode so far that its record does not hold."""
         return {}
@@ -154,7 +158,13 @@ class HelpEnv:
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
         return Episode(
-            task=self.task, steps=tuple(self._steps), ended=self.ended, seed=self.seed, agent=agent, budget=self.budget
+            task=self.task,
+            steps=tuple(self._steps),
+            ended=self.ended,
+            seed=self.seed,
+            agent=agent,
+            budget=self.budget,
+            house=self.world.house.digest[:16],
         )
 
     # What a rule with help overrides -------------------------------------------------------------

@@ -15,9 +15,7 @@ class HannaEnv(HelpEnv):
         self.instruction = required(reply.text, "text in the reply")  # line 11
         self.target = reply.image  # line 12: I^depart
         self.subtask, self.targets = subtask, (subtask.target,)
-        self.pose = required(
-            subtask.start, "start of the route"
-        )  # line 13: step to the start of the route and look along it
+        self.pose = subtask.start or self.pose  # line 13: step to the start of the route and look along it
         self.time_on_task = 0
 
     def _stopped(self) -> None:

@@ -28,7 +28,6 @@ from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import nearest
 from embodied.policies.baselines import Shortest
 
-
 SAID = "said "
 """How the ids of sub-tasks begin that people put into words."""
 
