@@ -72,7 +72,8 @@ class Story:
         """Take in the action of `step` and the reply to it."""
         if isinstance(step.action, Ask):
             self.requests += 1
-            self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
+            question = step.action.question or QUESTIONS[step.action.intention]
+            self.dialogue.append(f"**Agent** (step {self.count}): {question}")
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
