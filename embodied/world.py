@@ -18,7 +18,7 @@ from assets.closure import code_digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
-from embodied.interface import Sight, Sighting
+from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
 from embodied.render.camera import View
@@ -232,16 +232,6 @@ class World:
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
         return self._sightings.at(node, self.house)
-
-    def node_of(self, sight: Sight) -> int:
-        """The node behind a sight; for renderers and recordings, never for a policy.
-
-        Raises:
-          ValueError: the sight is of another world.
-        """
-        if sight._world != self.name:
-            raise ValueError(f"this sight is of world {sight._world!r}, not of {self.name!r}; pass it to its own world")
-        return sight._node
 
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""

@@ -11,7 +11,6 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.interface import Sight
 from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
@@ -55,6 +54,14 @@ def test_a_panorama_from_the_file_is_the_one_that_was_drawn(world):
     assert np.abs(kept.depth - drawn.depth).max() <= 0.0005 + 1e-6
     error = np.abs(kept.rgb.astype(int) - drawn.rgb)
     assert error.mean() < 1.25 and np.square(error).mean() < 255**2 / 10**4, "40 dB; files are JPEG of quality 90"
+
+
+def test_a_camera_at_a_node_sees_a_face_of_its_panorama(world):
+    face, size = world.panorama(0), (world.pictures.size,) * 2
+    view = world.camera(world.graph.positions[0], math.pi / 2, 0.0, math.pi / 2, size)
+    np.testing.assert_array_equal(view.ids, face.ids[1])
+    np.testing.assert_array_equal(view.depth, face.depth[1])
+    assert np.abs(view.rgb.astype(int) - face.rgb[1]).max() <= 2
 
 
 def test_sightings_agree_with_the_panorama(world, house):
@@ -119,14 +126,11 @@ def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplo
         assert file.meta["house"] == edited.digest
 
 
-def test_unknown_nodes_folders_and_sights_are_refused(world, tmp_path):
+def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
     with pytest.raises(IndexError, match="0 to 2"):
         world.panorama(3)
     with pytest.raises(FileNotFoundError, match=r"house\.json"):
         open_folder(tmp_path, HandCatalogue(), tmp_path)
-    assert world.node_of(Sight(world.name, 2)) == 2
-    with pytest.raises(ValueError, match="other house"):
-        world.node_of(Sight("other house", 2))
 
 
 def test_a_world_without_pictures_says_so(house, tmp_path):

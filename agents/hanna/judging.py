@@ -13,9 +13,17 @@ import torch
 
 from agents.common.lessons import split_of
 from agents.hanna.agent import load_agent
-from agents.hanna.evaluation import failures, hanna_policies, plainer_policies, predictions, request_share
+from agents.hanna.evaluation import (
+    failures,
+    hanna_policies,
+    plainer_policies,
+    predictions,
+    request_share,
+    sight_policies,
+)
 from agents.vision.config import Looked
 from agents.vision.drawn import pictures_of
+from agents.vision.occasions import OCCASIONS, showing
 from agents.vision.run import encoder_of
 from assets.cache import digest, write_json
 from embodied.datasets.store import dataset_of
@@ -56,8 +64,12 @@ def run_eval(
     with locked(args.out) if args.out else contextlib.nullcontext():
         for split in args.split or ("test_unseen",):
             whole, bank = data.split(split), split_of(data, split, encoder.digest, quality=args.quality).bank
-            learned = hanna_policies(agent, bank)
-            plainer = plainer_policies(agent, bank)
+            bank = showing(
+                bank, data, list(whole.worlds), OCCASIONS[args.shown], encoder.digest, args.cache, args.quality
+            )
+            sight = sight_policies(agent, bank)
+            learned = {**hanna_policies(agent, bank), **{name: sight.pop(name) for name in ("blind", "rules only")}}
+            plainer = {**plainer_policies(agent, bank), **sight}
             judged = _asked_for({**_without_learning(), **learned}, plainer, args.only)
             drawn = {n: pictures_of(data, n, args.quality) for n in whole.worlds}
             looked = Looked((*learned, *plainer), {**looked.pictures, **drawn})
@@ -80,6 +92,7 @@ def run_eval(
                 seed=args.seed,
                 tasks=args.tasks,
                 looking=looked.looking,
+                shown=dataclasses.asdict(OCCASIONS[args.shown]),
                 pictures={name: dataclasses.asdict(p) for name, p in looked.pictures.items()},
             )
             write_json(args.out / "run.json", about_run, indent=1)

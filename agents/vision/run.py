@@ -19,6 +19,7 @@ from agents.vision.drawn import StripSource, baked_lightings, drawn_world, house
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips
+from agents.vision.occasions import OCCASIONS, Occasion, make_shown
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
 from agents.vision.training import Example, matched, save_training, train_encoder, trained_classes, whitened
@@ -139,6 +140,10 @@ def run_features(args: argparse.Namespace, note: Note = print) -> int:
 
     arguments = (args.data.resolve(), encoder, args.cache, args.threads, args.lights)
     for_each_unit(_make_features, missing, arguments, workers=args.workers, watch=watch, ray_address=args.ray)
+    shown = [OCCASIONS[word] for word in args.shown if OCCASIONS[word] != Occasion()]
+    for name in names if shown else ():
+        made = make_shown(data, name, shown, encoder, args.cache, wanted[name])
+        note(f"{name}: {len(made)} of {len(shown)} kinds of pictures made that are shown")
     note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
     return 0
 

@@ -38,6 +38,7 @@ COMMANDS = (
     "train",
     "eval",
     "judge",
+    "evaluate",
     "serve",
     "study",
     "iliad",

@@ -191,8 +191,25 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
     )
+    add_shown(parser, several=True)
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_device(parser)
+
+
+SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
+"""As in agents.vision.occasions, which --help should not import."""
+
+
+def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    parser.add_argument(
+        "--shown",
+        choices=SHOWN,
+        nargs="+" if several else None,
+        default=() if several else SHOWN[0],
+        help="when the pictures that helpers show were taken: as the agent sees the place (same), by a robot's camera, "
+        "at another hour, on another day with people elsewhere and small things moved, later (hour and day); by that "
+        "camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
+    )
 
 
 def add_train_hanna(parser: argparse.ArgumentParser) -> None:
@@ -440,6 +457,7 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
         default=32,
         help="episodes side by side; no influence on results (default: %(default)s)",
     )
+    add_shown(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where tables and episodes go")
     add_json(parser)
 

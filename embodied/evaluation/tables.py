@@ -28,6 +28,8 @@ PERCENT = (
     "oracle success",
     "room success",
     "subtask success",
+    "weighted success",
+    "success progress",
     "mistake repeat",
     "request repeat",
     "target success (HANNA)",
@@ -143,7 +145,9 @@ def across_seeds(values: Sequence[float]) -> Estimate:
     return Estimate(float(np.mean(values)), half, n)
 
 
-def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str], repeats: Sequence[int] | None = None) -> Estimate:
+def ratio(
+    pairs: Sequence[tuple[float, float]], groups: Sequence[str], repeats: Sequence[int] | None = None
+) -> Estimate:
     """Sum of firsts over sum of seconds (the repeat rates of Table 4.6), clustered likewise."""
     total = sum(b for _, b in pairs)
     if total == 0:
@@ -151,7 +155,7 @@ def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str], repeats: Sequ
     mean = sum(a for a, _ in pairs) / total
     scale = len(pairs) / total
     residuals = estimate([(a - mean * b) * scale for a, b in pairs], groups, repeats)
-    return Estimate(mean, residuals.half, total)
+    return Estimate(mean, residuals.half, round(total))
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
@@ -170,6 +174,13 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
         name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
         for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
     }
+    if episodes[0].task.kind == "ask":
+        pairs = [(metrics.price(e, graphs[e.task.world]), metrics.success(e, graphs[e.task.world])) for e in episodes]
+        values["price per success"] = ratio(pairs, groups, passes)
+    used = [metrics.usage(e) for e in episodes]
+    if any(used):
+        for name, count in metrics.USAGE.items():
+            values[name] = estimate([count(u) if u else 0.0 for u in used], groups, passes)
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
     if episodes[0].task.kind == "vnla":  # where turning on the spot is no mistake
         del repeats["mistake repeat"]
