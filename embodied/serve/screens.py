@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step
+from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step, viewpoint
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.sessions import STARS, Person, Sessions
@@ -84,7 +85,7 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
     """What the agent sees, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
-    target = seen.target and pictures.name(seen.target._world, seen.target._node)
+    target = None if seen.target is None else pictures.name(*dataclasses.astuple(viewpoint(seen.target)))
     return {
         "moves": moves_of(seen, game.situation, pictures),
         "words": list(seen.candidates.words),
