@@ -110,7 +110,7 @@ def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(dat
     (episode,) = load_lines(tmp_path / "episodes_val_seen_together.jsonl", Episode)
     ask, move, stop = episode.steps
     assert isinstance(ask.action, Ask) and ask.action.question == "Which door?"
-    assert ask.reply.text == "the left one" and ask.reply.image._node == 9 == ask.reply.subtask.target
+    assert ask.reply.text == "the left one" and ask.reply.image.node == 9 == ask.reply.subtask.target
     assert move.instruction == "the left one" and ask.pose == ask.next_pose
     assert ask.seconds < move.seconds < stop.seconds and episode.agent == "ann with bob"
 
