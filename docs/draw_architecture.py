@@ -92,7 +92,7 @@ FLOORS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ("place", PLACE, (("world", "all of a place"),)),
     ("play", PLAY, (("action_spaces", "moves"), ("language", "words"))),
     ("play", PLAY, (("teachers", "labels"), ("records", "JSON"))),
-    ("play", PLAY, (("tasks", "who wants what"),)),
+    ("play", PLAY, (("tasks", "who wants what"), ("identity", "what it hangs on"))),
     ("play", PLAY, (("policies", "baselines"), ("assistants", "who answers"))),
     ("play", PLAY, (("envs", "rules of play"),)),
     ("use", USE, (("datasets", "build, export"),)),
