@@ -44,6 +44,6 @@ def test_goals_and_actions_keep_their_kind():
         from_json(Task, to_json(task).replace("FollowRoute", "Nonsense"))
     with pytest.raises(RecordError, match="as JSON"):
         from_json(Task, "{")
-    with pytest.raises(RecordError, match="should be int"):
+    with pytest.raises(RecordError, match="should be an integer"):
         from_json(Task, to_json(task).replace('"horizon":9', '"horizon":"nine"'))
     assert to_json(Ask()).startswith('{"intention":"help","is":"Ask"')

@@ -10,9 +10,15 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import torch
+from torch import nn
+
 from agents.common.choosing import choose_at
 from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_with
+from agents.hanna.config import HannaSizes
+from agents.hanna.network import Scores
+from agents.hanna.percept import Percept, slot_distribution
 from agents.hanna.policy import PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
@@ -60,12 +66,60 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
 
 
 def all_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """Those of `hanna_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of PLAINER."""
+    """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
+    PLAINER."""
     learned = agent.policy(bank)
     rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
     asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
     plainer = {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
-    return {**hanna_policies(agent, bank), **asking, **plainer}
+    return {**hanna_policies(agent, bank), **asking, **plainer, **sight_policies(agent, bank)}
+
+
+UNWILLING = 20.0
+"""Logit by which stopping is less likely than a move where nothing was learned."""
+
+
+class Uniform(nn.Module):
+    """A network that has learned nothing: all moves are equally likely, and it does not stop by itself."""
+
+    def __init__(self, config: HannaSizes) -> None:
+        super().__init__()
+        self.config = config
+        self.nothing = nn.Parameter(torch.zeros(0))
+
+    def start(self, batch: int, length: int) -> tuple[Forgetting, Forgetting]:
+        return Forgetting(), Forgetting()
+
+    def forward(self, memory: object, percept: Percept) -> tuple[Scores, object]:
+        logits = torch.zeros(percept.action_mask.shape).masked_fill(~percept.action_mask, -torch.inf)
+        logits[:, 0] = -UNWILLING
+        slots = slot_distribution(logits, percept.action_slots)
+        return Scores(logits, slots, torch.zeros(len(logits), 2), None), memory
+
+
+class Forgetting:
+    """The memory of a network that has none."""
+
+    def select(self, rows: torch.Tensor) -> Forgetting:
+        return self
+
+
+def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+    """What sight is worth, by name: the learned agent without it, and its rules with sight but without learning.
+
+    'blind' sees black with network and matcher alike; the last two draw moves evenly, stop by the picture alone and
+    ask every 5 steps.
+    """
+    learned, blind = agent.policy(bank), agent.policy(bank.blind())
+    every5 = RULES["every5"][1]
+    rules = dataclasses.replace(learned, network=Uniform(learned.network.config), ask_rule=every5)
+    return {
+        "blind": blind,
+        "blind, not by image": dataclasses.replace(blind, by_image=False),
+        "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
+        "rules only": rules,
+        "rules only, blind": dataclasses.replace(rules, bank=blind.bank),
+    }
 
 
 def players(agent: HannaAgent, bank: FeatureBank, only: Sequence[str] = ()) -> dict[str, Agent]:
@@ -78,7 +132,7 @@ def players(agent: HannaAgent, bank: FeatureBank, only: Sequence[str] = ()) -> d
     every = {**without, **all_policies(agent, bank)}
     if unknown := sorted(set(only) - set(every)):
         raise ValueError(f"unknown rows {unknown}; there are {list(every)}")
-    return {name: every[name] for name in only or (*without, *hanna_policies(agent, bank))}
+    return {name: every[name] for name in only or (*without, *hanna_policies(agent, bank), "blind", "rules only")}
 
 
 def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 
 from agents.common.lessons import Lessons
 from agents.hanna.agent import HannaAgent
 from agents.hanna.evaluation import Keep, players
+from agents.vision.occasions import Occasion, showing
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row
+
+SAME = Occasion()
 
 
 def judge(
@@ -20,6 +24,8 @@ def judge(
     limit: int | None = None,
     batch: int = 32,
     only: Sequence[str] = (),
+    shown: Occasion = SAME,
+    cache: Path | None = None,
     keep: Keep | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
 ) -> list[Row]:
@@ -28,6 +34,8 @@ def judge(
     Args:
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for those of the paper's tables.
+      shown: when the pictures that helpers show were taken.
+      cache: where the furniture is, for other pictures than the agent sees.
       watch: wraps the iterator over rows (a progress bar).
 
     Raises:
@@ -35,8 +43,12 @@ def judge(
     """
     rows = []
     for split in splits:
-        judged = players(agent, lessons.split(split).bank, only)
-        kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         whole = lessons.data.split(split)
+        bank = lessons.split(split).bank
+        if cache is not None:
+            encoder = lessons.encoder.digest
+            bank = showing(bank, lessons.data, list(whole.worlds), shown, encoder, cache, lessons.quality)
+        judged = players(agent, bank, only)
+        kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         rows += evaluate(whole, judged, seed=seed, limit=limit, batch=batch, keep=kept, watch=watch)
     return rows

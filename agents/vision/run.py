@@ -17,6 +17,7 @@ from agents.vision.drawn import StripSource, baked_lightings, drawn_world, house
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips
+from agents.vision.occasions import Occasion, make_shown
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
 from agents.vision.training import Example, matched, save_training, train_encoder, trained_classes, whitened
@@ -131,6 +132,7 @@ def make_features(
     threads: int = 1,
     workers: int = 1,
     ray: str | None = None,
+    shown: Sequence[Occasion] = (),
     note: Note = print,
 ) -> None:
     """Features of every house of a data set, in so many lightings; houses that have them, from pictures drawn so, are
@@ -141,6 +143,7 @@ def make_features(
       splits: of whose houses; none for all.
       first: so many houses of each split.
       ray: address of a Ray cluster to use instead of `workers`.
+      shown: when the pictures that helpers show were taken, of which there are to be features, too.
 
     Raises:
       ValueError: several lightings of pictures without light.
@@ -162,6 +165,10 @@ def make_features(
 
     arguments = (data.folder.resolve(), encoder, cache, threads, lights)
     for_each_unit(_make_features, missing, arguments, workers=workers, watch=watch, ray_address=ray)
+    others = [at for at in shown if at != Occasion()]
+    for name in names if others else ():
+        made = make_shown(data, name, others, encoder, cache, wanted[name])
+        note(f"{name}: {len(made)} of {len(others)} kinds of pictures made that are shown")
     note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
 
 

@@ -36,7 +36,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
     names = data.names("train")[:houses]
     requests = [t.request for t in data.tasks("train") if t.world in names]
     said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    return build_vocabulary([*requests, *said])
+    return build_vocabulary([*requests, *said, *(s.text for s in data.said(names))])
 
 
 def train_agent(

@@ -38,6 +38,8 @@ COMMANDS = (
     "train",
     "eval",
     "judge",
+    "evaluate",
+    "serve",
     "study",
     "iliad",
     "bench",

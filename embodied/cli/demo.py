@@ -2,7 +2,8 @@
 
 Generates a furnished house with people in it, lights it, draws the panorama of every viewpoint,
 lets an agent walk to an object it is asked for, then lets a trained agent, which has never seen
-this house, find another one by asking the people; both episodes are recorded for Rerun.
+this house, find another one by asking the people; both episodes are recorded for Rerun, the
+second one with --video as a film.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.options import face, folder_to_write, whole
-from embodied.cli.recording import add_sinks, viewers_of
+from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder to write (default: %(default)s)",
     )
+    add_video(parser)
     add_sinks(parser, "DIR/episode.rrd")
     add_cache(parser)
     add_packs(parser)
@@ -155,6 +157,8 @@ def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route]
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
+    if args.video:
+        film(world, episode, args.video, tuple(args.video_size))
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world)
 
 

@@ -19,6 +19,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from agents.common.device import check_device
+    from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of, make_features
 
     check_device(args.device)
@@ -34,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
         threads=args.threads,
         workers=args.workers,
         ray=args.ray,
+        shown=[OCCASIONS[word] for word in args.shown],
         note=note,
     )
     return 0

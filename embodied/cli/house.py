@@ -9,9 +9,10 @@ from __future__ import annotations
 import argparse
 
 from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, show
-from embodied.cli.options import add_fields, chosen, folder_to_write
+from embodied.cli.options import add_fields, any_path, chosen, folder_to_write
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
+from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
@@ -23,6 +24,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--out", type=folder_to_write, required=True, metavar="DIR", help="folder to write, made if missing"
+    )
+    parser.add_argument(
+        "--plan", type=any_path, metavar="FILE", help="JSON file with the rooms of your own floor plan (docs/houses.md)"
     )
     parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
     parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
@@ -41,7 +45,10 @@ def run(args: argparse.Namespace) -> int:
 
     catalogue, config = catalogue_of(args), chosen(args, HouseConfig())
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
-        house = generate_house(args.seed, config, catalogue)
+        if args.plan:
+            house = house_of_plan(load_plan(args.plan), args.seed, config, catalogue)
+        else:
+            house = generate_house(args.seed, config, catalogue)
         stages.next()
         graph = build_graph(house)
         stages.next()

@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from agents.hanna.evaluation import behaviour
     from agents.studies.episodes import JUDGES
     from agents.vision.drawn import pictures_of
+    from agents.vision.occasions import OCCASIONS
     from assets.cache import write_json
     from embodied.datasets.store import Dataset
     from embodied.evaluation.tables import as_json, markdown, save
@@ -73,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
             save(rows, args.out, "table")
             about = {"data": data.digest, "agent": weights_digest(file), "seed": args.seed, "tasks": args.tasks}
             about |= {"splits": list(splits), "looking": looking, "pictures": drawn}
+            about["shown"] = dataclasses.asdict(OCCASIONS[args.shown])
             write_json(args.out / "run.json", fingerprint(**about, identity=identity_of(*JUDGES)), indent=1)
             write_json(args.out / "behaviour.json", facts, indent=1)
             note(f"table and episodes in {args.out}")
@@ -93,12 +95,13 @@ def hanna(args: argparse.Namespace, file: Path, how: Mapping[str, Any]) -> Judge
     from agents.hanna.agent import load_agent
     from agents.hanna.evaluation import COLUMNS, WITHOUT_LEARNING
     from agents.hanna.judging import judge
+    from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
     lessons = Lessons(dataset_of(args.data, "hanna"), encoder_of(args.encoder, args.network), args.quality)
     splits = args.split or ("test_unseen",)
-    rows = judge(lessons, load_agent(file), splits, **how)
+    rows = judge(lessons, load_agent(file), splits, shown=OCCASIONS[args.shown], cache=args.cache, **how)
     return rows, COLUMNS, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING)), splits
 
 

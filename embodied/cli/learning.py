@@ -25,7 +25,7 @@ from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
-from embodied.cli.options import add_fields, any_path, folder_to_write, positive, whole
+from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
 
 
 def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
@@ -117,7 +117,7 @@ def add_study(
     if seeds:
         parser.add_argument(
             "--seeds",
-            type=whole(1, 1000),
+            type=whole(1, REPEATS),
             default=seeds,
             metavar="N",
             help="training seeds of each row, from --seed on (default: %(default)s)",
@@ -223,8 +223,25 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
     )
+    add_shown(parser, several=True)
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_device(parser)
+
+
+SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
+"""As in agents.vision.occasions, which --help should not import."""
+
+
+def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    parser.add_argument(
+        "--shown",
+        choices=SHOWN,
+        nargs="+" if several else None,
+        default=() if several else SHOWN[0],
+        help="when the pictures that helpers show were taken: as the agent sees the place (same), by a robot's camera, "
+        "at another hour, on another day with people elsewhere and small things moved, later (hour and day); by that "
+        "camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
+    )
 
 
 def add_train_hanna(parser: argparse.ArgumentParser) -> None:
@@ -417,6 +434,7 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
         default=32,
         help="episodes side by side; no influence on results (default: %(default)s)",
     )
+    add_shown(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where tables and episodes go")
     add_json(parser)
 

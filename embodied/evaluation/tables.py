@@ -27,6 +27,8 @@ PERCENT = (
     "oracle success",
     "room success",
     "subtask success",
+    "weighted success",
+    "success progress",
     "mistake repeat",
     "request repeat",
     "target success (HANNA)",
@@ -185,6 +187,13 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
         name: Samples(tuple(of(f)), houses, share=name in SHARES)
         for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(kind, {})}.items()
     }
+    if kind == "ask":
+        prices, arrived = tuple(of(metrics.price)), tuple(of(metrics.success))
+        found["price per success"] = Samples(prices, houses, arrived)
+    used = [metrics.usage(e) for e in episodes]
+    if any(used):
+        for name, count in metrics.USAGE.items():
+            found[name] = Samples(tuple(float(count(u)) if u else 0.0 for u in used), houses)
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
     if kind == "vnla":  # where turning on the spot is no mistake
         del repeats["mistake repeat"]

@@ -25,7 +25,7 @@ from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
-from embodied.interface import Language, Route, SeenPlace, Task
+from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings
 from embodied.world import makers, open_world
@@ -69,12 +69,14 @@ def split_playground(
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
+    assistant: Assistant | None = None,
 ) -> Playground:
     """A split of a data set.
 
     Args:
       pictures: how the houses are drawn; as the data set's pictures are where not given.
       sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
+      assistant: who answers, instead of the kind's own assistant.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
@@ -90,7 +92,7 @@ def split_playground(
         names = whole.names(split)
         drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
         worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari)
+    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari, assistant=assistant)
     return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, cache, sees))
 
 
@@ -103,6 +105,7 @@ def flat_playground(
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
+    assistant: Assistant | None = None,
 ) -> Playground:
     """One world (generated from `seed` unless given) and tasks in it.
 
@@ -110,7 +113,7 @@ def flat_playground(
 
     Args:
       pictures: how the flat is drawn; 'fast' where not given.
-      sees: as for `split_playground`.
+      sees, assistant: as for `split_playground`.
     """
     catalogue = load_catalogue(cache)
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
@@ -131,7 +134,9 @@ def flat_playground(
         routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
     tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
-    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari)
+    make_env = environment_maker(
+        kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari, assistant=assistant
+    )
     played = tasks_under(kind, tasks, worlds, variants.vnla, variants.hari)
     return Playground(worlds, played, make_env, _oracle(worlds, catalogue, cache, sees))
 

@@ -7,16 +7,30 @@ tile is and how often it is turned; nothing is resampled, so that a face survive
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from embodied.geometry import yaw_of_heading
-from embodied.render.panorama import Panorama, ray_stretch
+from embodied.render.panorama import (
+    PixelGrid,
+    checked,
+    padded_nearness,
+    padded_rgba,
+    perspective_grid,
+    ray_stretch,
+    resampled_depth,
+    resampled_rgb,
+)
 
 TILES = ((3, 0), (5, 1), (2, 3), (4, 1), (0, 1), (1, 2))
 """Face and quarter turns (counter-clockwise) of each tile."""
+TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_COUNTERCLOCKWISE}
+"""What undoes so many quarter turns."""
+LARGE = 1e30
+"""More than any depth or its inverse."""
 DEPTH_UNITS = 4000.0
 """Depth is kept in quarters of a millimetre; 0 where nothing is."""
 RGB, DEPTH = "{}_skybox_small.jpg", "{}_skybox_depth_small.png"
@@ -33,65 +47,78 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
     return np.stack([np.rot90(faces[face], turns) for face, turns in TILES])
 
 
-def faces_of(tiles: np.ndarray) -> np.ndarray:
-    """(6, s, s, ...) faces in our order from the tiles of a skybox."""
-    faces = [tiles[0]] * 6
+def faces_of(tiles: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The faces in our order from the tiles of a skybox."""
+    faces = list(tiles)
     for tile, (face, turns) in zip(tiles, TILES, strict=True):
-        faces[face] = np.rot90(tile, -turns)
-    return np.stack(faces)
+        faces[face] = np.ascontiguousarray(tile) if not turns else cv2.rotate(tile, TURNED_BACK[turns])
+    return faces
 
 
 class Skyboxes:
     """The skyboxes of a folder, the last used of them in memory."""
 
-    def __init__(self, dataset: str, kept: int, *, depth: bool, apart: bool = False) -> None:
+    def __init__(self, dataset: str, kept: int, *, apart: bool = False) -> None:
         """Args:
         dataset: folder of `<scan>/matterport_skybox_images`.
         kept: how many to keep in memory.
-        depth: whether depth is wanted.
         apart: read the six files of the first release.
         """
-        self.dataset, self.depth, self.apart = dataset, depth, apart
-        self.panorama = functools.lru_cache(maxsize=max(1, kept))(self._load)
+        self.dataset, self.apart = dataset, apart
+        self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
+        self.nearness = functools.lru_cache(maxsize=max(1, kept))(self._nearness)
 
-    def _load(self, scan: str, viewpoint: str) -> Panorama:
-        """A skybox as a Panorama whose colours are blue, green, red.
+    def _colours(self, scan: str, viewpoint: str) -> np.ndarray:
+        """`padded_rgba` of a skybox, but blue, green, red.
 
         Raises:
           ValueError: a picture is missing, as there.
         """
         folder = skybox_folder(self.dataset, scan)
         if self.apart:
-            tiles = np.stack([_read(folder / FACES.format(viewpoint, k), cv2.IMREAD_COLOR) for k in range(6)])
+            strip = np.concatenate([_read(folder / FACES.format(viewpoint, k), cv2.IMREAD_COLOR) for k in range(6)], 1)
         else:
-            tiles = _apart(_read(folder / RGB.format(viewpoint), cv2.IMREAD_COLOR))
-        rgb = faces_of(tiles)
-        size = rgb.shape[1]
-        units = np.zeros((6, size, size))
-        if self.depth:
-            units = faces_of(_apart(_read(folder / DEPTH.format(viewpoint), cv2.IMREAD_ANYDEPTH))).astype(float)
-        metres = units / DEPTH_UNITS
-        along = np.where(metres > 0, metres / ray_stretch(size), np.inf).astype(np.float32)
-        return Panorama(rgb, along, np.zeros((6, size, size), np.int32))
+            strip = _read(folder / RGB.format(viewpoint), cv2.IMREAD_COLOR)
+        return padded_rgba(faces_of(_apart(cv2.cvtColor(strip, cv2.COLOR_RGB2RGBA))))
+
+    def _nearness(self, scan: str, viewpoint: str) -> np.ndarray:
+        """`padded_nearness` of a skybox for depth in DEPTH_UNITS.
+
+        Raises:
+          ValueError: the picture is missing.
+        """
+        units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), cv2.IMREAD_ANYDEPTH)
+        faces = []
+        for face in faces_of(_apart(units)):
+            with np.errstate(divide="ignore"):
+                near = np.divide(ray_stretch(len(face)), face, dtype=np.float32)
+            faces.append(cv2.threshold(near, LARGE, 0.0, cv2.THRESH_TOZERO_INV)[1])
+        return padded_nearness(faces)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 3) uint8, blue, green, red: the picture of a pose; size is (height, width)."""
-        return self.panorama(scan, viewpoint).view_rgb(float(yaw_of_heading(heading)), elevation, vfov, size)
+        padded = self.colours(scan, viewpoint)
+        return resampled_rgb(padded, _grid(padded, heading, elevation, vfov, size))
 
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 1) uint16, quarters of a millimetre along the optical axis; 0 where nothing is."""
-        depth = self.panorama(scan, viewpoint).view(float(yaw_of_heading(heading)), elevation, vfov, size)[1]
-        units = np.where(np.isfinite(depth), np.minimum(np.rint(depth * DEPTH_UNITS), 65535), 0)
-        return units.astype(np.uint16)[..., None]
+        padded = self.nearness(scan, viewpoint)
+        units = resampled_depth(padded, _grid(padded, heading, elevation, vfov, size))
+        cv2.threshold(units, LARGE, 0.0, cv2.THRESH_TOZERO_INV, dst=units)
+        return cv2.add(units, 0.0, dtype=cv2.CV_16U)[..., None]
 
 
-def _apart(strip: np.ndarray) -> np.ndarray:
-    """(6, s, s, ...) tiles of a strip."""
-    return np.stack(np.split(strip, 6, axis=1))
+def _grid(padded: np.ndarray, heading: float, elevation: float, vfov: float, size: tuple[int, int]) -> PixelGrid:
+    return perspective_grid(padded.shape[1] - 2, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
+
+
+def _apart(strip: np.ndarray) -> list[np.ndarray]:
+    """The six (s, s, ...) tiles of a strip."""
+    return np.split(strip, 6, axis=1)
 
 
 def _read(path: Path, mode: int) -> np.ndarray:

@@ -130,7 +130,7 @@ class Simulator:
         self._set("_batch", int(size))
 
     def setCacheSize(self, size: int) -> None:
-        """How many decoded skyboxes are kept; one of 512 pixels takes 20 MB."""
+        """How many decoded skyboxes are kept; one of 512 pixels takes 6 MB, and 6 more with depth."""
         self._set("_cache", int(size))
 
     def setSeed(self, seed: int) -> None:
@@ -170,14 +170,16 @@ class Simulator:
         """
         self._graphs: Graphs = load_graphs(self._graph_path, listed_scans(self._graph_path))
         self._engine = Engine(self._seed)
-        self._skyboxes = Skyboxes(self._dataset_path, self._cache, depth=self._depth)
+        self._skyboxes = Skyboxes(self._dataset_path, self._cache)
         self._motion = self._new_motion()
         self._states = [SimState(self, self._motion, agent) for agent in range(self._batch)]
         self._scans = [""] * self._batch
         self._ready = True
         if self._rendering and self._preload:
             for row in np.flatnonzero(self._graphs.included)[: self._cache].tolist():
-                self._skyboxes.panorama(self._graphs.scans[row], self._graphs.ids[row])
+                self._skyboxes.colours(self._graphs.scans[row], self._graphs.ids[row])
+                if self._depth:
+                    self._skyboxes.nearness(self._graphs.scans[row], self._graphs.ids[row])
 
     def newEpisode(
         self,

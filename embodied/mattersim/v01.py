@@ -86,7 +86,7 @@ class Simulator:
 
     def setDatasetPath(self, path: str) -> None:
         """Folder above `v1/scans/<scan>/matterport_skybox_images`."""
-        self._one._skyboxes = Skyboxes(f"{path}/v1/scans", KEPT, depth=False, apart=True)
+        self._one._skyboxes = Skyboxes(f"{path}/v1/scans", KEPT, apart=True)
 
     def setNavGraphPath(self, path: str) -> None:
         """Folder of `<scan>_connectivity.json`; there need not be a scans.txt."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -28,6 +29,8 @@ FACES = (
 """Forward and up direction of every face, world."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
+MOST_TURNS = 4 * math.pi
+"""Largest angle that is taken for radians; larger ones are most often degrees."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -62,14 +65,14 @@ class Panorama:
         Returns:
           (h, w, 3) uint8, (h, w) float32 metres, (h, w) int32.
         """
-        grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size))
+        grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size))
         return self._rgb(grid), self._depth(grid), self._ids(grid)
 
     def view_rgb(
         self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
     ) -> np.ndarray:
         """The colours of `view` alone."""
-        return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *_checked(vfov, size)))
+        return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size)))
 
     def views36(self, size: int = 224) -> np.ndarray:
         """(36, size, size, 3) uint8: the views of the VLN literature, in the order of embodied.interface.
@@ -78,12 +81,12 @@ class Panorama:
         30 (k // 12 - 1) degrees: 0-11 down, 12-23 level, 24-35 up, as `Candidates.view` and a
         FeatureSource's rows count them. Matterport's own order is in embodied.datasets.matterport.
         """
-        _checked(VFOV36, (size, size))
+        checked(VFOV36, (size, size))
         return self._rgb(grid36(self.size, size)).reshape(VIEWS, size, size, 3)
 
     def equirect(self, height: int = 512) -> np.ndarray:
         """(height, 2 height, 3) uint8: all directions; +x (yaw 0) in the middle column, +y left of it, up on top."""
-        return self._rgb(equirect_grid(self.size, _checked(1.0, (height, height))[0]))
+        return self._rgb(equirect_grid(self.size, checked(1.0, (height, height))[0]))
 
     def equirect_depth(self, height: int = 512) -> np.ndarray:
         """(height, 2 height) float32: metres along the ray, in the layout of `equirect`."""
@@ -105,79 +108,119 @@ class Panorama:
 
     @functools.cached_property
     def _padded_rgba(self) -> np.ndarray:
-        """(6 (s + 2), s + 2, 4): the faces below each other, each with a border taken from its neighbours.
-
-        The fourth channel is empty: OpenCV resamples four channels twice as fast as three.
-        """
-        s, pad = self.size, pad_grid(self.size)
-        padded = np.zeros((6, s + 2, s + 2, 4), np.uint8)
-        padded[:, 1:-1, 1:-1, :3] = self.rgb
-        border = cv2.remap(np.ascontiguousarray(self.rgb).reshape(6 * s, s, 3), pad.x, pad.y, cv2.INTER_LINEAR)
-        padded[pad.face, pad.row, pad.column, :3] = border.reshape(-1, 3)
-        return padded.reshape(6 * (s + 2), s + 2, 4)
+        return padded_rgba(self.rgb)
 
     @functools.cached_property
     def _padded_nearness(self) -> np.ndarray:
-        """(6 (s + 2), s + 2) float32: 1 / depth, which is linear over a plane, with borders as above."""
-        s, pad = self.size, pad_grid(self.size)
-        padded = np.empty((6, s + 2, s + 2), np.float32)
-        nearness = self._nearness.reshape(6, s, s)
-        padded[:, 1:-1, 1:-1] = nearness
-        border = cv2.remap(nearness.reshape(6 * s, s), pad.x, pad.y, cv2.INTER_NEAREST).reshape(-1)
-        padded[pad.face, pad.row, pad.column] = border * pad.ratio
-        return padded.reshape(6 * (s + 2), s + 2)
+        return padded_nearness(np.divide(1.0, self.depth))
 
     @functools.cached_property
-    def _nearness(self) -> np.ndarray:
-        """(6 s, s) float32: 1 / depth, 0 where nothing is."""
-        return (1.0 / self.depth).astype(np.float32).reshape(6 * self.size, self.size)
-
-    @functools.cached_property
-    def _ids_as_floats(self) -> np.ndarray:
-        """(6 s, s): the bits of the ids as float32, which OpenCV can copy from place to place."""
-        return np.ascontiguousarray(self.ids, dtype=np.int32).view(np.float32).reshape(6 * self.size, self.size)
+    def _padded_ids(self) -> np.ndarray:
+        """The bits of the ids as float32, which OpenCV can copy from place to place."""
+        return _padded(np.ascontiguousarray(self.ids, dtype=np.int32).view(np.float32))
 
     def _rgb(self, grid: PixelGrid) -> np.ndarray:
-        rgba = cv2.remap(self._padded_rgba, grid.x, grid.y, cv2.INTER_LINEAR)
-        return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
-
-    def _ids(self, grid: PixelGrid) -> np.ndarray:
-        return cv2.remap(self._ids_as_floats, grid.nearest, None, cv2.INTER_NEAREST).view(np.int32)
+        return resampled_rgb(self._padded_rgba, grid)
 
     def _depth(self, grid: PixelGrid) -> np.ndarray:
-        nearest, other, mixed = _scratch(grid.x.shape, threading.get_ident())
-        smooth = cv2.remap(self._padded_nearness, grid.x, grid.y, cv2.INTER_LINEAR)
-        cv2.remap(self._nearness, grid.nearest, None, cv2.INTER_NEAREST, dst=nearest)
-        cv2.absdiff(smooth, nearest, dst=other)
-        cv2.scaleAdd(nearest, -CREASE, other, dst=other)
-        cv2.compare(other, 0.0, cv2.CMP_GT, dst=mixed)
-        cv2.copyTo(nearest, mixed, smooth)
-        with np.errstate(divide="ignore"):
-            return np.divide(grid.stretch, smooth, out=smooth)
+        return resampled_depth(self._padded_nearness, grid)
+
+    def _ids(self, grid: PixelGrid) -> np.ndarray:
+        return cv2.remap(self._padded_ids, grid.x, grid.y, cv2.INTER_NEAREST).view(np.int32)
+
+
+def padded_rgba(faces: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """(6 (s + 2), s + 2, 4) uint8: the faces below each other, each with a border taken from its neighbours.
+
+    The fourth channel means nothing: OpenCV resamples four channels twice as fast as three.
+
+    Args:
+      faces: six (s, s, 3) or (s, s, 4) uint8.
+    """
+    s = len(faces[0])
+    padded, pad = np.empty((6, s + 2, s + 2, 4), np.uint8), pad_grid(s)
+    for whole, face in zip(padded, faces, strict=True):
+        if face.shape[2] == 4:
+            whole[1:-1, 1:-1] = face
+        else:
+            cv2.cvtColor(face, cv2.COLOR_RGB2RGBA, dst=whole[1:-1, 1:-1])
+    flat = padded.reshape(6 * (s + 2), s + 2, 4)
+    padded[pad.face, pad.row, pad.column] = cv2.remap(flat, pad.x, pad.y, cv2.INTER_LINEAR)[:, 0]
+    return flat
+
+
+def padded_nearness(faces: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """(6 (s + 2), s + 2) float32: as `padded_rgba`, 1 / depth, which is linear over a plane; 0 where nothing is."""
+    return _padded(faces, pad_grid(len(faces[0])).ratio)
+
+
+def _padded(faces: Sequence[np.ndarray] | np.ndarray, ratio: np.ndarray | None = None) -> np.ndarray:
+    """Six (s, s) float32 with borders of the nearest pixels beyond, times `ratio`."""
+    s = len(faces[0])
+    padded, pad = np.empty((6, s + 2, s + 2), np.float32), pad_grid(s)
+    for whole, face in zip(padded, faces, strict=True):
+        whole[1:-1, 1:-1] = face
+    flat = padded.reshape(6 * (s + 2), s + 2)
+    border = cv2.remap(flat, pad.x, pad.y, cv2.INTER_NEAREST)[:, 0]
+    padded[pad.face, pad.row, pad.column] = border if ratio is None else border * ratio
+    return flat
+
+
+def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
+    rgba = _scratch(grid.x.shape, threading.get_ident()).rgba
+    cv2.remap(padded, grid.x, grid.y, cv2.INTER_LINEAR, dst=rgba)
+    return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
+
+
+def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
+    work = _scratch(grid.x.shape, threading.get_ident())
+    smooth = cv2.remap(padded, grid.x, grid.y, cv2.INTER_LINEAR)
+    cv2.remap(padded, grid.x, grid.y, cv2.INTER_NEAREST, dst=work.nearest)
+    cv2.absdiff(smooth, work.nearest, dst=work.other)
+    cv2.scaleAdd(work.nearest, -CREASE, work.other, dst=work.other)
+    cv2.compare(work.other, 0.0, cv2.CMP_GT, dst=work.mixed)
+    cv2.copyTo(work.nearest, work.mixed, smooth)
+    with np.errstate(divide="ignore"):
+        return np.divide(grid.stretch, smooth, out=smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scratch:
+    """Arrays of one picture's size to work in: fresh memory costs more than what is done with it."""
+
+    rgba: np.ndarray
+    nearest: np.ndarray
+    other: np.ndarray
+    mixed: np.ndarray
 
 
 @functools.lru_cache(maxsize=8)
-def _scratch(shape: tuple[int, int], thread: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Two float32 arrays and one uint8 for one thread to work in: fresh memory costs more than what is done with it."""
-    return np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint8)
+def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
+    """The arrays of one thread."""
+    return _Scratch(
+        np.empty((*shape, 4), np.uint8),
+        np.empty(shape, np.float32),
+        np.empty(shape, np.float32),
+        np.empty(shape, np.uint8),
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class PixelGrid:
-    """Where the pixels of a picture lie on the faces. (h, w) arrays."""
+    """Where the pixels of a picture lie on the padded faces. (h, w) float32 arrays."""
 
     x: np.ndarray
     y: np.ndarray
-    """float32: the two maps of cv2.remap into the padded faces."""
-    nearest: np.ndarray
-    """(h, w, 2) int16: column and row of the nearest pixel of the faces below each other, without borders."""
+    """The two maps of cv2.remap."""
     stretch: np.ndarray
-    """float32 depth in this picture per depth in the face."""
+    """Depth in this picture per depth in the face."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """The border pixels of all padded faces, and where their values lie. (n,) arrays; x and y are (n, 1)."""
+    """The border pixels of all padded faces, and where there their values lie. (n,) arrays; x and y are (n, 1)."""
 
     face: np.ndarray
     row: np.ndarray
@@ -188,60 +231,73 @@ class Pad:
     """float32 1 / depth in this face per 1 / depth in the neighbour."""
 
 
-@functools.lru_cache(maxsize=96)
+@functools.lru_cache(maxsize=48)
 def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> PixelGrid:
+    if not (abs(yaw) <= MOST_TURNS and abs(pitch) <= math.pi):
+        raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
     """The grid of an upright perspective picture on faces of side `s`."""
-    return _grid(s, *_pinhole_rays(yaw, pitch, vfov, height, width))
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    tall = math.tan(vfov / 2)
+    down = tall * (1 - 2 * (np.arange(height)[:, None] + 0.5) / height)
+    across = tall * width / height * (2 * (np.arange(width) + 0.5) / width - 1)
+    ahead = (cp - sp * down).astype(np.float32)
+    x = np.add(cy * ahead, (sy * across).astype(np.float32))
+    y = np.add(sy * ahead, (-cy * across).astype(np.float32))
+    return _grid(s, x, y, (sp + cp * down).astype(np.float32))
 
 
 @functools.lru_cache(maxsize=4)
 def grid36(s: int, size: int) -> PixelGrid:
     """The 36 views of `Panorama.views36`, below each other."""
-    rays = [_pinhole_rays(yaw, pitch, VFOV36, size, size) for yaw, pitch in zip(VIEW_YAWS, VIEW_PITCHES, strict=True)]
-    return _grid(s, np.concatenate([r[0] for r in rays]), np.concatenate([r[1] for r in rays]))
+    views = zip(VIEW_YAWS, VIEW_PITCHES, strict=True)
+    grids = [perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size) for yaw, pitch in views]
+    return PixelGrid(*(np.concatenate([getattr(g, name) for g in grids]) for name in ("x", "y", "stretch")))
 
 
 @functools.lru_cache(maxsize=4)
 def equirect_grid(s: int, height: int) -> PixelGrid:
     """The grid of an equirectangular picture of (height, 2 height) pixels."""
     yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
-    pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
-    rays = np.empty((height, 2 * height, 3))
-    rays[..., 0] = np.cos(pitch)[:, None] * np.cos(yaw)
-    rays[..., 1] = np.cos(pitch)[:, None] * np.sin(yaw)
-    rays[..., 2] = np.sin(pitch)[:, None]
-    return _grid(s, rays, np.ones(rays.shape[:2]))
+    pitch = np.pi / 2 - (np.arange(height)[:, None] + 0.5) * np.pi / height
+    x, y = np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw)
+    return _grid(s, x.astype(np.float32), y.astype(np.float32), np.sin(pitch).astype(np.float32))
 
 
-def _pinhole_rays(yaw: float, pitch: float, vfov: float, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """(h, w, 3) unit rays through the pixel centres, and (h, w) cosines with the optical axis."""
-    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    forward, right, up = np.array([cy * cp, sy * cp, sp]), np.array([sy, -cy, 0.0]), np.array([-cy * sp, -sy * sp, cp])
-    tall = math.tan(vfov / 2)
-    y = tall * (1 - 2 * (np.arange(height) + 0.5) / height)
-    x = tall * width / height * (2 * (np.arange(width) + 0.5) / width - 1)
-    rays = forward + x[None, :, None] * right + y[:, None, None] * up
-    lengths = np.linalg.norm(rays, axis=-1)
-    return rays / lengths[..., None], 1.0 / lengths
+def _grid(s: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> PixelGrid:
+    """Where rays meet the faces.
 
-
-def _grid(s: int, rays: np.ndarray, cosines: np.ndarray) -> PixelGrid:
-    """Where unit `rays` (h, w, 3) meet the faces; cosines (h, w) turn ray lengths into depths of the picture."""
-    face, u, v, along = _face_coordinates(rays)
-    x, y = (u + 1) / 2 * s - 0.5, (v + 1) / 2 * s - 0.5
-    map_x, map_y = (x + 1).astype(np.float32), (y + 1 + face * (s + 2)).astype(np.float32)
-    column, row = np.clip(np.rint(x), 0, s - 1), np.clip(np.rint(y), 0, s - 1) + face * s
-    nearest = np.stack([column, row], axis=-1).astype(np.int16)
-    return PixelGrid(map_x, map_y, nearest, (cosines / along).astype(np.float32))
-
-
-def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Face index, u (right) and v (down) in [-1, 1], and the part of each unit ray along the face's axis."""
-    forward, up = (np.array([f[i] for f in FACES]) for i in (0, 1))
-    right = np.cross(forward, up)
-    face = np.argmax(rays @ forward.T, axis=-1)
-    along, u, v = (np.sum(rays * axes[face], axis=-1) for axes in (forward, right, -up))
-    return face, u / along, v / along, along
+    Args:
+      x, y: (h, w) float32, components of the rays, world; overwritten.
+      z: (h, 1) float32, the third: one for each row. Depth in the picture is in units of these rays.
+    """
+    # A face of the four around shows (x / y, -z / |y|) where |y| is the larger, else (-y / x, -z / |x|).
+    across, vertical = np.negative(y), np.abs(y)
+    swapped = cv2.compare(vertical, np.abs(x), cv2.CMP_GT)
+    cv2.copyTo(x, swapped, across)
+    along = x.copy()
+    cv2.copyTo(y, swapped, along)
+    back = cv2.compare(along, 0.0, cv2.CMP_LT)
+    with np.errstate(divide="ignore", invalid="ignore"):  # straight up and down
+        np.divide(1.0, along, out=along)
+        np.multiply(across, along, out=across)
+    stretch = np.abs(along)
+    np.multiply(stretch, -z, out=vertical)
+    steep = np.abs(z[:, 0]) * cv2.reduce(stretch, 1, cv2.REDUCE_MAX)[:, 0] > 1
+    other = np.flatnonzero(steep)
+    for mask, faces in ((swapped, 1), (back, 2)):
+        cv2.add(vertical, faces * (s + 2) / (s / 2), dst=vertical, mask=mask)
+    if len(other):  # rows that see the faces above and below: (-y, x) / |z| and (-y / |z|, x / z)
+        rows = slice(int(other[0]), int(other[-1]) + 1)
+        nearer = 1.0 / np.where(z[rows] == 0, 1, z[rows])
+        mask = cv2.compare(stretch[rows] * np.abs(z[rows]), 1.0, cv2.CMP_GT)
+        face = np.where(z[rows] > 0, np.float32(4), np.float32(5)) * np.float32((s + 2) / (s / 2))
+        cv2.copyTo(y[rows] * -np.abs(nearer), mask, across[rows])
+        cv2.copyTo(x[rows] * nearer + face, mask, vertical[rows])
+        cv2.copyTo(np.repeat(np.abs(nearer), x.shape[1], axis=1), mask, stretch[rows])
+    for where in (across, vertical):
+        np.multiply(where, s / 2, out=where)
+        np.add(where, s / 2 + 0.5, out=where)
+    return PixelGrid(across, vertical, stretch)
 
 
 @functools.lru_cache(maxsize=8)
@@ -262,10 +318,19 @@ def pad_grid(s: int) -> Pad:
         face,
         row,
         column,
-        x.astype(np.float32)[:, None],
-        (y + other * s).astype(np.float32)[:, None],
+        (x + 1).astype(np.float32)[:, None],
+        (y + 1 + other * (s + 2)).astype(np.float32)[:, None],
         (along * lengths).astype(np.float32),
     )
+
+
+def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Face index, u (right) and v (down) in [-1, 1], and the part of each unit ray along the face's axis."""
+    forward, up = (np.array([f[i] for f in FACES]) for i in (0, 1))
+    right = np.cross(forward, up)
+    face = np.argmax(rays @ forward.T, axis=-1)
+    along, u, v = (np.sum(rays * axes[face], axis=-1) for axes in (forward, right, -up))
+    return face, u / along, v / along, along
 
 
 @functools.lru_cache(maxsize=8)
@@ -284,7 +349,7 @@ def face_rays(s: int) -> np.ndarray:
     return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).astype(np.float32)
 
 
-def _checked(vfov: float, size: tuple[int, int]) -> tuple[int, int]:
+def checked(vfov: float, size: tuple[int, int]) -> tuple[int, int]:
     """`size` as (height, width), refused where no picture can have it."""
     height, width = int(size[0]), int(size[1])
     if not (0 < height <= 8192 and 0 < width <= 16384):
