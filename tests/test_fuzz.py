@@ -25,21 +25,23 @@ import torch
 from conftest import two_rooms
 from hand_data import build
 
-from agents.bandit import store
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
-from agents.bandit.store import load_translator, save_weights
+from agents.bandit.store import load_translator, save_network
 from agents.bandit.training import NumberedCorpus
 from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
-from agents.common.session import Progress
+from agents.common.checkpoint import restore
+from agents.common.session import Session
 from agents.common.tensor_file import save_tensors
 from agents.common.vocabulary import build_vocabulary
+from agents.common.weights import FORMAT
 from agents.hanna.agent import load_agent, new_agent, save_agent
-from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.training_config import SCALES
 from agents.hari import agent as hari
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.words import FeatureWords
+from agents.iliad.nav.stages import config_of
+from agents.iliad.regex.run import load_student
 from agents.vision.encoder import random_encoder
 from agents.vision.features import load_features, save_features
 from agents.vision.labels import HouseStrips
@@ -164,7 +166,9 @@ def _agent():
 def _write_learned(folder: Path) -> None:
     agent = _agent()
     save_agent(agent, folder / "agent.safetensors")
-    save_checkpoint(folder / "checkpoint.pt", agent, torch.optim.Adam(agent.network.parameters()), Progress(3))
+    parts = {"network": agent.network, "adam": torch.optim.Adam(agent.network.parameters())}
+    with Session(folder, {"settings": {"batch": 2}}, parts, 5, note=str) as session:
+        session.save()
     save_features(folder / "features.safetensors", np.ones((2, 36, 4)), random_encoder(seed=0), "house")
 
 
@@ -174,7 +178,7 @@ def _write_others(folder: Path) -> None:
     hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
     words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
     material = NumberedCorpus(BanditConfig(hidden_size=8), {}, (words, words), "", "")
-    save_weights(Translator(4, 4, 8), material, folder / "translator.safetensors")
+    save_network(Translator(4, 4, 8), material, folder / "translator.safetensors", {})
 
 
 def _weights(network: torch.nn.Module) -> list[float]:
@@ -183,8 +187,8 @@ def _weights(network: torch.nn.Module) -> list[float]:
 
 def _resumed(path: Path) -> object:
     agent = _agent()
-    progress = load_checkpoint(path, agent, torch.optim.Adam(agent.network.parameters()))
-    return progress, _weights(agent.network)
+    parts = {"network": agent.network, "adam": torch.optim.Adam(agent.network.parameters())}
+    return restore(path, {"settings": {"batch": 2}}, parts)["progress"], _weights(agent.network)
 
 
 def _write_pictures(folder: Path) -> None:
@@ -357,23 +361,27 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
 
 
 BESIDE = [
-    (hari.load_agent, hari.FORMAT, {}, "missing fields"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": "{"}, "as JSON"),
-    (hari.load_agent, hari.FORMAT, {"names": "[1]", "settings": '{"execution": {}}'}, r"names\[0\] should be a text"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"wings": 2}}'}, "unknown fields"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"heads": 0}}'}, "at least 1"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {}}'}, "execution policy alone"),
-    (load_translator, store.FORMATS[0], {"lexicons": "[]"}, "missing fields"),
-    (load_translator, store.FORMATS[0], {"config": "[]", "lexicons": "[]"}, "should be an object"),
-    (load_translator, store.FORMATS[0], {"config": '{"units": "bytes"}', "lexicons": "[]"}, "units must be one of"),
-    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "7"}, "words of two languages"),
-    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "[1, 2]"}, "cannot be read"),
+    (hari.load_agent, "hari", "{}", "missing fields"),
+    (hari.load_agent, "hari", "{", "as JSON"),
+    (hari.load_agent, "hari", '{"names": [1], "execution": {}}', r"names\[0\] should be"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {"wings": 2}}', "unknown fields"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {"heads": 0}}', "at least 1"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {}}', "execution policy alone"),
+    (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
+    (load_translator, "bandit", '{"config": {}}', "missing fields"),
+    (load_translator, "bandit", '{"config": [], "lexicons": ["", ""]}', "should be an object"),
+    (load_translator, "bandit", '{"config": {"units": "bytes"}, "lexicons": ["", ""]}', "units must be one of"),
+    (load_translator, "bandit", '{"config": {}, "lexicons": [1, 2]}', "should be"),
+    (load_translator, "bandit", '{"config": {}, "lexicons": ["1", "2"]}', "cannot be read"),
+    (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown fields"),
+    (config_of, "nav", '{"config": {}}', "missing fields"),
 ]
 
 
-@pytest.mark.parametrize(("read", "form", "about", "match"), BESIDE)
-def test_weights_beside_settings_that_cannot_be_are_refused(read, form, about, match, tmp_path):
-    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": form, **about})
+@pytest.mark.parametrize(("read", "kind", "about", "match"), BESIDE)
+def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, match, tmp_path):
+    facts = {"format": FORMAT, "kind": kind, "about": about}
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, facts)
     with pytest.raises(ValueError, match=match):
         read(tmp_path / "a.safetensors")
 
