@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test quick setup lint docs wheels clean
+.PHONY: help demo test quick setup browser page lint docs wheels clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -11,6 +11,8 @@ help:
 	@echo 'make quick   the tests that take less than a minute together'
 	@echo 'make lint    ruff, its formatter, import-linter, mypy'
 	@echo 'make docs    the documentation site, in site/; warnings are errors'
+	@echo 'make browser install Chromium and Caddy (Debian), without which the tests of `embodied serve` in them are skipped'
+	@echo 'make page    build the page of `embodied serve` from web/ with Node'
 	@echo 'make wheels  build embodied-houses and embodied-houses-furniture into dist/'
 
 setup:
@@ -36,6 +38,14 @@ docs: setup
 	@.venv/bin/python docs/build_results.py
 	@.venv/bin/python docs/build_reference.py
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict -q
+
+browser:
+	@command -v chromium >/dev/null && command -v caddy >/dev/null || { as=$$([ "$$(id -u)" = 0 ] || echo 'sudo -n'); \
+	  $$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	  chromium caddy fonts-dejavu-core >/dev/null; } || echo 'note: no Chromium or Caddy here; their tests are skipped'
+
+page:
+	@cd web && npm ci --no-audit --no-fund && npm run build
 
 wheels: setup
 	@.venv/bin/python packaging/furniture/collect.py
