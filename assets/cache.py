@@ -3,36 +3,41 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import functools
 import hashlib
 import json
 import os
-import re
 import shutil
-import socket
 import tempfile
-import time
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-_MACHINE = re.sub(r"[^\w]", "", socket.gethostname()) or "here"
-_DRAFT = re.compile(r"\..+\.(?P<machine>\w+)-(?P<pid>\d+)\.")
-
-
-DAMAGED = (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+DRAFTS = ".embodied-unfinished-"
+"""How folders of unfinished files begin; what makes them ours is the mark in them."""
+MARK = ".mark"
+DAMAGED = (
+    ValueError, KeyError, EOFError, RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile,
+    zlib.error,
+)  # fmt: skip
 """What reading a damaged .npz archive may raise, besides errors of the operating system: cut short, flipped in its
-directory (another compression, encrypted, another name) or in its content."""
+directory (another compression, encrypted, another name), in its content, or in the size that an array says to have."""
 
 
 def default_cache() -> Path:
-    """EMBODIED_CACHE if set, else the user's cache folder; only command lines call this."""
+    """EMBODIED_CACHE if set, else the user's cache folder, else, for somebody without a home, one in the folder for
+    temporary files; only command lines call this."""
     chosen = os.environ.get("EMBODIED_CACHE")
-    if chosen:
+    if not chosen:
+        base = os.environ.get("XDG_CACHE_HOME")
+        chosen = f"{base}/embodied" if base else "~/.cache/embodied"
+    try:
         return Path(chosen).expanduser()
-    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "embodied"
+    except RuntimeError:  # neither HOME nor an entry in the list of users
+        return Path(tempfile.gettempdir()) / f"embodied-{os.getuid()}"
 
 
 def digest(*parts: object) -> str:
@@ -50,7 +55,7 @@ def digest(*parts: object) -> str:
 
 @contextlib.contextmanager
 def atomic_path(path: Path, *, sync: bool = True) -> Iterator[Path]:
-    """A temporary sibling of `path` that replaces it only if the body succeeds.
+    """A path of the same name in a private folder beside `path`, which becomes `path` only if the body succeeds.
 
     A reader therefore sees the old file, no file or the whole new file; Ctrl-C, a full disk or
     an exception leaves nothing half-written behind. What a killed process left in the folder is
@@ -62,21 +67,17 @@ def atomic_path(path: Path, *, sync: bool = True) -> Iterator[Path]:
     Raises:
       OSError: the disk is full, the folder may not be written, ...; its `filename` is `path`.
     """
+    path = Path(path)
     with _named(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         sweep(path.parent)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=draft_prefix(path.name), suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
-        try:
+        with drafts(path.parent) as private:
+            temporary = private / path.name
             yield temporary
             if sync:
                 with open(temporary, "rb") as f:
                     os.fsync(f.fileno())
-            os.chmod(temporary, 0o644)
             os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -85,49 +86,61 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as e:
-        unnamed = e.filename is None or Path(os.fsdecode(e.filename)).name.startswith(f".{path.name}.")
-        if e.errno is None or not unnamed:
+        inside = e.filename is not None and any(p.startswith(DRAFTS) for p in Path(os.fsdecode(e.filename)).parts)
+        if e.errno is None or not (e.filename is None or inside):
             raise
         raise OSError(e.errno, e.strerror or os.strerror(e.errno), str(path)) from e
 
 
-def draft_prefix(name: str) -> str:
-    """How the name of the unfinished `name` begins; it tells which process of which machine makes it."""
-    return f".{name}.{_MACHINE}-{os.getpid()}."
+@contextlib.contextmanager
+def drafts(folder: Path) -> Iterator[Path]:
+    """A private folder in `folder` for what is unfinished; it is removed with all that is left in it.
 
-
-def abandoned(draft: Path) -> bool:
-    """Whether `draft` was left unfinished by a process that is no more.
-
-    Whether a process of another machine lives cannot be known; its draft is taken for abandoned
-    when nobody has touched it for a day.
+    It holds a mark, locked as long as its maker lives: so everybody on this machine, in other containers too, can
+    tell what was abandoned, and nothing else is ever taken for it.
     """
-    maker = _DRAFT.match(draft.name)
-    if maker is None:
-        return False
-    if maker["machine"] == _MACHINE:
-        return not alive(int(maker["pid"]))
-    return time.time() - draft.stat().st_mtime > 86_400
-
-
-def alive(pid: int) -> bool:
-    """Whether a process of this number runs on this machine."""
+    private = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=folder))
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        handle = os.open(private / MARK, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
+        try:
+            with contextlib.suppress(OSError):  # a disk without locks: nobody will sweep it
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                os.write(handle, _mark_of(handle))
+            yield private
+        finally:
+            os.close(handle)
+    finally:
+        shutil.rmtree(private, ignore_errors=True)
+
+
+def _mark_of(handle: int) -> bytes:
+    """What stands in the mark: words, and the number of the file itself, so that a copy is none."""
+    return f"unfinished files of the program embodied, {os.fstat(handle).st_ino}\n".encode()
+
+
+def abandoned(private: Path) -> bool:
+    """Whether `private` is a folder of `drafts` whose maker is no more."""
+    if private.is_symlink() or not private.is_dir():
         return False
-    except (PermissionError, OverflowError):
-        return True
-    return True
+    try:
+        handle = os.open(private / MARK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return os.read(handle, 200) == _mark_of(handle)
+    except OSError:  # its maker lives, or the disk knows no locks
+        return False
+    finally:
+        os.close(handle)
 
 
 @functools.lru_cache(maxsize=1024)
 def sweep(folder: Path) -> None:
     """Remove what killed processes left unfinished in `folder`; once per folder and process."""
-    for draft in sorted(folder.glob(".*")):
-        with contextlib.suppress(OSError):  # another process may sweep, too
-            if abandoned(draft):
-                shutil.rmtree(draft) if draft.is_dir() else draft.unlink()
+    for private in sorted(folder.glob(f"{DRAFTS}*")):
+        if abandoned(private):
+            shutil.rmtree(private, ignore_errors=True)  # another process may sweep, too
 
 
 def write_bytes(path: Path, data: bytes) -> None:

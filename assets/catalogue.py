@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -17,7 +18,7 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from assets import materials
-from assets.built import MAKERS
+from assets.built import BASICS, MAKERS
 from assets.cache import default_cache
 from assets.importing.importer import import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own, source_digest
@@ -28,6 +29,7 @@ from assets.rows import DATA, CatalogueError, check_classes, read_json, read_mod
 
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
 
+log = logging.getLogger(__name__)
 Params = tuple[tuple[str, str | float], ...]
 """What a maker of built things is told, by name."""
 
@@ -61,6 +63,12 @@ class Catalogue:
         return tuple(sorted({a.object_class for a in self.assets.values()}))
 
     @functools.cached_property
+    def own_classes(self) -> tuple[str, ...]:
+        """Object classes that a user's own models alone belong to, sorted."""
+        others = {a.object_class for key, a in self.assets.items() if key not in self._own}
+        return tuple(name for name in self.classes if name not in others)
+
+    @functools.cached_property
     def _by_class(self) -> dict[str, tuple[Asset, ...]]:
         found: dict[str, list[Asset]] = {}
         for asset in self.assets.values():
@@ -79,6 +87,14 @@ class Catalogue:
         """
         kept = {key: self._asset(key) for key in keys}
         return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
+
+    @functools.cached_property
+    def furnishing(self) -> Catalogue:
+        """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
+        furniture models are installed, only what code builds, the simple furniture included."""
+        if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
+            return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
+        return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
 
     def mesh(
         self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
@@ -109,6 +125,11 @@ class Catalogue:
           MeshError, PackError: a file is gone since the catalogue was read.
         """
         return {key: source_digest(self._own[key]) for key in sorted(set(keys)) if key in self._own}
+
+    @property
+    def models(self) -> frozenset[str]:
+        """The models of furniture libraries that are used, by the keys they have there."""
+        return frozenset(self._recipes[k].model or k for k in self._recipes if k not in self._own)
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
@@ -147,7 +168,9 @@ class Catalogue:
         return materials.finish(material_key, self.cache)
 
 
-def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
+def load_catalogue(
+    cache: Path | None = None, packs: Sequence[Path] | Path | str = (), own: Sequence[Path] | Path | str = ()
+) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
 
     Args:
@@ -155,6 +178,7 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
+    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
@@ -165,4 +189,17 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    return Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    for name in catalogue.own_classes:
+        if why := _placed_nowhere(catalogue.of_class(name)):
+            log.warning("class %r is placed in no house: %s", name, why)
+    return catalogue
+
+
+def _placed_nowhere(group: Sequence[Asset]) -> str:
+    """Why no generated house can hold any of an own class's assets; '' where one can."""
+    if not any(weight > 0 for a in group for weight in a.rooms.values()):
+        return 'none of its models names a kind of room with a weight in "rooms"'
+    if all(a.support == "surface" and not a.on for a in group):
+        return 'none of its models names a class that it rests on in "on"'
+    return ""

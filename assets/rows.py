@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from assets import json_file
+from assets.json_file import RecordError
 from assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
 
 Row = dict[str, Any]
@@ -18,7 +19,7 @@ SIZES = (0.001, 30.0)
 """Shortest and longest side of a thing, metres."""
 
 
-class CatalogueError(ValueError):
+class CatalogueError(RecordError):
     """A catalogue that cannot be read: says what was expected, what came and what to do."""
 
 
@@ -122,18 +123,13 @@ def read_json(path: Path) -> Row:
       CatalogueError: missing, not readable, not JSON, or not an object.
     """
     try:
-        body = json.loads(path.read_text(encoding="utf-8"))
+        return json_file.read_json(path)
     except FileNotFoundError as e:
         raise CatalogueError(f"{path} does not exist; docs/assets.md shows what it should hold") from e
     except OSError as e:  # a folder, no permission, a symbolic link to itself
         raise CatalogueError(f"{path} cannot be read ({e.strerror or e}); it should be a file of JSON") from e
-    except RecursionError as e:
-        raise CatalogueError(f"{path} is nested too deeply; docs/assets.md shows what it should hold") from e
-    except ValueError as e:  # neither UTF-8 nor JSON, or a number of thousands of digits
-        raise CatalogueError(f"{path} is not JSON ({e})") from e
-    if not isinstance(body, dict):
-        raise CatalogueError(f"{path} should hold a JSON object, got {type(body).__name__}")
-    return body
+    except RecordError as e:
+        raise CatalogueError(str(e)) from e
 
 
 def check_row(where: str, row: object, fields: Mapping[str, Field]) -> Row:

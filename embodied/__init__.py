@@ -1,21 +1,35 @@
-"""embodied: generated houses in MuJoCo, panoramas, and agents that ask people for help.
+"""embodied: generated, photo-realistic houses in MuJoCo, and agents that ask people for help.
 
     import embodied
 
-    catalogue = embodied.load_catalogue()
-    house = embodied.generate_house(7, embodied.HouseConfig(area=(38.0, 46.0)), catalogue)
-    with embodied.open_world(house, catalogue, embodied.default_cache()) as world:
-        panorama = world.panorama(0)
-        left = panorama.view_rgb(yaw=1.57, pitch=0.0)
+    house = embodied.generate_house(7)                        # the same on every machine
+    with embodied.open_world(house, quality="fast") as world: # lit once, then drawn in milliseconds
+        view = world.camera((2.0, 3.0, 1.5), yaw=0.5)         # rgb, depth and ids from anywhere
+        panorama = world.panorama(0)                          # or from a viewpoint of its navigation graph
+        print({world.classes[i] for i in set(view.ids.flat)})
 
-Places: generate_house, House, HouseConfig, load_catalogue, default_cache, build_graph, NavGraph.
-Pictures: open_world, World, Renderer, Panorama. Randomness: stream.
-Tasks and people are in embodied.interface; read it first when you write an agent.
+Houses
+    generate_house, HouseConfig    a furnished house from a seed
+    load_plan, house_of_plan       a furnished house on a floor plan of your own
+    House, load_house              a house as data: rooms, openings, furniture, lamps; JSON
+    Catalogue, load_catalogue      the furniture and materials, your own models included
+Pictures
+    open_world, open_folder, World a house with its navigation graph, light, cameras and panoramas
+    PictureSettings, ViewSettings  how houses are drawn; how an agent's views are framed
+    NavGraph, Panorama             viewpoints and ways between them; what is seen around one
+Tasks
+    make_env                       a Gymnasium environment, as gymnasium.make("embodied/HANNA-v0")
+    Task, Observation, Move, Ask, Stop, Intention, Situation, Reply, Subtask, Episode
+Data sets
+    DatasetConfig, build_dataset, draw_panoramas, Dataset
+Evaluation
+    play, evaluate, baseline, markdown
+Other
+    default_cache                  where expensive products are kept
+    stream                         named random generators of one seed
 
-Each name is imported when it is first used, so that `import embodied` costs nothing; and off-screen
-OpenGL is chosen before mujoco is imported, whichever name comes first. The Gymnasium environments
-embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0 are registered by `import embodied`; Gymnasium
-itself is not imported for that (embodied.gym.registration).
+Each name is imported when it is first used. Environments: embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0 and
+Drive-v0, registered by `import embodied`.
 """
 
 from __future__ import annotations
@@ -27,57 +41,122 @@ from embodied.gym.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
     from assets.cache import default_cache
-    from assets.catalogue import load_catalogue
+    from assets.catalogue import Catalogue, load_catalogue
+    from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
+    from embodied.datasets.store import Dataset
+    from embodied.evaluation.evaluate import agent as baseline
+    from embodied.evaluation.evaluate import evaluate
+    from embodied.evaluation.rollout import play
+    from embodied.evaluation.tables import markdown
     from embodied.generate import HouseConfig, generate_house
+    from embodied.generate.plan_file import house_of_plan, load_plan
+    from embodied.gym.env import make as make_env
+    from embodied.gym.eyes import ViewSettings
     from embodied.house.house import House
+    from embodied.house.validation import load_house
+    from embodied.interface import Ask, Episode, Intention, Move, Observation, Reply, Situation, Stop, Subtask, Task
     from embodied.navigation.graph import NavGraph, build_graph
     from embodied.render.classic import Renderer
     from embodied.render.panorama import Panorama
+    from embodied.render.pictures import PictureSettings
     from embodied.seeds import stream
-    from embodied.world import World, open_world
+    from embodied.world import World, open_folder, open_world
+
+__version__: str
+"""The version of the installed distribution."""
+
+_HOMES = {
+    "assets.cache": ("default_cache",),
+    "assets.catalogue": ("Catalogue", "load_catalogue"),
+    "embodied.datasets.build": ("DatasetConfig", "build_dataset", "draw_panoramas"),
+    "embodied.datasets.store": ("Dataset",),
+    "embodied.evaluation.evaluate": ("evaluate",),
+    "embodied.evaluation.rollout": ("play",),
+    "embodied.evaluation.tables": ("markdown",),
+    "embodied.generate": ("HouseConfig", "generate_house"),
+    "embodied.generate.plan_file": ("house_of_plan", "load_plan"),
+    "embodied.gym.eyes": ("ViewSettings",),
+    "embodied.house.house": ("House",),
+    "embodied.house.validation": ("load_house",),
+    "embodied.interface": (
+        *("Ask", "Episode", "Intention", "Move", "Observation"),
+        *("Reply", "Situation", "Stop", "Subtask", "Task"),
+    ),
+    "embodied.navigation.graph": ("NavGraph", "build_graph"),
+    "embodied.render.classic": ("Renderer",),
+    "embodied.render.panorama": ("Panorama",),
+    "embodied.render.pictures": ("PictureSettings",),
+    "embodied.seeds": ("stream",),
+    "embodied.world": ("World", "open_folder", "open_world"),
+}
+"""The public names of each module."""
+_FOUND = {name: (module, name) for module, names in _HOMES.items() for name in names} | {
+    "baseline": ("embodied.evaluation.evaluate", "agent"),
+    "make_env": ("embodied.gym.env", "make"),
+}
 
 __all__ = [
+    "__version__",
+    "Ask",
+    "Catalogue",
+    "Dataset",
+    "DatasetConfig",
+    "Episode",
     "House",
     "HouseConfig",
+    "Intention",
+    "Move",
     "NavGraph",
+    "Observation",
     "Panorama",
+    "PictureSettings",
     "Renderer",
+    "Reply",
+    "Situation",
+    "Stop",
+    "Subtask",
+    "Task",
+    "ViewSettings",
     "World",
+    "baseline",
+    "build_dataset",
     "build_graph",
     "default_cache",
+    "draw_panoramas",
+    "evaluate",
     "generate_house",
+    "house_of_plan",
     "load_catalogue",
+    "load_house",
+    "load_plan",
+    "make_env",
+    "markdown",
+    "open_folder",
     "open_world",
+    "play",
     "stream",
 ]
-
-HOMES = {
-    "House": "embodied.house.house",
-    "HouseConfig": "embodied.generate",
-    "NavGraph": "embodied.navigation.graph",
-    "Panorama": "embodied.render.panorama",
-    "Renderer": "embodied.render.classic",
-    "World": "embodied.world",
-    "build_graph": "embodied.navigation.graph",
-    "default_cache": "assets.cache",
-    "generate_house": "embodied.generate",
-    "load_catalogue": "assets.catalogue",
-    "open_world": "embodied.world",
-    "stream": "embodied.seeds",
-}
-"""The module behind each public name."""
 
 
 def __getattr__(name: str) -> object:
     """A public name, imported on first use (PEP 562)."""
-    if name not in HOMES:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        from embodied.distribution import DISTRIBUTION
+
+        value: object = version(DISTRIBUTION)
+    elif name in _FOUND:
+        module, attribute = _FOUND[name]
+        value = getattr(importlib.import_module(module), attribute)
+    else:
         raise AttributeError(f"module 'embodied' has no attribute {name!r}; it offers {__all__}")
-    value = globals()[name] = getattr(importlib.import_module(HOMES[name]), name)
+    globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted(__all__)
 
 
 register_with_gymnasium()

@@ -9,6 +9,7 @@ import json
 import logging
 import os
 import socket
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -17,8 +18,10 @@ from pathlib import Path
 from assets.cache import sweep
 from embodied.errors import UnableError
 
-LOCK = ".lock"
+LOCK = ".embodied.lock"
 """Name of the file in a folder that somebody writes to."""
+FIELDS = {"pid", "host", "since", "command"}
+"""What stands in it."""
 CANNOT = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 """What disks say that know no locks."""
 log = logging.getLogger(__name__)
@@ -29,20 +32,24 @@ class LockedError(UnableError):
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
     """Hold `folder`, which is made if missing, for writing while the body runs.
 
     The lock is the operating system's (flock), so it is gone when its process is, also after a
     kill; what is written into the file is for people. What killed processes left unfinished in the
     folder is removed.
 
+    Args:
+      wait: until whoever holds it is done, instead of raising LockedError.
+
     Raises:
       LockedError: another process holds it; the message names process, machine and command.
+      UnableError: what stands in the lock's place is no lock of this program; it is left as it is.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / LOCK
-    handle = _take(path)
+    handle = _take(path, wait)
     try:
         sweep.cache_clear()
         sweep(folder)
@@ -52,15 +59,17 @@ def locked(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _take(path: Path) -> int:
+def _take(path: Path, wait: bool) -> int:
     """The descriptor of the locked file `path`, with this process written into it."""
     while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        handle = _open(path)
         try:
-            _flock(handle, path)
+            _flock(handle, path, wait)
             if _is_same(handle, path):  # else its holder removed it between open and lock
-                os.truncate(handle, 0)
-                os.write(handle, json.dumps(_myself()).encode())
+                if not _is_ours(handle):
+                    raise UnableError(f"{path} is no lock of this program; move it away, or choose another folder")
+                os.ftruncate(handle, 0)
+                os.pwrite(handle, json.dumps(_myself()).encode(), 0)
                 return handle
         except BaseException:
             os.close(handle)
@@ -68,13 +77,37 @@ def _take(path: Path) -> int:
         os.close(handle)
 
 
-def _flock(handle: int, path: Path) -> None:
+def _open(path: Path) -> int:
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    except OSError as e:
+        if e.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
+            raise UnableError(f"{path} is no lock of this program; move it away, or choose another folder") from e
+        raise
+
+
+def _is_ours(handle: int) -> bool:
+    """Whether the open file is a lock: a file of one name, empty or with what `_myself` writes."""
+    facts = os.fstat(handle)
+    if not stat.S_ISREG(facts.st_mode) or facts.st_nlink > 1 or facts.st_size > 4096:
+        return False
+    content = os.pread(handle, 4096, 0)
+    try:
+        return not content or set(json.loads(content)) == FIELDS
+    except (ValueError, TypeError, RecursionError):
+        return False
+
+
+def _flock(handle: int, path: Path, wait: bool) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise LockedError(
-            f"{path.parent} is being written by {_holder(path)}; wait for it, end it, or choose another folder"
-        ) from None
+        if not wait:
+            raise LockedError(
+                f"{path.parent} is being written by {_holder(path)}; wait for it, end it, or choose another folder"
+            ) from None
+        log.warning("%s is being written by %s; waiting for it", path.parent, _holder(path))
+        fcntl.flock(handle, fcntl.LOCK_EX)
     except OSError as e:
         if e.errno not in CANNOT:
             raise
@@ -83,7 +116,7 @@ def _flock(handle: int, path: Path) -> None:
 
 def _is_same(handle: int, path: Path) -> bool:
     try:
-        return os.path.samestat(os.fstat(handle), os.stat(path))
+        return os.path.samestat(os.fstat(handle), os.lstat(path))
     except FileNotFoundError:
         return False
 
@@ -102,5 +135,5 @@ def _holder(path: Path) -> str:
     try:
         who = json.loads(path.read_text(encoding="utf-8"))
         return f"process {who['pid']} on {who['host']} since {who['since']} ({who['command']})"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "another process"

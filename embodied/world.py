@@ -12,24 +12,25 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import digest
+from assets.cache import default_cache, digest
+from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
-from embodied.interface import Sight, Sighting
+from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
+from embodied.navigation.poses import FreePoses
 from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import TRACED, PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
     from embodied.light import Bake
     from embodied.light.reference import Tracer
     from embodied.render.gloss import Gloss, Shine
@@ -59,6 +60,7 @@ class World:
           file: where the panoramas go, or lie, instead of the cache.
           may_differ: fields of `fingerprint` in which panoramas in `file` may differ from those that would be drawn
             here and now: a data set is read with other drivers ('renderer') and later versions ('code') than drew it.
+            With 'renderer' among them, stored ones are read without OpenGL.
         """
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.pictures = pictures
@@ -85,6 +87,24 @@ class World:
         return owners(self.house)
 
     @functools.cached_property
+    def classes(self) -> tuple[str, ...]:
+        """The class of each instance id: `world.classes[view.ids[y, x]]` is what a pixel shows."""
+        return instance_classes(self.house)
+
+    @functools.cached_property
+    def _poses(self) -> FreePoses:
+        return FreePoses(self.house, self.graph)
+
+    def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
+        """Whether the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        return self._poses.is_free(position)
+
+    def random_pose(self, *, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+        """(3,) of an eye, metres, and yaw, radians, drawn evenly over the floor where the agent can stand:
+        `world.renderer.view(*world.random_pose(rng=rng))` is a picture from there."""
+        return self._poses.draw(rng=rng)
+
+    @functools.cached_property
     def _origin(self) -> dict[str, object]:
         """What the world's geometry depends on."""
         return {
@@ -94,15 +114,22 @@ class World:
         }
 
     @functools.cached_property
-    def fingerprint(self) -> dict[str, object]:
-        """All that the panoramas depend on, and what draws them."""
+    def _made_of(self) -> dict[str, object]:
+        """All that the panoramas depend on but what draws them."""
         return (
             self._origin
             | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k not in ("look", "rays")}
             | ({"look": "gloss"} if self.pictures.shown_with == "gloss" else {})  # matte ones are older than the word
             | ({} if self.pictures.rays is None else {"rays": self.pictures.rays})
-            | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
+            | {"light": self.pictures.lit_by, "code": code_digest(*makers(self.pictures))}
         )
+
+    @functools.cached_property
+    def fingerprint(self) -> dict[str, object]:
+        """All that the panoramas depend on, and what draws them, or drew those that are stored where that may differ.
+        Opens OpenGL only where nothing is stored."""
+        stored = self._open_file() if "renderer" in self._may_differ and self._path is not None else None
+        return self._made_of | {"renderer": str(gl.info()) if stored is None else stored.meta.get("renderer")}
 
     @functools.cached_property
     def path(self) -> Path:
@@ -206,24 +233,15 @@ class World:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
         return self._sightings.at(node, self.house)
 
-    def node_of(self, sight: Sight) -> int:
-        """The node behind a sight; for renderers and recordings, never for a policy.
-
-        Raises:
-          ValueError: the sight is of another world.
-        """
-        if sight._world != self.name:
-            raise ValueError(f"this sight is of world {sight._world!r}, not of {self.name!r}; pass it to its own world")
-        return sight._node
-
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
         file = self._open_file()
         if file is not None and (damaged := file.damaged()):
             log.warning("%s: %s of its pictures are damaged; drawing again", self.path, len(damaged))
             file.close()
-            file = self._file = None
+            file, self._file, self._refused = None, None, True
         if file is None:
+            self.__dict__.pop("fingerprint", None)  # what was stored may have been drawn by others
             write_panoramas(self.path, self._draw_all(progress), self.fingerprint)
             self._refused = False
             self._recent.cache_clear()
@@ -263,7 +281,8 @@ class World:
             except PanoramaFileError as e:
                 log.warning("%s", e)
                 return None
-            if others := differing(file.meta, self.fingerprint, self._may_differ):
+            wanted = self._made_of if "renderer" in self._may_differ else self.fingerprint
+            if others := differing(file.meta, wanted, self._may_differ):
                 log.warning("%s holds other pictures (%s); drawing again", self.path, others)
                 file.close()
                 return None
@@ -286,8 +305,8 @@ class World:
 
 def open_world(
     house: House,
-    catalogue: Catalogue,
-    cache: Path,
+    catalogue: Catalogue | None = None,
+    cache: Path | None = None,
     pictures: PictureSettings = PictureSettings(),
     *,
     graph: NavGraph | None = None,
@@ -296,30 +315,36 @@ def open_world(
     """A world over `house`; nothing is drawn until asked for.
 
     Args:
-      catalogue: where meshes and materials come from.
-      cache: folder for what is expensive; may be deleted at any time.
+      catalogue: where meshes and materials come from; the shipped one where not given.
+      cache: folder for what is expensive, which may be deleted at any time; the user's cache folder where not given.
       pictures: how the house is drawn.
       graph: the navigation graph; built when not given.
       changes: fields of PictureSettings, instead of those of `pictures`: size=512, quality="normal".
     """
-    graph = graph or build_graph(house)
-    return World(house, catalogue, graph, cache, dataclasses.replace(pictures, **changes))
+    graph, cache = graph or build_graph(house), cache or default_cache()
+    return World(house, catalogue or load_catalogue(cache), graph, cache, dataclasses.replace(pictures, **changes))
 
 
 def open_folder(
-    folder: Path, catalogue: Catalogue, cache: Path, pictures: PictureSettings = PictureSettings(), **changes: Any
+    folder: Path,
+    catalogue: Catalogue | None = None,
+    cache: Path | None = None,
+    pictures: PictureSettings = PictureSettings(),
+    **changes: Any,
 ) -> World:
     """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there.
 
     Args:
-      pictures, changes: as in `open_world`.
+      catalogue, cache, pictures, changes: as in `open_world`.
     """
-    folder = Path(folder)
+    folder, cache = Path(folder), cache or default_cache()
+    catalogue = catalogue or load_catalogue(cache)
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
     graph, pictures = build_graph(house), dataclasses.replace(pictures, **changes)
-    return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
+    file = folder / "panoramas.pano"
+    return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))
 
 
 def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_differ: Collection[str] = ()) -> str:

@@ -20,7 +20,7 @@ from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariRules
 from embodied.gym.registration import IDS
 from embodied.gym.spaces import Numbers, SpaceLayout, decode, number, text_of, word_number, words
-from embodied.interface import Ask, Intention, Move, Stop
+from embodied.interface import Ask, Intention, Move, Reply, Stop, Subtask
 from embodied.teachers.shortest import shortest_action
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")
@@ -129,6 +129,44 @@ def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
         strict.step(bad)
     with pytest.raises(ActionError, match="action 9999 does not exist; use 0 to"):
         strict.unwrapped.step(9999)
+
+
+class Guide:
+    """Sends whoever asks to the nearest goal, from where it stands."""
+
+    def intentions(self, situation):
+        return (Intention.HELP,)
+
+    def answer(self, situation, question, *, rng):
+        goal = situation.task.goal_nodes[0]
+        return Reply("over there", subtask=Subtask("own", goal, start=situation.pose, goal=goal))
+
+
+def test_request_instruction_and_ways_on_are_in_every_info_also_after_a_reply(tmp):
+    env = make("hanna", tmp, assistant=Guide())
+    _, info = env.reset(seed=0)
+    assert info["request"] == info["instruction"] == env.task.request
+    request = info["request"]
+    observation, _, _, _, info = env.step(number(Ask(), SpaceLayout()))
+    assert (info["request"], info["instruction"]) == (request, "over there")
+    moves = np.flatnonzero(observation["action_mask"][: SpaceLayout().candidates])
+    assert [c["action"] for c in info["candidates"]] == moves.tolist()
+    headings = np.arctan2(*observation["candidates"][moves, :2].T)
+    assert [c["heading"] for c in info["candidates"]] == pytest.approx(headings.tolist())
+    assert all(("left" in c["text"]) == (0.1 < c["heading"] < 2.9) for c in info["candidates"])
+
+
+def test_an_assistant_is_named_by_module_and_class_and_refused_where_nobody_is_asked(tmp):
+    envs = gym.make_vec(
+        "embodied/HANNA-v0", 2, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", assistant="test_gym:Guide"
+    )
+    _, info = envs.reset(seed=0)
+    *_, info = envs.step(np.full(2, number(Ask(), SpaceLayout())))
+    assert list(info["instruction"]) == ["over there"] * 2
+    with pytest.raises(ValueError, match="importable module, got 'test_gym:Nobody'"):
+        make("hanna", tmp, assistant="test_gym:Nobody")
+    with pytest.raises(ValueError, match="nobody is asked in tasks of kind 'find'"):
+        make("find", tmp, assistant=Guide())
 
 
 def test_actions_have_numbers():

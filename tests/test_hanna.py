@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import av
 import numpy as np
 import pytest
 from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
@@ -24,7 +25,7 @@ from embodied.assistants.route_system import (
 from embodied.envs.base import ActionError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
-from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Sight, Step, Stop, Thought
+from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
@@ -38,6 +39,7 @@ from embodied.policies.baselines import (
 )
 from embodied.seeds import stream
 from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, lost_as_written, segments
+from viz.video import _captions, film_episode
 
 # ANNA
 
@@ -59,7 +61,7 @@ def test_the_reply_is_the_route_that_ends_nearest_the_goal():
     env = line_env()
     env.reset(LINE_TASK)
     reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
-    assert (reply.text, reply.image) == ("go two", Sight("line", 3))
+    assert (reply.text, reply.image) == ("go two", Viewpoint("line", 3))
     assert (reply.subtask.target, reply.subtask.goal, reply.subtask.start) == (3, 3, Pose(1, 3, 1))
 
 
@@ -102,12 +104,12 @@ def test_an_episode_follows_algorithm_7_line_by_line():
     o = env.reset(LINE_TASK)
     assert (o.mode, o.instruction, o.target, o.time, o.time_on_task) == (Mode.MAIN, "find a mug", None, 0, 0)
     o = env.step(Ask())
-    assert (o.mode, o.instruction, o.target) == (Mode.SUB, "go two", Sight("line", 3))
+    assert (o.mode, o.instruction, viewpoint(o.target)) == (Mode.SUB, "go two", Viewpoint("line", 3))
     assert (env.pose, o.time, o.time_on_task) == (Pose(1, 3, 1), 1, 0), "entered the route, looking along its angles"
     o = env.step(Move(env.situation.candidate_nodes.index(2)))
     assert (o.mode, o.time_on_task, env.pose.node) == (Mode.SUB, 1, 2)
     o = env.step(Stop())
-    assert (o.mode, o.instruction, o.target) == (Mode.MAIN, "find a mug", Sight("line", 3)), (
+    assert (o.mode, o.instruction, viewpoint(o.target)) == (Mode.MAIN, "find a mug", Viewpoint("line", 3)), (
         "departed early: image of g*"
     )
     assert (env.pose.node, o.time, o.time_on_task, env.situation.targets) == (2, 3, 0, (3,))
@@ -281,3 +283,19 @@ def test_entropy_in_base_37_spans_zero_to_one():
     sure, even = np.array([1.0, 0, 0]), np.full(3, 1 / 3)
     assert base37_entropy(sure, candidates) == 0
     assert base37_entropy(even, candidates) == pytest.approx(math.log(3) / math.log(VIEWS + 1))
+
+
+def test_a_film_of_an_episode_shows_the_request_and_then_what_the_assistant_said(tmp_path):
+    env = line_env()
+    env.reset(LINE_TASK)
+    while env.ended is None:
+        asks = bool(env.observation.can_ask) and not env.requests
+        env.step(Ask() if asks else Stop() if env.time else Move(0))
+    episode = env.episode()
+    reply = next(s.reply.text for s in episode.steps if s.reply)
+    words, first = _captions(episode), f"Task: {LINE_TASK.request}"
+    assert words[0] == first and f"Agent asks. Assistant: {reply}" in words and first in words[-1]
+    black = np.zeros((48, 64, 3), np.uint8)
+    frames = film_episode(env.world.graph, episode, lambda i, c: black, tmp_path / "film.mp4", (48, 64))
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == frames > len(episode.steps)

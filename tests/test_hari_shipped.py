@@ -6,9 +6,9 @@ import pytest
 import torch
 from hand_worlds import grid_world
 
+from agents.common.shipped import SHIPPED_HARI
 from agents.hari.agent import HariAgent, load_agent
 from agents.hari.policy import policy_of
-from agents.common.shipped import SHIPPED_HARI
 from embodied.envs.hari import HariRules
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics

@@ -27,11 +27,21 @@ def with_thing(**changes) -> House:
     return dataclasses.replace(house, placements=(dataclasses.replace(house.placements[0], **changes),))
 
 
+def test_numbers_and_words_that_things_are_built_from_survive_json():
+    house = with_thing(params=(("finish", "oak/1"), ("open", 0.5), ("turned", 0.0)))
+    assert House.from_json(house.to_json()) == house
+
+
 def test_a_house_survives_json_and_a_file(tmp_path):
     house = two_rooms()
     assert House.from_json(house.to_json()) == house
     house.save(tmp_path / "house.json")
     assert House.load(tmp_path / "house.json").digest == house.digest
+
+
+def test_what_a_built_thing_is_made_of_may_be_words_and_numbers():
+    house = with_thing(params=(("finish", "oak"), ("lean", 0.25), ("turns", 2.0)))
+    assert House.from_json(house.to_json()) == house
 
 
 def test_any_change_changes_the_digest():
@@ -102,18 +112,20 @@ def test_nonsense_is_refused_with_its_reason(message):
 
 
 BROKEN = {
-    "not JSON": lambda text: text[:-40],
+    "expected a house as JSON": lambda text: text[:-40],
     "schema 99": lambda text: text.replace('"schema":1', '"schema":99'),
     "no 'schema'": lambda text: "[]",
     "unknown fields": lambda text: text.replace('"seed":', '"sed":'),
-    "lacks the fields": lambda text: json.dumps({k: v for k, v in json.loads(text).items() if k != "rooms"}),
-    "should be a finite number": lambda text: text.replace('"outer_wall":0.32', '"outer_wall":NaN'),
+    r"missing fields \['rooms'\]": lambda text: json.dumps({k: v for k, v in json.loads(text).items() if k != "rooms"}),
+    "NaN is no JSON": lambda text: text.replace('"outer_wall":0.32', '"outer_wall":NaN'),
+    "1e999 is too large": lambda text: text.replace('"outer_wall":0.32', '"outer_wall":1e999'),
+    "should be a finite number": lambda text: text.replace('"outer_wall":0.32', '"outer_wall":1e300'),
     "should be a text": lambda text: text.replace('"kind":"bedroom"', '"kind":7'),
     "should be a list": lambda text: text.replace('"lights":[]', '"lights":{}'),
     r"placements\[0\] \('rug_1'\).yaw should be a number, got 'north'": lambda text: text.replace(
         '"yaw":0.0', '"yaw":"north"'
     ),
-    r"\['seed'\] stand there twice": lambda text: text.replace('"seed":0', '"seed":0,"seed":1'),
+    "'seed' stands there twice": lambda text: text.replace('"seed":0', '"seed":0,"seed":1'),
 }
 
 

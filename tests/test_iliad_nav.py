@@ -7,6 +7,7 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
+from agents.common.decoding import likeliest
 from agents.common.vocabulary import build_vocabulary
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.network import Follower, WalkDescriber
@@ -14,7 +15,6 @@ from agents.iliad.nav.student import LoopFree, NavEyes, NavStudent
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
 from agents.iliad.nav.world import HORIZON, NavMarginal, NavWalk, NavWorld, Trip, trips_of, walk_along, without_loops
 from agents.iliad.training import IliadProblem, success_rate, train
-from agents.common.decoding import likeliest
 from agents.vision.bank import FeatureBank
 from embodied.interface import FindObject, Pose, Route, Task
 from embodied.seeds import stream

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world
 
+from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_WALKER
 from agents.common.vocabulary import build_vocabulary
 from agents.iliad.nav.stages import load_follower
 from agents.iliad.nav.student import NavEyes, NavStudent
 from agents.iliad.nav.world import MOVES, Trip, walk_along
-from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_WALKER
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import load_encoder
 from embodied.action_spaces import PanoramicMoves

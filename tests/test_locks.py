@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import signal
+import socket
+import stat
 import subprocess
 import sys
-import time
+import threading
+from pathlib import Path
 
 import pytest
 
-from assets.cache import _MACHINE, atomic_path, draft_prefix, sweep, write_bytes
+from assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes
+from embodied.errors import UnableError
 from embodied.locks import LOCK, LockedError, locked
 
 HOLD = """
@@ -54,34 +59,113 @@ def test_the_same_process_cannot_hold_a_folder_twice(tmp_path):
         assert (tmp_path / LOCK).exists()
 
 
-def dead_pid() -> int:
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
-    return process.pid
+def killed_draft(folder) -> None:
+    """What a process leaves in `folder` that is killed while it writes."""
+    code = """
+import os, signal, sys
+from pathlib import Path
+from assets.cache import atomic_path
+with atomic_path(Path(sys.argv[1]) / "weights.safetensors") as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    assert subprocess.run([sys.executable, "-c", code, str(folder)]).returncode == -signal.SIGKILL
+    (left,) = folder.glob(f"{DRAFTS}*")
+    assert (left / "weights.safetensors").read_text() == "half"
+
+
+NAMES = (
+    ".backup.home-2023.tar.gz",
+    ".report.v2-2024.pdf",
+    ".bashrc",
+    ".lock",
+    ".mark",
+    f".a.{socket.gethostname()}-99999999.x.json",
+    f"{DRAFTS}notes.txt",
+    ".embodied-unfinished",
+    "weights.safetensors.tmp",
+)
+
+
+def own_files(folder) -> set[Path]:
+    """Files and folders of every name that looks like a draft, a lock or a mark, and none is."""
+    for name in NAMES:
+        (folder / name).write_text("mine")
+    for name in (".photos.italy-2019.d", f"{DRAFTS}holidays", f"{DRAFTS}"):
+        (folder / name).mkdir()
+        (folder / name / "one.jpg").write_text("mine")
+        (folder / name / MARK).write_text("unfinished files of the program embodied, 7\n")
+    (folder / "elsewhere").mkdir()
+    (folder / "elsewhere" / "dear").write_text("mine")
+    (folder / f"{DRAFTS}link").symlink_to(folder / "elsewhere")
+    return set(folder.rglob("*"))
 
 
 def test_what_a_killed_process_left_is_swept_and_what_others_write_or_own_stays(tmp_path):
-    mine, dead = tmp_path / f"{draft_prefix('a')}x.json", tmp_path / f".a.{_MACHINE}-{dead_pid()}.x.json"
-    house = tmp_path / f".train_0001.{_MACHINE}-{dead_pid()}.y"
-    house.mkdir()
-    far, forgotten = tmp_path / ".a.elsewhere-1.x.json", tmp_path / ".a.elsewhere-2.x.json"
-    others = [tmp_path / ".bashrc", tmp_path / ".my.settings", tmp_path / ".git-1.x"]
-    for path in (mine, dead, far, forgotten, house / "house.json", *others):
-        path.write_text("half")
-    long_ago = time.time() - 3 * 86_400
-    os.utime(forgotten, (long_ago, long_ago))
+    killed_draft(tmp_path)
+    mine = own_files(tmp_path) - set(tmp_path.glob(f"{DRAFTS}*/weights.safetensors"))
+    swept = {p for p in mine if abandoned(p) or abandoned(p.parent)}
+    with atomic_path(tmp_path / "live") as temporary:
+        sweep.cache_clear()
+        write_bytes(tmp_path / "b.json", b"{}")
+        temporary.write_text("")
+        assert temporary.exists(), "a draft that somebody writes stays"
+    assert swept and set(tmp_path.rglob("*")) == mine - swept | {tmp_path / "b.json", tmp_path / "live"}
+
+
+def test_a_copy_of_what_was_killed_is_nobodys_draft(tmp_path):
+    killed_draft(tmp_path)
+    (left,) = tmp_path.glob(f"{DRAFTS}*")
+    shutil.copytree(left, tmp_path / f"{DRAFTS}copy")
     sweep.cache_clear()
-    write_bytes(tmp_path / "b.json", b"{}")
-    assert set(tmp_path.iterdir()) == {mine, far, tmp_path / "b.json", *others}
+    sweep(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == [f"{DRAFTS}copy"]
 
 
 def test_whoever_takes_a_folder_finds_nothing_that_a_killed_process_left_in_it(tmp_path):
     with locked(tmp_path):
         pass  # it has been swept once in this process
-    left = tmp_path / f".weights.safetensors.{_MACHINE}-{dead_pid()}.x.safetensors"
-    left.write_text("half")
+    killed_draft(tmp_path)
     with locked(tmp_path):
-        assert not left.exists()
+        assert [p.name for p in tmp_path.iterdir()] == [LOCK]
+
+
+@pytest.mark.parametrize("place", ["link", "hard link", "file", "folder", "fifo"])
+def test_a_lock_touches_nothing_that_is_not_one(tmp_path, place):
+    (tmp_path / "run").mkdir()
+    victim, lock = tmp_path / "victim", tmp_path / "run" / LOCK
+    victim.write_text("dear")
+    make = {
+        "link": lambda: lock.symlink_to(victim),
+        "hard link": lambda: lock.hardlink_to(victim),
+        "file": lambda: lock.write_text("dear"),
+        "folder": lock.mkdir,
+        "fifo": lambda: os.mkfifo(lock),
+    }
+    make[place]()
+    with pytest.raises(UnableError, match="no lock of this program"), locked(tmp_path / "run"):
+        pass
+    assert victim.read_text() == "dear" and lock.exists()
+    assert place != "file" or lock.read_text() == "dear"
+
+
+def test_files_and_folders_are_made_as_the_umask_says(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_bytes(tmp_path / "a" / "b.json", b"")
+        os.umask(0o002)
+        write_bytes(tmp_path / "c.json", b"")
+    finally:
+        os.umask(before)
+    modes = [stat.S_IMODE((tmp_path / p).stat().st_mode) for p in ("a", "a/b.json", "c.json")]
+    assert modes == [0o750, 0o640, 0o664]
+
+
+def test_whoever_waits_for_a_folder_gets_it_when_its_holder_is_done(tmp_path):
+    first = holder(tmp_path / "run")
+    threading.Timer(0.3, first.kill).start()
+    with locked(tmp_path / "run", wait=True):
+        assert first.wait(5) == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("body", [lambda t: t.write_bytes(b"x"), lambda t: (t / "no").write_text(""), None])

@@ -189,7 +189,7 @@ def test_a_truncated_or_foreign_file_is_refused(stored):
 def test_a_flipped_byte_is_noticed_where_it_matters(stored):
     path, _ = stored
     with PanoramaFile(path) as file:
-        offset, length, _ = file.index["nodes"][1]["depth"]
+        offset, length, _ = file.index.nodes[1]["depth"]
     data = bytearray(path.read_bytes())
     data[offset + length // 2] ^= 0xFF
     path.write_bytes(data)

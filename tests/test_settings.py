@@ -9,9 +9,9 @@ import pytest
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import RatingConfig
+from agents.common.settings import RunSettings, ValidatedRunSettings
 from agents.hanna.training_config import TrainingConfig
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.common.settings import RunSettings, ValidatedRunSettings
 from agents.vision.config import VisionConfig
 from agents.vnla.config import VnlaSettings
 

@@ -4,13 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Place, Pose, Reply, Sight, Step, Task
+from embodied.interface import (
+    TURNS,
+    Ask,
+    Description,
+    Feature,
+    Intention,
+    Mode,
+    Place,
+    Pose,
+    Reply,
+    Step,
+    Task,
+    Viewpoint,
+)
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
     Intention.CUR: "Where am I?",
     Intention.GOAL: "Where should I go?",
     Intention.SUB: "Can you give me a nearer goal?",
+    Intention.CONFIRM: "Is it this one?",
+    Intention.APPEARANCE: "What does it look like?",
+    Intention.REGION: "Which room is it in?",
+    Intention.ROUTE: "How do I get there?",
+    Intention.DISAMBIGUATE: "Which of these do you mean?",
+    Intention.FREE: "May I ask something?",
 }
 SIDES = (
     "ahead",
@@ -44,7 +63,7 @@ class Story:
         """HARI's stack of goals, the top last."""
         self.route: tuple[int, ...] = ()
         """Nodes of the route that the agent was told and has not left."""
-        self.image: Sight | None = None
+        self.image: Viewpoint | None = None
         """What the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
         self.count = 0
         self.requests = 0
@@ -65,14 +84,16 @@ class Story:
             self.goals.pop()
         left = self.last is not None and self.last.mode is Mode.SUB and step.mode is Mode.MAIN
         if left and self.task.kind == "hanna":
-            self.image = Sight(self.task.world, step.targets[0])
+            self.image = Viewpoint(self.task.world, step.targets[0])
             self.dialogue.append(f"**Agent** (step {self.count}): *leaves the route and goes on by itself*")
 
     def after(self, step: Step) -> None:
         """Take in the action of `step` and the reply to it."""
         if isinstance(step.action, Ask):
             self.requests += 1
-            self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
+            self.dialogue.append(
+                f"**Agent** (step {self.count}): {step.action.question or QUESTIONS[step.action.intention]}"
+            )
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)

@@ -15,10 +15,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.hanna.losses import help_loss, navigation_loss
-from agents.hanna.policy import HannaPolicy, Moment
 from agents.common.losses import IGNORE
 from agents.common.playing import play_remembering
+from agents.hanna.losses import help_loss, navigation_loss
+from agents.hanna.policy import HannaPolicy, Moment
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, Label, Move, Place, Stop, Task, Teacher
 

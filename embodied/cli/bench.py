@@ -3,8 +3,9 @@
 houses, pictures, steps and memory measure the main line; views measures views of a panorama; plays counts environment
 steps with help, seen those with pixels; drive counts live pictures and the steps of a body on wheels that sees them;
 bakes lights a flat again and again; light compares the ways of drawing with a path tracer; growth lights houses of 40
-to 400 m² (fast, or --quality normal) and fits how the cost grows. Close other programs first: they make every number
-worse.
+to 400 m² (fast, or --quality normal) and fits how the cost grows; serve lets --people take part in a study at once for
+--seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make
+every number worse.
 """
 
 from __future__ import annotations
@@ -18,7 +19,20 @@ from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, no
 from embodied.cli.options import folder_to_write, whole
 from embodied.render.pictures import DRAWN, LOOKS
 
-PARTS = ("houses", "pictures", "steps", "views", "plays", "seen", "drive", "memory", "bakes", "light", "growth")
+PARTS = (
+    "houses",
+    "pictures",
+    "steps",
+    "views",
+    "plays",
+    "seen",
+    "drive",
+    "memory",
+    "bakes",
+    "light",
+    "growth",
+    "serve",
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +48,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="light and growth write here"
     )
+    parser.add_argument("--people", type=whole(2), default=50, help="who take part at once, for serve (default: 50)")
+    parser.add_argument("--seconds", type=whole(), default=60, help="how long, for serve (default: 60)")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -44,10 +60,13 @@ def run(args: argparse.Namespace) -> int:
     from embodied.bench import bakes, drive, episodes, growth, light, seen, timing, views, world
     from embodied.light.settings import QUALITIES
 
-    catalogue, parts = catalogue_of(args), args.part or ["houses", "pictures", "steps"]
+    parts = args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
+    catalogue = catalogue_of(args)
     lit = args.quality if args.quality in QUALITIES else "fast"
+    if "serve" in parts:
+        from embodied.bench import serve  # needs the extra of that name
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality, args.look),
@@ -61,6 +80,9 @@ def run(args: argparse.Namespace) -> int:
     }
     reports = {
         "light": lambda: light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note),
+        "serve": lambda: serve.measure(
+            args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note
+        ),
         "growth": lambda: growth.growth(catalogue, args.cache, args.out, seed=args.seed, quality=lit, progress=note),
     }
     measures = []

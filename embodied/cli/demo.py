@@ -2,7 +2,8 @@
 
 Generates a furnished house with people in it, lights it, draws the panorama of every viewpoint,
 lets an agent walk to an object it is asked for, then lets a trained agent, which has never seen
-this house, find another one by asking the people; both episodes are recorded for Rerun.
+this house, find another one by asking the people; both episodes are recorded for Rerun, the
+second one with --video as a film.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
 from embodied.cli.options import face, folder_to_write, whole
-from embodied.cli.recording import add_sinks, viewers_of
+from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -44,6 +45,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder to write (default: %(default)s)",
     )
+    parser.add_argument(
+        "--small", action="store_true", help="only light one small flat and show a room of it, as DIR/room.png"
+    )
+    add_video(parser)
     add_sinks(parser, "DIR/episode.rrd")
     add_cache(parser)
     add_packs(parser)
@@ -51,6 +56,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    if args.small:
+        return show_a_room(args)
     with viewers_of(args) as viewers:
         return demonstrate(args, viewers)
 
@@ -101,6 +108,41 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     return 0
 
 
+SMALL = (32.0, 36.0)
+"""Area of the flat of --small, square metres."""
+
+
+def show_a_room(args: argparse.Namespace) -> int:
+    """A small flat from the seed, lit, and the view of it that shows most objects; needs neither torch nor Rerun."""
+    import cv2
+    import numpy as np
+
+    from embodied.generate import generate_house
+    from embodied.generate.config import HouseConfig
+    from embodied.world import open_world
+
+    catalogue = catalogue_of(args)
+    seconds: dict[str, float] = {}
+    args.out.mkdir(parents=True, exist_ok=True)
+    with timed("a small flat (about 10 s)", seconds):
+        house = generate_house(args.seed, HouseConfig(area=SMALL, hour=11.0, weather="clear"), catalogue)
+        house.save(args.out / "house.json")
+        fetch(catalogue, house)
+    note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects")
+    with open_world(house, catalogue, args.cache, size=args.size, quality="fast") as world:
+        with timed("light, followed through the flat once (about 40 s)", seconds):
+            seen = {n: world.panorama(n) for n in range(len(world.graph.ids))}
+        best = max(
+            ((n, yaw) for n in seen for yaw in np.arange(12) * np.pi / 6),
+            key=lambda at: len(np.unique(seen[at[0]].view(at[1], -0.15, np.radians(60), (90, 160))[2])),
+        )
+        picture = world.camera(world.graph.positions[best[0]], best[1], -0.15, np.radians(60), (720, 1280)).rgb
+    cv2.imwrite(str(args.out / "room.png"), np.ascontiguousarray(picture[..., ::-1]))
+    facts = {"room": str(args.out / "room.png"), "house": str(args.out / "house.json"), "seconds": seconds}
+    show(args, facts, f"a room of it: {facts['room']}")
+    return 0
+
+
 def inhabited(
     house: House, catalogue: Catalogue, args: argparse.Namespace
 ) -> tuple[House, NavGraph, tuple[Route, ...]]:
@@ -137,8 +179,8 @@ def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, .
 def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
-    from agents.hanna.evaluation import hanna_policies
     from agents.hanna.agent import load_agent
+    from agents.hanna.evaluation import hanna_policies
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
@@ -155,6 +197,8 @@ def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route]
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
+    if args.video:
+        film(world, episode, args.video, tuple(args.video_size))
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world)
 
 

@@ -5,9 +5,21 @@ from __future__ import annotations
 import argparse
 import contextlib
 from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from embodied.cli.common import note
-from embodied.cli.options import file_to_write
+from embodied.cli.common import bar, note
+from embodied.cli.options import file_ending_in, video_side
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from embodied.interface import Episode
+    from embodied.render.photograph import PhotoCamera
+    from embodied.world import World
+
+VIDEO_ANGLE = 1.2
+"""Vertical field of view of videos, radians."""
 
 
 def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -19,7 +31,7 @@ def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> No
     group = parser.add_argument_group("recording")
     group.add_argument(
         "--rrd",
-        type=file_to_write,
+        type=file_ending_in(".rrd"),
         metavar="FILE",
         help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
     )
@@ -61,3 +73,36 @@ def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
                 "better --serve"
             )
         yield viewers
+
+
+def add_video(parser: argparse.ArgumentParser) -> None:
+    """The options of `film`."""
+    parser.add_argument(
+        "--video",
+        type=file_ending_in(".mp4"),
+        metavar="MP4",
+        help="write what the agent sees and what is said as a video",
+    )
+    parser.add_argument(
+        "--video-size",
+        type=video_side,
+        nargs=2,
+        default=(480, 640),
+        metavar=("H", "W"),
+        help="pixels of the video, both even (default: 480 640)",
+    )
+
+
+def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera | None = None) -> Path:
+    """Write what the agent saw as a video with smooth motion and the dialogue; returns the path."""
+    from viz.video import film_episode
+
+    def frame(number: int, c: np.ndarray) -> np.ndarray:
+        rgb = world.renderer.view(c[:3], c[3], c[4], VIDEO_ANGLE, size).rgb
+        if camera is None or not camera.traits:
+            return rgb
+        return camera.photographed(rgb, VIDEO_ANGLE, "frame", number, light=world.darkness(c[:3]))
+
+    frames = film_episode(world.graph, episode, frame, path, size, lambda track: bar(track, "video", "frame"))
+    note(f"{path}: {frames} frames")
+    return path

@@ -10,27 +10,22 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import LOOK_HELP, any_path, face, file_to_write, video_side, whole
-from embodied.cli.recording import add_sinks, viewers_of
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, show
+from embodied.cli.options import LOOK_HELP, face, house_folder, whole
+from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from embodied.interface import Agent, Episode
-    from embodied.render.photograph import PhotoCamera
+    from embodied.interface import Agent
     from embodied.world import World
 
-VIDEO_ANGLE = 1.2
-"""Vertical field of view of videos, radians."""
 AGENTS = ("shortest", "random", "forward10")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--house", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    where.add_argument("--house", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
     parser.add_argument(
@@ -41,15 +36,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument("--video", type=file_to_write, metavar="MP4", help="write what the agent sees as a video")
-    parser.add_argument(
-        "--video-size",
-        type=video_side,
-        nargs=2,
-        default=(480, 640),
-        metavar=("H", "W"),
-        help="pixels, both even (default: 480 640)",
-    )
+    add_video(parser)
     parser.add_argument(
         "--camera",
         choices=CAMERAS,
@@ -145,21 +132,3 @@ def numbered(path: Path, number: int, total: int) -> Path:
         return path
     name = path.name if "%d" in path.name else f"{path.stem}-%d{path.suffix}"
     return path.with_name(name.replace("%d", str(number)))
-
-
-def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera) -> Path:
-    """Write what the agent saw as a video with smooth motion; returns the path."""
-    from viz.video import camera_track, captioned, write_video
-
-    poses = [episode.task.start, *(s.next_pose for s in episode.steps)]
-    track = camera_track(world.graph.positions, poses)
-
-    def frame(number: int, c: np.ndarray) -> np.ndarray:
-        rgb = world.renderer.view(c[:3], c[3], c[4], VIDEO_ANGLE, size).rgb
-        dark = world.darkness(c[:3]) if camera.traits else 1.0
-        return camera.photographed(rgb, VIDEO_ANGLE, "frame", number, light=dark)
-
-    drawn = (captioned(frame(i, c), episode.task.request) for i, c in enumerate(bar(track, "video", "frame")))
-    write_video(path, drawn, size)
-    note(f"{path}: {len(track)} frames")
-    return path

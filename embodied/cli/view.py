@@ -3,7 +3,8 @@
 RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
 a viewer that runs already), or a folder that `embodied eval` or `judge` wrote: its episodes are
 listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
---data, the data set its houses come from). What the agent sees in it is drawn as it was for the agent.
+--data, the data set its houses come from), and with --video a film. What the agent sees in the
+recording is drawn as it was for the agent.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
 from embodied.cli.options import any_path, whole
-from embodied.cli.recording import add_sinks, viewers_of
+from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quality", choices=DRAWN, default="unlit", help="how --episode draws the house (default: unlit)"
     )
+    add_video(parser)
     add_sinks(parser, "RUN/recordings/N.rrd")
     add_cache(parser)
     add_packs(parser)
@@ -105,13 +107,12 @@ def record_again(
     """Record an episode of a run in its house, drawn again as `args.quality`, and with what its agent saw.
 
     Raises:
-      ValueError: the house is not in the data set.
+      DatasetError: it was played in a house that is not in the data set.
     """
     from viz.recording import record_episode
 
     name = episode.task.world
-    if f"{name}/house.json" not in data.index.files:
-        raise ValueError(f"{data.folder} has no house {name!r}; name the data set of the run")
+    data.place_of(episode)
     seen = looked_at(run).by(episode.agent, name)
     with contextlib.ExitStack() as stack:
         eyes = None
@@ -122,6 +123,8 @@ def record_again(
         world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
         watch = lambda steps: bar(steps, "recording", "step")
         record_episode(world, episode, sinks, eyes=eyes, watch=watch)
+        if args.video:
+            film(world, episode, args.video, tuple(args.video_size))
     note(f"recorded {episode.task.id}")
 
 

@@ -6,8 +6,6 @@ import contextlib
 import dataclasses
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,7 @@ from typing import Any, TypeVar
 import joblib
 from joblib.externals.loky import process_executor
 
-from assets.cache import digest, draft_prefix, write_bytes
+from assets.cache import digest, drafts, sweep, write_bytes
 from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
@@ -128,6 +126,8 @@ class UnitFacts:
     """SplitPlan to number of tasks."""
 
 
+DRAWING = ("mitsuba", "drjit", "embreex", "xatlas")
+"""Libraries that light and draw houses, which pictures have in their own keys; houses and words do without."""
 Watch = Callable[[Iterable[str], int], Iterable[str]]
 HouseMaker = Callable[[int, str, HouseConfig, Catalogue], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
@@ -166,15 +166,7 @@ def build_dataset(
     with locked(folder):
         _claim(folder, config)
         for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
-        _sweep(folder, work)
         return write_index(config, folder)
-
-
-def _sweep(folder: Path, work: tuple[Unit, ...]) -> None:
-    """Remove what processes that were killed outright left unfinished; all is whole now, and ours alone."""
-    for home in (folder / "houses", *(folder / "houses" / unit.name for unit in work)):
-        for draft in sorted(home.glob(".*")):
-            shutil.rmtree(draft) if draft.is_dir() else draft.unlink()
 
 
 def draw_panoramas(
@@ -204,7 +196,6 @@ def draw_panoramas(
     work = units(config.plan)
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
-        _sweep(Path(folder), work)
 
 
 def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings, packs: tuple[Path, ...]) -> str:
@@ -274,17 +265,15 @@ def build_unit(
     home = folder / "houses" / unit.name
     if (home / "unit.json").exists():
         return unit.name
+    if home.exists():
+        raise ValueError(f"{home} is no house of this data set (it has no unit.json); move it away")
     home.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=draft_prefix(unit.name), dir=home.parent))
-    try:
+    sweep(home.parent)
+    with drafts(home.parent) as private:
+        draft = private / unit.name
+        draft.mkdir()
         _write_unit(unit, config, draft, cache, make_house, packs)
-        os.chmod(draft, 0o755)
-        if home.exists():
-            shutil.rmtree(home)
         draft.rename(home)
-    finally:
-        if draft.exists():
-            shutil.rmtree(draft)
     return unit.name
 
 
@@ -387,7 +376,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
 
 def program() -> str:
     """A digest of the code and the catalogue that make data sets: what one began, only the same one may finish."""
-    return code_digest(__name__)
+    return code_digest(__name__, without=DRAWING)
 
 
 def write_index(config: DatasetConfig, folder: Path) -> Path:

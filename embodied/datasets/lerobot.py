@@ -16,8 +16,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -29,7 +27,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from assets.cache import write_bytes, write_json
+from assets.cache import drafts, sweep, write_bytes, write_json
 from embodied.datasets.checks import DatasetError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Place, Pose, Step, Stop
@@ -106,29 +104,19 @@ def export_lerobot(
     if folder.exists() and any(folder.iterdir()):
         raise ValueError(f"{folder} is not empty; choose another folder for the LeRobot data set")
     folder.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    try:
+    sweep(folder.parent)
+    with drafts(folder.parent) as private:
+        draft = private / folder.name
+        draft.mkdir()
         writer = _Writer(draft, camera)
         for episode in episodes:
-            writer.add(episode, data.place(_house_of(data, episode)), _pictures(data, episode.task.world), succeeded)
+            place = data.place_of(episode)
+            writer.add(episode, place, _pictures(data, episode.task.world), succeeded)
         steps = writer.finish(data)
-        draft.chmod(0o755)
         if folder.exists():
             folder.rmdir()
         draft.rename(folder)
-    finally:
-        if draft.exists():
-            shutil.rmtree(draft)
     return steps
-
-
-def _house_of(data: Dataset, episode: Episode) -> str:
-    name = episode.task.world
-    if not any(name in data.names(split) for split in data.splits):
-        raise DatasetError(
-            f"{data.folder} has no house {name!r}, where {episode.task.id!r} was played; give its own --data"
-        )
-    return name
 
 
 def _pictures(data: Dataset, name: str) -> Path:

@@ -7,6 +7,7 @@ does, what stopping does, and what may be asked.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import TypeVar
 
@@ -16,7 +17,9 @@ from embodied.interface import (
     Ask,
     Assistant,
     Description,
+    Detection,
     Episode,
+    FindDescribed,
     FindObject,
     Intention,
     Mode,
@@ -30,8 +33,9 @@ from embodied.interface import (
     Stop,
     Subtask,
     Task,
+    Viewpoint,
 )
-from embodied.seeds import stream
+from embodied.seeds import checked_seed, stream
 
 T = TypeVar("T")
 
@@ -78,10 +82,10 @@ class HelpEnv:
           TaskError: unknown world, nodes outside the graph, a goal that is not in the house.
         """
         check_task(task, self.worlds)
-        self.task, self.seed, self.world = task, seed, self.worlds[task.world]
+        self.task, self.seed, self.world = task, checked_seed(seed), self.worlds[task.world]
         self.pose = task.start
         self.mode, self.instruction = Mode.MAIN, task.request
-        self.target: Sight | None = None
+        self.target: Viewpoint | None = None
         self.targets = task.goal_nodes
         self.subtask: Subtask | None = None
         self.time = self.time_on_task = self.requests = 0
@@ -109,7 +113,8 @@ class HelpEnv:
             self._moved()
         elif isinstance(action, Ask):
             rng = stream(self.seed, "assistant", self.task.id, self.time)
-            reply = required(self.assistant, "assistant").answer(situation, action.intention, rng=rng)
+            asked = dataclasses.replace(situation, question=action.question or "")
+            reply = required(self.assistant, "assistant").answer(asked, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)
         else:
@@ -136,6 +141,10 @@ class HelpEnv:
         )
         return self._look() if self.ended is None else None
 
+    def cut_short(self) -> None:
+        """End the episode here, as its horizon does; nothing where it has ended."""
+        self.ended = self.ended or "limit"
+
     def facts(self) -> dict[str, float]:
         """Numbers about the episode so far that its record does not hold."""
         return {}
@@ -154,7 +163,13 @@ class HelpEnv:
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
         return Episode(
-            task=self.task, steps=tuple(self._steps), ended=self.ended, seed=self.seed, agent=agent, budget=self.budget
+            task=self.task,
+            steps=tuple(self._steps),
+            ended=self.ended,
+            seed=self.seed,
+            agent=agent,
+            budget=self.budget,
+            house=self.world.house.digest[:16],
         )
 
     # What a rule with help overrides -------------------------------------------------------------
@@ -197,6 +212,15 @@ class HelpEnv:
     def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
         return (), ()
 
+    def _possible(self) -> tuple[str, ...]:
+        return ()
+
+    def _detections(self) -> tuple[Detection, ...]:
+        return ()
+
+    def _advised(self) -> Move | Stop | None:
+        return None
+
     # Looking -------------------------------------------------------------------------------------
 
     def _budget(self) -> int | None:
@@ -229,6 +253,7 @@ class HelpEnv:
             requests_left=left,
             trail=tuple(self._trail),
             goals=self._stack(),
+            possible=self._possible(),
         )
         state, goals = self._descriptions()
         self.observation = Observation(
@@ -237,7 +262,7 @@ class HelpEnv:
             tilt=self.pose.tilt,
             candidates=candidates,
             instruction=self.instruction,
-            target=self.target,
+            target=None if self.target is None else Sight(self.target.world, self.target.node, picture=True),
             mode=self.mode,
             can_ask=self._askable(self.situation),
             requests_left=left,
@@ -245,6 +270,9 @@ class HelpEnv:
             time_on_task=self.time_on_task,
             state_description=state,
             goal_descriptions=goals,
+            detections=self._detections(),
+            advised=self._advised(),
+            moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
         )
         return self.observation
 
@@ -293,8 +321,10 @@ def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
         raise TaskError(
             f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again"
         )
-    if isinstance(task.goal, FindObject):
-        gone = [p for p in task.goal.placements if p not in world.house.placement_by_id]
+    if isinstance(task.goal, FindObject | FindDescribed):
+        goal = task.goal
+        sought = goal.placements if isinstance(goal, FindObject) else (goal.placement, *goal.fitting, *goal.similar)
+        gone = [p for p in sought if p not in world.house.placement_by_id]
         if gone:
             raise TaskError(f"task {task.id!r} looks for {gone}, not in the house {task.world!r}; sample it again")
     if task.horizon < 1 or (task.budget is not None and task.budget < 0):

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
+from embodied.assistants.ask import AskAssistant
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
+from embodied.envs.ask import AskEnv, AskRules
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.vnla import RULES, check_rules, fitted, teacher_of
-from embodied.interface import Language, Place, Route, Task
+from embodied.interface import Assistant, Language, Place, Route, Task
 from embodied.language.plain import PlainLanguage
 
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.house.house import Placement
+    from embodied.tasks.ask import Look
+
+ASK_RULES = AskRules()
 AS_PUBLISHED = "indirect"
 """VNLA as its program plays it: help is put into words."""
 
@@ -31,6 +41,7 @@ def environment_maker(
     language: Language | None = None,
     hari: HariRules = AS_PRINTED,
     vnla: str = AS_PUBLISHED,
+    assistant: Assistant | None = None,
 ) -> Callable[[], HelpEnv]:
     """A maker of environments for a kind of task; all it makes share assistant and caches.
 
@@ -40,29 +51,78 @@ def environment_maker(
       language: of VNLA's advisor.
       hari: variants of HARI.
       vnla: one of embodied.envs.vnla.RULES.
+      assistant: who answers, instead of the kind's own assistant.
 
     Raises:
-      ValueError: an unknown kind or rule of play, or a rule of VNLA for another kind.
+      ValueError: an unknown kind or rule of play, a rule of VNLA for another kind, or an assistant where nobody is
+        asked.
     """
     refuse_rules(kind, vnla, hari)
     if kind in ("find", "vln"):
+        if assistant is not None:
+            raise ValueError(f"nobody is asked in tasks of kind {kind!r}; give an assistant to vnla, hanna or hari")
         moves = PanoramicMoves()
         return lambda: HelpEnv(worlds, moves=moves)
     if kind == "hanna":
-        anna = Anna({name: w.graph for name, w in worlds.items()}, routes or {}, split=wording)
+        anna = assistant or Anna({name: w.graph for name, w in worlds.items()}, routes or {}, split=wording)
         moves = PanoramicMoves()
         return lambda: HannaEnv(worlds, anna, moves)
     if kind == "vnla":
         teacher, rule = teacher_of(vnla), RULES[vnla]
-        advisor = Advisor(teacher, language or PlainLanguage())
+        advisor = assistant or Advisor(teacher, language or PlainLanguage())
         return lambda: rule(worlds, advisor, teacher.moves)
     if kind == "hari":
         say = describer or Describer(frequent_classes(worlds.values()))
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
-        assistant = willing if hari.cooperative else Uncooperative(willing)
+        asked = assistant or (willing if hari.cooperative else Uncooperative(willing))
         moves = PanoramicMoves()
-        return lambda: HariEnv(worlds, assistant, say, costs=hari.costs, moves=moves, states=hari.states)
+        return lambda: HariEnv(worlds, asked, say, costs=hari.costs, moves=moves, states=hari.states)
+    if kind == "ask":
+        catalogues = (getattr(w, "catalogue", None) for w in worlds.values())
+        return ask_environment_maker(worlds, look_of(next(catalogues, None)), assistant=assistant)
     raise ValueError(f"unknown kind of task {kind!r}")
+
+
+def ask_environment_maker(
+    worlds: Mapping[str, Place], look: Look, rules: AskRules = ASK_RULES, assistant: Assistant | None = None
+) -> Callable[[], HelpEnv]:
+    """A maker of Ask-v0's environments.
+
+    Args:
+      look: words of colour and material of things.
+      assistant: who answers, instead of AskAssistant.
+    """
+    answering, moves, describer = assistant or AskAssistant(look), PanoramicMoves(), Describer(())
+    return lambda: AskEnv(worlds, answering, moves, rules, describer)
+
+
+def look_of(catalogue: Catalogue | None) -> Look:
+    """The first word of colour and of material that a catalogue has for a thing; none without a catalogue."""
+    assets = {} if catalogue is None else catalogue.assets
+
+    def look(p: Placement) -> tuple[str, ...]:
+        asset = assets.get(p.asset)
+        return () if asset is None else (*asset.colours[:1], *asset.materials[:1])
+
+    return look
+
+
+def assistant_of(named: Assistant | str | None) -> Assistant | None:
+    """An assistant as it is, or made by what 'module:Class' names, without arguments.
+
+    Raises:
+      ValueError: no such class, or what it makes is no Assistant.
+    """
+    if not isinstance(named, str):
+        return named
+    module, _, attribute = named.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError, ValueError) as e:
+        raise ValueError(f"assistant should be 'module:Class' with an importable module, got {named!r} ({e})") from e
+    if not (hasattr(found, "intentions") and hasattr(found, "answer")):
+        raise ValueError(f"{named!r} is no Assistant; it needs intentions() and answer() (embodied/interface.py)")
+    return found
 
 
 def refuse_rules(kind: str, vnla: str, hari: HariRules = AS_PRINTED) -> None:

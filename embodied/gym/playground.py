@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,14 +26,16 @@ from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
-from embodied.interface import Language, Route, SeenPlace, Task
+from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings
 from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
+    from embodied.world import World
 
+log = logging.getLogger(__name__)
 TASKS = 200
 """Tasks of a generated house."""
 AREA = (70.0, 110.0)
@@ -69,12 +72,14 @@ def split_playground(
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
+    assistant: Assistant | None = None,
 ) -> Playground:
     """A split of a data set.
 
     Args:
       pictures: how the houses are drawn; as the data set's pictures are where not given.
       sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
+      assistant: who answers, instead of the kind's own assistant.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
@@ -90,7 +95,7 @@ def split_playground(
         names = whole.names(split)
         drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
         worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari)
+    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari, assistant=assistant)
     return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, cache, sees))
 
 
@@ -103,6 +108,7 @@ def flat_playground(
     pictures: PictureSettings | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
+    assistant: Assistant | None = None,
 ) -> Playground:
     """One world (generated from `seed` unless given) and tasks in it.
 
@@ -110,7 +116,7 @@ def flat_playground(
 
     Args:
       pictures: how the flat is drawn; 'fast' where not given.
-      sees: as for `split_playground`.
+      sees, assistant: as for `split_playground`.
     """
     catalogue = load_catalogue(cache)
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
@@ -123,7 +129,10 @@ def flat_playground(
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
         drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
-        worlds = {name: open_world(house, catalogue, cache, graph=graph, pictures=drawn)}
+        world = open_world(house, catalogue, cache, graph=graph, pictures=drawn)
+        if drawn.lit:
+            _light(world)
+        worlds = {name: world}
     name, world = next(iter(worlds.items()))
     routes: tuple[Route, ...] = ()
     if kind in ("hanna", "vln"):
@@ -131,9 +140,29 @@ def flat_playground(
         routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
     tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
-    make_env = environment_maker(kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari)
+    make_env = environment_maker(
+        kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari, assistant=assistant
+    )
     played = tasks_under(kind, tasks, worlds, variants.vnla, variants.hari)
     return Playground(worlds, played, make_env, _oracle(worlds, catalogue, cache, sees))
+
+
+def _light(world: World) -> None:
+    """Bake the light of a world unless the cache has it, and say so: it takes minutes."""
+    from embodied.light import bake, progress_bar  # late: loads the path tracer
+
+    told: list[str] = []
+    with progress_bar() as show:
+
+        def tell(stage: str, done: float) -> None:
+            if not told:
+                log.warning("lighting %s, which takes some minutes, once: %s keeps it", world.name, world.cache)
+            if stage not in told:
+                told.append(stage)
+                log.info("lighting %s: %s", world.name, stage)
+            show(stage, done)
+
+        bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "normal", progress=tell)
 
 
 def _oracle(

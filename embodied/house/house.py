@@ -14,7 +14,6 @@ import itertools
 import json
 import math
 import re
-import types
 import typing
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ import numpy as np
 import shapely
 
 from assets.cache import write_bytes
+from assets.json_file import RecordError, from_plain, parse, shown
 from assets.records import ROOM_KINDS
 
 SCHEMA = 1
@@ -42,7 +42,7 @@ ID = re.compile(r"[\w'.-]+")
 """What an id looks like; walls and leaves are named '<id>/<part>', so that it holds no slash."""
 
 
-class HouseError(ValueError):
+class HouseError(RecordError):
     """A house that cannot be: says what was expected, what came and what to do."""
 
 
@@ -183,6 +183,10 @@ class House:
     disorder: float = 0.4
     """0 is tidy, 1 is thoroughly lived in."""
 
+    def __repr__(self) -> str:
+        rooms, things = len(self.rooms), len(self.placements)
+        return f"<House {self.name!r}: {rooms} rooms, {self.area:.0f} m2, {things} objects, seed {self.seed}>"
+
     @functools.cached_property
     def digest(self) -> str:
         """Hex SHA-256 of the canonical JSON: two houses with one digest are the same house."""
@@ -218,7 +222,7 @@ class House:
         return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @staticmethod
-    def from_json(text: str) -> House:
+    def from_json(text: str | bytes) -> House:
         """Read what `to_json` wrote.
 
         Raises:
@@ -226,16 +230,20 @@ class House:
             numbers that are not finite, or a house that fails `check`.
         """
         try:
-            body = json.loads(text, object_pairs_hook=_once)
-        except (ValueError, RecursionError) as e:
-            raise HouseError(f"house file is not JSON ({e}); write it with House.save") from e
+            body = parse(text, "a house")
+        except RecordError as e:
+            raise HouseError(f"{e}; write it with House.save") from e
         if not isinstance(body, dict) or "schema" not in body:
             raise HouseError("house file has no 'schema' field; write it with House.save")
         if (schema := body.pop("schema")) != SCHEMA:
             raise HouseError(
-                f"house file has schema {schema!r}, this version reads {SCHEMA}; generate the house again from its seed"
+                f"house file has schema {shown(schema)}, this version reads {SCHEMA}; "
+                "generate the house again from its seed"
             )
-        house = _read(House, body, "house")
+        try:
+            house = from_plain(House, body, "house")
+        except RecordError as e:
+            raise HouseError(str(e)) from e
         check(house)
         return house
 
@@ -248,13 +256,11 @@ class House:
     def load(path: Path) -> House:
         """Read a house.json; raises HouseError with the file's name."""
         try:
-            return House.from_json(Path(path).read_text(encoding="utf-8"))
+            return House.from_json(Path(path).read_bytes())
         except FileNotFoundError as e:
             raise FileNotFoundError(
                 f"{path} does not exist; make one with `embodied house --seed 7 --out {Path(path).parent}`"
             ) from e
-        except UnicodeDecodeError as e:
-            raise HouseError(f"{path} is not text in UTF-8 ({e}); write it with House.save") from e
         except HouseError as e:
             raise HouseError(f"{path}: {e}") from e
 
@@ -501,60 +507,6 @@ def _check_reach(house: House) -> None:
         todo += new
     if lost := [r.id for r in house.rooms if r.id not in reached]:
         raise HouseError(f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one")
-
-
-WORDS = {float: "a number", int: "an integer", str: "a text", bool: "true or false"}
-"""Types as people call them."""
-
-
-def _read(kind: typing.Any, value: object, where: str) -> typing.Any:
-    """`value`, as JSON gives it, turned into the type `kind`."""
-    origin, args = typing.get_origin(kind), typing.get_args(kind)
-    if dataclasses.is_dataclass(kind):
-        return _read_record(kind, value, where)
-    if origin in (types.UnionType, typing.Union):
-        if value is None and type(None) in args:
-            return None
-        if float in args and isinstance(value, (int, float)) and not isinstance(value, bool):
-            return _read(float, value, where)
-        return _read(next(a for a in args if a is not type(None)), value, where)
-    if origin is tuple:
-        if not isinstance(value, list):
-            raise HouseError(f"{where} should be a list, got {value!r}")
-        if len(args) == 2 and args[1] is Ellipsis:
-            return tuple(_read(args[0], v, f"{where}[{i}]") for i, v in enumerate(value))
-        if len(value) != len(args):
-            raise HouseError(f"{where} should have {len(args)} values, got {len(value)}")
-        return tuple(_read(a, v, f"{where}[{i}]") for i, (a, v) in enumerate(zip(args, value)))
-    if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if not abs(value) <= 1e12:  # NaN too
-            raise HouseError(f"{where} should be a finite number below 1e12, got {value!r:.40}")
-        return float(value)
-    if type(value) is not kind:
-        raise HouseError(f"{where} should be {WORDS.get(kind, kind.__name__)}, got {value!r:.60}")
-    return value
-
-
-def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """An object of JSON, refused where a field stands twice."""
-    if twice := sorted({n for n, _ in pairs if sum(n == m for m, _ in pairs) > 1}):
-        raise ValueError(f"the fields {twice} stand there twice")
-    return dict(pairs)
-
-
-def _read_record(kind: typing.Any, value: object, where: str) -> typing.Any:
-    if not isinstance(value, dict):
-        raise HouseError(f"{where} should be an object, got {value!r}")
-    hints = typing.get_type_hints(kind)
-    names = [f.name for f in dataclasses.fields(kind)]
-    if isinstance(value.get("id"), str):
-        where = f"{where} ({value['id']!r:.60})"
-    if unknown := sorted(set(value) - set(names)):
-        raise HouseError(f"{where} has the unknown fields {unknown}; it may hold {names}")
-    required = [f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING]
-    if missing := [n for n in required if n not in value]:
-        raise HouseError(f"{where} lacks the fields {missing}")
-    return kind(**{n: _read(hints[n], value[n], f"{where}.{n}") for n in names if n in value})
 
 
 def rounded(value: typing.Any, digits: int = 4) -> typing.Any:

@@ -30,8 +30,10 @@ from embodied.light.compose import Composer, Solved, page_of
 from embodied.light.emitters import in_the_open, lamps_of
 from embodied.light.files import (
     Bake,
+    StaleBake,
     facts_of,
     kept_light,
+    open_bake,
     page_files,
     reopened,
     same_atlas,
@@ -49,6 +51,7 @@ from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, w
 from embodied.light.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.tone import expose
 from embodied.light.unwrap import areas_of
+from embodied.locks import locked
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
@@ -154,13 +157,16 @@ def bake_all(
     looks = looks_of(parts)
     for house in lightings:
         folder = _folder(cache, house, looks, settings)
-        done = reopened(folder, house)
-        if done is None:
-            folder.mkdir(parents=True, exist_ok=True)
-            if shared is None:
-                several = len(lightings) > 1
-                shared = Shared(house, parts, Path(cache) / "light", settings, several=several, progress=progress)
-            done = _make(house, shared, folder, settings, progress)
+        with contextlib.suppress(StaleBake):
+            out.append(open_bake(folder, house))
+            continue
+        with locked(folder, wait=True):
+            done = reopened(folder, house)  # whoever held it may have made it
+            if done is None:
+                if shared is None:
+                    several = len(lightings) > 1
+                    shared = Shared(house, parts, Path(cache) / "light", settings, several=several, progress=progress)
+                done = _make(house, shared, folder, settings, progress)
         out.append(done)
     return tuple(out)
 

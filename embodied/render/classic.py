@@ -63,10 +63,11 @@ class Overlay(Protocol):
 class Renderer:
     """Draws one house. Owns textures and display lists on the graphics side until `close`.
 
-    All renderers of a process share its one OpenGL context (embodied.gl) and must be used from the
-    thread that made them.
+    All renderers of a process share its one OpenGL context (embodied.gl), in which threads take turns; one renderer
+    is used by one thread at a time.
     """
 
+    @gl.drawing()
     def __init__(
         self,
         house: House,
@@ -100,7 +101,6 @@ class Renderer:
         model = self.scene.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
-        gl.make_current()
         self._software = gl.info().software
         model.vis.quality.offsamples = 0 if self._software else MULTISAMPLES
         self._buffer = self._drawn_size((size, size))
@@ -137,6 +137,7 @@ class Renderer:
         """
         return self.through(camera_at(position, yaw, pitch, vfov), size, cull=cull)
 
+    @gl.drawing()
     def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
         """The picture of (height, width) that `camera` takes; `cull` as in `view`."""
         drawn = self._choose(camera, size, cull)
@@ -144,15 +145,18 @@ class Renderer:
         depth, ids = self._depth_and_ids(size, drawn)
         return View(rgb, depth, ids)
 
+    @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
         self._choose(camera, size, True)
         return self._rgb(camera, size)
 
+    @gl.drawing()
     def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
         return self._depth_and_ids(size, self._choose(camera, size, True))
 
+    @gl.drawing()
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
@@ -164,6 +168,7 @@ class Renderer:
             depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
         return Panorama(rgb, depth, ids)
 
+    @gl.drawing()
     def seen(self, position: Sequence[float] | np.ndarray, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
         depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
@@ -177,8 +182,8 @@ class Renderer:
             self._painter.close()
             self._painter = None
         if self._mjr is not None:
-            gl.make_current()
-            self._mjr.free()
+            with gl.drawing():
+                self._mjr.free()
             self._mjr = None
             give_memory_back()
 
@@ -192,7 +197,6 @@ class Renderer:
         """Prepare OpenGL and the list of geoms to draw; returns their indices, in drawing order."""
         if self._mjr is None:
             raise RuntimeError("the renderer is closed; make a new one")
-        gl.make_current()
         mujoco.mjr_restoreBuffer(self._mjr)
         if any(n > b for n, b in zip(self._drawn_size(size), self._buffer, strict=True)):
             height, width = self._drawn_size(size)

@@ -29,6 +29,8 @@ FACES = (
 """Forward and up direction of every face, world."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
+MOST_TURNS = 4 * math.pi
+"""Largest angle that is taken for radians; larger ones are most often degrees."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -231,6 +233,8 @@ class Pad:
 
 @functools.lru_cache(maxsize=48)
 def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> PixelGrid:
+    if not (abs(yaw) <= MOST_TURNS and abs(pitch) <= math.pi):
+        raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
     """The grid of an upright perspective picture on faces of side `s`."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     tall = math.tan(vfov / 2)

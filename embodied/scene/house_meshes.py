@@ -9,7 +9,7 @@ from embodied.house.house import House
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts
 
-__all__ = ["Meshes", "Part", "house_parts", "owners"]
+__all__ = ["Meshes", "Part", "house_parts", "instance_classes", "owners"]
 
 
 class Meshes(typing.Protocol):
@@ -43,3 +43,16 @@ def owners(house: House) -> tuple[str, ...]:
     Placements come first, in the house's order, then the shell.
     """
     return tuple(p.id for p in house.placements) + shell_owners(house)
+
+
+def instance_classes(house: House) -> tuple[str, ...]:
+    """The class of each instance id: 'nothing' (0), the furniture's classes, then 'floor', 'wall', 'door', ..."""
+    kinds = {opening.id: opening.kind for opening in house.openings}
+
+    def of_shell(owner: str) -> str:
+        whole, _, piece = owner.rpartition("/")
+        if whole == "outdoor":
+            return "outdoors"
+        return kinds.get(whole) or piece.partition("_")[0]
+
+    return ("nothing", *(p.object_class for p in house.placements), *map(of_shell, shell_owners(house)))

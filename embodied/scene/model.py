@@ -443,8 +443,7 @@ def _add_collisions(
         if p.id in bodies:
             _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(catalogue.assets[p.asset]))
         else:
-            frame = spec.worldbody.add_frame(pos=p.position, quat=yaw_quat(p.yaw))
-            _add_boxes(spec.worldbody, p.id, boxes, frame=frame)
+            _add_boxes(spec.worldbody, p.id, boxes, position=p.position, yaw=p.yaw)
 
 
 def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
@@ -453,10 +452,8 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
     for part in parts:
         if part.kind == "opening" and part.owner.endswith(LEAVES):
             first = count[part.owner] = count.get(part.owner, -1) + 1
-            frame = spec.worldbody.add_frame(pos=part.position, quat=yaw_quat(part.yaw))
-            _add_boxes(
-                spec.worldbody, part.owner, [collision.bounding_box(part.mesh.vertices)], frame=frame, first=first
-            )
+            box = collision.bounding_box(part.mesh.vertices)
+            _add_boxes(spec.worldbody, part.owner, [box], position=part.position, yaw=part.yaw, first=first)
 
 
 def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.CollisionBox, ...]:
@@ -476,23 +473,25 @@ def _add_boxes(
     boxes: Sequence[collision.CollisionBox],
     *,
     density: float = 1000.0,
-    frame: mujoco.MjsFrame | None = None,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    yaw: float = 0.0,
     first: int = 0,
 ) -> None:
+    """Boxes of a frame at `position`, turned by `yaw`."""
+    c, s = math.cos(yaw), math.sin(yaw)
     for k, box in enumerate(boxes, first):
-        geom = body.add_geom(
+        x, y, z = box.centre
+        body.add_geom(
             name=f"{owner}#box{k}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=box.centre,
-            quat=yaw_quat(box.yaw),
+            pos=[position[0] + c * x - s * y, position[1] + s * x + c * y, position[2] + z],
+            quat=yaw_quat(yaw + box.yaw),
             size=box.half,
             group=COLLISION,
             rgba=[0.6, 0.7, 0.9, 0.4],
             density=density,
             friction=[0.9, 0.005, 0.0001],
         )
-        if frame is not None:
-            geom.set_frame(frame)
 
 
 def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:

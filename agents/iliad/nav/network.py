@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.common.decoding import Choice
 from agents.hanna.attention import DotAttend, FeedForward, MultiAttend, SelfAttend, TextEncoder
 from agents.iliad.writing import Bridge, Remembered, Writer, before, write
-from agents.common.decoding import Choice
 
 WORD_END = 2
 """Of a request's words (agents.common.vocabulary)."""

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.hanna.percept import orientation
+from agents.common.decoding import Choice, drawn_with, likeliest
 from agents.common.vocabulary import Vocabulary
+from agents.hanna.percept import orientation
 from agents.iliad.nav.network import Follower, StepSeen
 from agents.iliad.nav.world import MOVES, NavWalk, Trip, walk_along, without_loops
 from agents.iliad.protocol import ExecutionScores
-from agents.common.decoding import Choice, drawn_with, likeliest
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.interface import Place, Pose, Sight

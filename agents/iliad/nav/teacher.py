@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from agents.common.decoding import drawn_with, likeliest
 from agents.common.vocabulary import PAD, Vocabulary
 from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.nav.network import WORD_END, WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent, Track
 from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import NOTHING
-from agents.common.decoding import drawn_with, likeliest
 from embodied.evaluation.metrics import sdtw
 from embodied.interface import SeenPlace
 

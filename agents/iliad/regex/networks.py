@@ -9,9 +9,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from agents.common.decoding import Choice
 from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD, WORD_END
 from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
-from agents.common.decoding import Choice
 
 
 class Speller(nn.Module):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from agents.common.decoding import drawn_with, likeliest
 from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
@@ -15,7 +16,6 @@ from agents.iliad.regex.data import RegexData, WordTask, grammar_of, random_aske
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
 from agents.iliad.regex.world import Written
-from agents.common.decoding import drawn_with, likeliest
 
 _OWN_RULE = re.compile(r"\((\^?)\)\(([a-zCV.]{1,2})\)\((\$?)\)@((?:[a-z]|\\2){0,2})")
 Case = tuple[WordTask, Written, str]

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from agents.common.decoding import Choice, drawn_with, likeliest
 from agents.iliad.protocol import ExecutionScores
 from agents.iliad.regex.coding import PAD, Requests, characters, texts
 from agents.iliad.regex.data import WordTask
 from agents.iliad.regex.networks import Speller
 from agents.iliad.regex.rules import LONGEST, edit_distance, outputs
-from agents.common.decoding import Choice, drawn_with, likeliest
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,138 @@
+"""Let people take part in a browser: as assistant, agent, rater or describer.
+
+STUDY.toml says who does what, with whom and how often; examples/study.toml is one, and the tutorial "Collect help from
+people" explains it. Prints the links to give away and serves until Ctrl-C; started again, it goes on where it was.
+What people did is in OUT: episodes*.jsonl for `embodied view`, judgements.jsonl, and the log people.db, from which both
+are made. `embodied dataset from-people` makes a data set of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.distribution import DISTRIBUTION
+from embodied.errors import UnableError
+
+if TYPE_CHECKING:
+    from embodied.datasets.store import Dataset
+    from embodied.interface import Agent, Place
+    from embodied.serve.game import AgentMaker
+    from embodied.serve.study import Study
+
+LOOPBACK = "127.0.0.1"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", type=any_path, metavar="STUDY.toml", help="the study")
+    parser.add_argument(
+        "--out", type=folder_to_write, metavar="DIR", help="where answers are kept (default: STUDY.people beside it)"
+    )
+    parser.add_argument(
+        "--host",
+        default=LOOPBACK,
+        metavar="ADDRESS",
+        help="where the server listens (default: %(default)s, this machine only; put a proxy with TLS in front of it "
+        "rather than 0.0.0.0)",
+    )
+    parser.add_argument("--port", type=whole(0, 65535), default=8080, help="default: %(default)s")
+    parser.add_argument(
+        "--address",
+        metavar="URL",
+        help="address of the page as people see it, such as https://study.example.org; links are made with it and "
+        "connections from it are accepted",
+    )
+    parser.add_argument(
+        "--invitations", type=whole(), metavar="N", help="make N single-use links instead of one for everybody"
+    )
+    parser.add_argument("--summary", action="store_true", help="print the summary of what was done so far, and end")
+    add_cache(parser)
+    add_packs(parser)
+    add_json(parser)
+
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+
+def run(args: argparse.Namespace) -> int:
+    if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
+        raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
+    from embodied.serve.run import open_study, serve
+    from embodied.serve.study import load_study
+
+    study = load_study(args.study)
+    out = args.out or args.study.with_suffix(".people")
+    address = (args.address or f"http://{args.host}:{args.port}").rstrip("/")
+
+    def draw(data: Dataset, name: str) -> Path:
+        return drawn(data, name, study, args)
+
+    origins = (args.address.rstrip("/"),) if args.address else ()
+    opened = open_study(args.study, out, draw, agents_of(args.study.parent / study.data), origins)
+    if args.summary:
+        from embodied.serve.results import as_text, summary
+
+        facts = summary(opened.server.sessions, time.time())
+        show(args, facts, as_text(facts))
+        return 0
+    links = opened.links(address, args.invitations or 0)
+    write_secret(out / "links.json", json.dumps(links, indent=1))
+    if args.host not in (LOOPBACK, "localhost", "::1"):
+        note(f"listening on {args.host}: whoever reaches this machine can connect; without TLS, answers can be read")
+    few = {k: v if len(v) <= 3 else [*v[:3], f"... {len(v)} in {out / 'links.json'}"] for k, v in links.items() if v}
+    show(args, links, "\n".join(f"{name}: {link}" for name, many in few.items() for link in many))
+    sys.stdout.flush()
+    serve(opened, args.host, args.port)
+    return 0
+
+
+def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> Path:
+    """The panoramas of a house: the data set's, else drawn into the cache."""
+    if data.drawn_pictures(name) is not None:
+        return data.folder / "houses" / name / "panoramas.pano"
+    from embodied.world import open_world
+
+    place, catalogue = data.place(name), catalogue_of(args)
+    with open_world(
+        place.house, catalogue, args.cache, graph=place.graph, quality=study.quality, size=study.size
+    ) as world:
+        note(f"panoramas of {name}: {study.quality}, faces of {study.size} pixels")
+        return world.render_all(progress=True)
+
+
+def agents_of(folder: Path) -> Mapping[str, AgentMaker]:
+    """The policies that a study may name: those without learning, and the agent that ships for its kind of task."""
+    from embodied.datasets.store import Dataset
+    from embodied.serve.game import POLICIES
+
+    data = Dataset(folder)
+
+    def shipped(places: Mapping[str, Place]) -> Agent:
+        from agents.common.shipped import SHIPPED_AGENT, SHIPPED_VNLA
+        from agents.hanna.agent import load_agent as hanna
+        from agents.vision.drawn import pictures_of
+        from agents.vision.features import feature_path, load_bank
+        from agents.vnla.agent import load_agent as vnla
+
+        agent = vnla(SHIPPED_VNLA) if data.kind == "vnla" else hanna(SHIPPED_AGENT)
+        pictures = {n: pictures_of(data, n, None) for n in places}
+        paths = {n: feature_path(data.folder / "features", agent.encoder_digest, n, pictures[n]) for n in places}
+        return agent.policy(load_bank(paths, agent.encoder_digest, places, pictures))
+
+    return {**POLICIES, "shipped": shipped}
+
+
+def write_secret(path: Path, text: str) -> None:
+    """Write a file that only its owner can read."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(handle, "w", encoding="utf-8") as f:
+        f.write(text + "\n")

@@ -1,0 +1,233 @@
+"""One episode that people take part in: an environment, whose turn it is, and what was said."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from embodied.action_spaces import PanoramicMoves
+from embodied.datasets.store import Dataset
+from embodied.envs.base import ActionError, HelpEnv
+from embodied.envs.hanna import HannaEnv
+from embodied.envs.vnla import VnlaEnv
+from embodied.interface import (
+    Action,
+    Agent,
+    Ask,
+    Episode,
+    Move,
+    Observation,
+    Place,
+    Reply,
+    Situation,
+    Step,
+    Stop,
+    Task,
+    act,
+)
+from embodied.policies.baselines import Forward10, RandomWalk, Shortest
+from embodied.records import from_plain, parse, to_json
+from embodied.seeds import stream
+from embodied.serve.store import Event
+from embodied.serve.study import LONGEST_TEXT, PERSON, Part
+from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv, loaded
+from embodied.teachers.vnla import VnlaTeacher
+
+AgentMaker = Callable[[Mapping[str, Place]], Agent]
+POLICIES: Mapping[str, AgentMaker] = {
+    "shortest": lambda places: Shortest(),
+    "random": lambda places: RandomWalk(),
+    "forward10": lambda places: Forward10(),
+}
+OWN_RULES = {"hanna": HannaEnv, "vnla": VnlaEnv}
+"""Kinds of task with a rule of play that their learned agents know."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What all games of a part share: the places, the tasks, and who plays where no person does."""
+
+    part: Part
+    places: Mapping[str, Place]
+    tasks: Mapping[str, Task]
+    practice: Task
+    """Played before the first that counts; none of `tasks` where there are more."""
+    make_env: Callable[[], tuple[HelpEnv, Relay]]
+    agent: Agent | None
+    assistant: Any
+
+
+def set_table(part: Part, data: Dataset, agents: Mapping[str, AgentMaker] = POLICIES) -> Table:
+    """Everything that a part that is played needs.
+
+    Args:
+      agents: policies by name.
+
+    Raises:
+      ValueError: an unknown agent or assistant, or tasks of HARI, which is not played in free words.
+    """
+    if data.kind == "hari":
+        raise ValueError(f"{data.folder} is a data set of HARI, whose help is not put into words; take another kind")
+    split = data.split(part.split)
+    tasks = [t if part.budget is None else dataclasses.replace(t, budget=part.budget) for t in split.tasks]
+    if not tasks:
+        raise ValueError(f"part {part.name!r}: the split {part.split!r} has no tasks")
+    agent: Agent | None = None
+    if part.agent != PERSON:
+        agent = agents[part.agent](split.worlds) if part.agent in agents else loaded(part.agent)
+    moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
+    own = OWN_RULES.get(data.kind)
+    assistant: Any = None
+    if part.assistant == "simulated":
+        assistant = split.make_env().assistant or PathSpeaker()
+    elif part.assistant not in (PERSON, "none"):
+        assistant = loaded(part.assistant)
+    by_own_rule = own is not None and (part.assistant == "simulated" or part.agent not in (PERSON, *POLICIES))
+
+    def make_env() -> tuple[HelpEnv, Relay]:
+        relay = Relay() if assistant is None else Overheard(assistant)
+        if by_own_rule and own is not None:
+            return own(split.worlds, relay, VnlaTeacher().moves if own is VnlaEnv else moves), relay
+        return TalkEnv(split.worlds, None if part.assistant == "none" else relay, moves, prices), relay
+
+    known = {t.id: t for t in tasks[: part.tasks]}
+    spare = next((t for t in tasks[part.tasks :]), tasks[-1])
+    return Table(part, split.worlds, known, spare, make_env, agent, assistant)
+
+
+@dataclass(eq=False)
+class Game:
+    """One episode. Its state follows from the events that were applied."""
+
+    id: str
+    table: Table
+    people: Mapping[str, str]
+    """Role to person."""
+    practice: bool
+    begun: float
+    """Seconds since 1970."""
+    task: Task
+    seed: int
+    said: list[dict[str, Any]] = field(default_factory=list)
+    """What was said: who ('agent', 'assistant'), text, picture (node or None)."""
+    question: str | None = None
+    """What the agent asked and nobody has answered yet."""
+    broken: str | None = None
+    """Why it ended without an episode."""
+    turn: int = 0
+    """Events so far: what a browser saw when somebody acted."""
+
+    def __post_init__(self) -> None:
+        if self.practice:
+            self.relay = Relay()
+            self.env: HelpEnv = TalkEnv(self.table.places, self.relay, PanoramicMoves())
+            self.agent: Agent | None = None if "agent" in self.people else Follower()
+            self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
+        else:
+            self.env, self.relay = self.table.make_env()
+            self.agent, self.assistant = self.table.agent, self.table.assistant
+        self.observation: Observation | None = self.env.reset(self.task, seed=self.seed)
+        self.last_change = self.begun
+        self._steps: list[Step] = []
+        self._asked_at = 0.0
+        self._seen: list[tuple[Observation, Situation]] = [(self.observation, self.env.situation)]
+        self._memory: Any = None
+        self._thought = 0
+        self._rng = stream(self.seed, "policy", self.task.id)
+
+    @property
+    def over(self) -> bool:
+        return self.observation is None or self.broken is not None
+
+    @property
+    def mover(self) -> str | None:
+        """Whose turn it is: 'agent', 'assistant', or nobody's."""
+        return None if self.over else "assistant" if self.question is not None else "agent"
+
+    @property
+    def machine_moves(self) -> bool:
+        return self.mover is not None and self.mover not in self.people
+
+    @property
+    def episode(self) -> Episode:
+        """The finished episode, with the seconds of its steps."""
+        names = [
+            self.people.get("agent", self.table.part.agent),
+            self.people.get("assistant", self.table.part.assistant),
+        ]
+        return dataclasses.replace(self.env.episode(" with ".join(names)), steps=tuple(self._steps))
+
+    @property
+    def situation(self) -> Situation:
+        return self.env.situation
+
+    def apply(self, event: Event) -> None:
+        """Take in one event.
+
+        Raises:
+          ActionError: not possible now; nothing has changed.
+        """
+        if self.over:
+            raise ActionError("the episode is over")
+        if event.kind == "broken":
+            self.broken = str(event.body["why"])
+        elif event.kind == "asked":
+            self._ask(str(event.body["question"]), event.time)
+        elif event.kind == "answered":
+            if self.question is None:
+                raise ActionError("nothing was asked")
+            reply = from_plain(Reply, event.body["reply"])
+            self.relay.reply = reply
+            question, self.question = self.question, None
+            self._step(Ask(question=question), self._asked_at)
+            picture = None if reply.image is None else reply.image.node
+            seconds = event.time - self._asked_at
+            self.said.append({"who": "assistant", "text": reply.text or "", "picture": picture, "seconds": seconds})
+        else:
+            if self.question is not None:
+                raise ActionError("the assistant has not answered yet")
+            action: Action = Move(int(event.body["candidate"])) if event.kind == "moved" else Stop()
+            self._step(action, event.time)
+        self.turn += 1
+        self.last_change = event.time
+
+    def think(self) -> tuple[str, dict[str, Any]]:
+        """What the machine does whose turn it is: the kind and the body of its event. May take its time."""
+        if self.question is not None:
+            return "answered", {"reply": self._answer(self.question)}
+        assert self.agent is not None, "a machine acts"
+        action: Action | None = None
+        for seen, situation in self._seen[self._thought :]:
+            (action,), self._memory = act(self.agent, [seen], [situation], self._memory, rngs=[self._rng])
+        self._thought = len(self._seen)
+        if isinstance(action, Move):
+            return "moved", {"candidate": action.candidate}
+        if isinstance(action, Ask):
+            return "asked", {"question": action.question or "Can you help me?"}
+        return "stopped", {}
+
+    def _answer(self, question: str) -> Any:
+        rng = stream(self.seed, "assistant", self.task.id, self.env.time)
+        (intention, *_) = self.assistant.intentions(self.env.situation)
+        if hasattr(self.assistant, "answer_text"):
+            reply = self.assistant.answer_text(self.env.situation, question, rng=rng)
+        else:
+            reply = self.assistant.answer(self.env.situation, intention, rng=rng)
+        return parse(to_json(reply))
+
+    def _ask(self, question: str, time: float) -> None:
+        now = self.observation
+        if self.question is not None or now is None or not now.can_ask:
+            raise ActionError("nothing can be asked now")
+        if not 0 < len(question) <= LONGEST_TEXT:
+            raise ActionError(f"a question has 1 to {LONGEST_TEXT} characters")
+        self.question, self._asked_at = question, time
+        self.said.append({"who": "agent", "text": question, "picture": None})
+
+    def _step(self, action: Action, time: float) -> None:
+        self.observation = self.env.step(action)
+        self._steps.append(dataclasses.replace(self.env.last_step, seconds=round(time - self.begun, 3)))
+        if self.observation is not None:
+            self._seen.append((self.observation, self.env.situation))

@@ -1,0 +1,117 @@
+"""Opening a study: its data, panoramas and log; and serving it."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from embodied.datasets.store import Dataset
+from embodied.interface import Episode
+from embodied.records import load_lines, to_json
+from embodied.render.panorama_file import PanoramaFile
+from embodied.serve.app import Server, key_of
+from embodied.serve.game import POLICIES, AgentMaker, set_table
+from embodied.serve.pictures import Pictures
+from embodied.serve.results import Writer
+from embodied.serve.sessions import Sessions
+from embodied.serve.store import Store
+from embodied.serve.study import Study, StudyError, load_study
+
+PanoramaDrawer = Callable[[Dataset, str], Path]
+"""Gives the file with a house's panoramas; draws it where it is not there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A study that can be served."""
+
+    study: Study
+    folder: Path
+    server: Server
+
+    def links(self, address: str, invitations: int = 0) -> dict[str, list[str]]:
+        """The links to give away: for everybody, single-use ones, and the results.
+
+        Args:
+          address: of the page, 'https://study.example.org'.
+        """
+        words = self.invite(invitations)
+        return {
+            "join": [] if invitations else [f"{address}/#join={self.server.token('join')}"],
+            "invitations": [f"{address}/#join={w}" for w in words],
+            "results": [f"{address}/#results={self.server.token('results')}"],
+        }
+
+    def invite(self, many: int) -> list[str]:
+        """The words of so many single-use links; asked again, the same ones."""
+        words = [self.server.token("invitation", str(i)) for i in range(many)]
+        self.server.invitations |= {key_of(w) for w in words}
+        return words
+
+
+def open_study(
+    path: Path,
+    folder: Path,
+    draw: PanoramaDrawer,
+    agents: Mapping[str, AgentMaker] = POLICIES,
+    origins: Iterable[str] = (),
+) -> Opened:
+    """Open a study and read what people did before.
+
+    Args:
+      folder: where the log and the results are kept.
+      draw: see PanoramaDrawer.
+      agents: policies by name.
+
+    Raises:
+      StudyError: not a study, or its log is another's.
+    """
+    path = Path(path)
+    study, data_path = load_study(path), path.parent
+    data = Dataset(data_path / study.data)
+    folder.mkdir(parents=True, exist_ok=True)
+    tables = {p.name: set_table(p, data, agents) for p in study.parts if p.kind == "play"}
+    viewed = {p.name: tuple(load_lines(data_path / p.episodes, Episode)) for p in study.parts if p.episodes}
+    worlds = {w for t in tables.values() for w in t.places} | {e.task.world for v in viewed.values() for e in v}
+    for world in sorted(worlds):
+        data.place(world)  # refuses houses that the data set has not
+    files = {w: PanoramaFile(draw(data, w)) for w in sorted(worlds)}
+    store = Store(folder / "people.db")
+    secret = store.about("secret", secrets.token_hex(32))
+    digest = hashlib.sha256((to_json(study) + data.digest).encode()).hexdigest()
+    if store.about("study", digest) != digest:
+        raise StudyError(
+            f"{folder} holds what people did in another study, or in this one before {path.name} or its data set were "
+            "changed; give another --out"
+        )
+    sessions = Sessions(study, tables, viewed)
+    for event in store.events():
+        sessions.apply(event)
+    writer = Writer(folder, sessions)
+    sessions.finished, sessions.judged = writer.game, writer.judged
+    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, origins))
+
+
+def serve(opened: Opened, host: str, port: int) -> None:
+    """Serve until interrupted."""
+    import uvicorn
+
+    from embodied.serve.app import LONGEST_MESSAGE, app_of
+
+    uvicorn.run(
+        app_of(opened.server),
+        host=host,
+        port=port,
+        log_level="warning",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=4 * LONGEST_MESSAGE,
+        ws_ping_interval=15,
+        ws_ping_timeout=20,
+        limit_concurrency=2500,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )

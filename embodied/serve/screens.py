@@ -1,0 +1,197 @@
+"""What a browser is told: everything on somebody's screen as one JSON object, so that a reload loses nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
+from embodied.serve.game import Game
+from embodied.serve.pictures import Pictures
+from embodied.serve.sessions import STARS, Person, Sessions
+from embodied.serve.study import Part
+from embodied.serve.talk import way_to_goal
+
+Screen = dict[str, Any]
+
+
+def screen_of(sessions: Sessions, person: Person, pictures: Pictures, code: str) -> Screen:
+    """Everything that `person` sees now."""
+    study = sessions.study
+    base: Screen = {"title": study.title, "contact": study.contact, "progress": progress(sessions, person)}
+    if person.ended:
+        done = person.ended == "done" or (person.ended == "left" and sum(person.done.values()) > 0)
+        return {**base, "screen": "done", "why": person.ended, "thanks": study.thanks, "code": code if done else None}
+    if not person.consented:
+        return {**base, "screen": "consent", "text": study.consent}
+    if person.game is not None:
+        game = sessions.games[person.game]
+        role = next(r for r, p in game.people.items() if p == person.id)
+        there = [sessions.people[p].connected > 0 for r, p in game.people.items() if r != role]
+        common = game_of(game, role, pictures) | {"partnerThere": all(there)}
+        return {**base, **common, **(agent_of if role == "agent" else assistant_of)(game, pictures)}
+    if person.viewing is not None:
+        return {**base, **judge_of(sessions, person, pictures)}
+    if person.waiting is not None:
+        return {**base, "screen": "wait"}
+    return {**base, "screen": "ready", "last": person.last, **coming(sessions, person)}
+
+
+def progress(sessions: Sessions, person: Person) -> Screen:
+    """How much of the study is done."""
+    total = 0
+    for part in sessions.study.parts:
+        units = len(sessions.tables[part.name].tasks) if part.kind == "play" else len(sessions.episodes(part))
+        left = 0 if part.name in person.without else min(part.per_person, units)
+        total += max(left, person.done[part.name])
+    return {"done": sum(person.done.values()), "total": total}
+
+
+def coming(sessions: Sessions, person: Person) -> Screen:
+    """What the next part asks, to be read before it begins."""
+    for part in sessions.study.parts:
+        if person.done[part.name] < part.per_person and part.name not in person.without:
+            role = person.roles.get(part.name) or (part.roles[0] if len(part.roles) == 1 else None)
+            practise = sessions.study.practice and part.kind == "play" and role not in person.practised
+            return {"advice": part.advice, "role": role, "practise": practise}
+    return {"advice": "", "role": None, "practise": False}
+
+
+def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
+    """What both roles see."""
+    world = game.task.world
+    shown = lambda node: None if node is None else pictures.name(world, node)
+    said = [{"who": s["who"], "text": s["text"], "pano": shown(s["picture"])} for s in game.said]
+    return {
+        "screen": role,
+        "game": game.id,
+        "turn": game.turn,
+        "practice": game.practice,
+        "advice": game.table.part.advice,
+        "request": game.task.request,
+        "said": said,
+        "question": game.question,
+        "yours": game.mover == role,
+        "pano": pictures.name(world, game.situation.pose.node),
+        "yaw": game.situation.pose.yaw,
+        "pitch": game.situation.pose.pitch,
+    }
+
+
+def _picture_of(sight: Sight, pictures: Pictures) -> str:
+    """The name under which the browser gets what a sight shows."""
+    at = viewpoint(sight)
+    return pictures.name(at.world, at.node)
+
+
+def agent_of(game: Game, pictures: Pictures) -> Screen:
+    """What the agent sees, and nothing that an agent may not know."""
+    part, seen = game.table.part, game.observation
+    assert seen is not None
+    target = None if seen.target is None else _picture_of(seen.target, pictures)
+    return {
+        "moves": moves_of(seen, game.situation, pictures),
+        "words": list(seen.candidates.words),
+        "instruction": seen.instruction,
+        "subtask": seen.mode is Mode.SUB,
+        "target": target,
+        "canAsk": bool(seen.can_ask) and game.question is None,
+        "questions": [{"text": q.text, "price": q.price} for q in part.questions],
+        "free": part.free_question or game.practice,
+        "left": seen.requests_left,
+        "time": seen.time,
+        "horizon": game.task.horizon,
+    }
+
+
+def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> list[Screen]:
+    """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
+    c, at = seen.candidates, situation.world.graph.positions
+    return [
+        {
+            "candidate": i,
+            "yaw": round(float(situation.pose.yaw + c.bearing[i]), 4),
+            "pitch": round(float(c.slope[i]), 4),
+            "distance": round(float(np.linalg.norm(at[node] - at[situation.pose.node])), 2),
+            "pano": pictures.name(situation.task.world, node),
+        }
+        for i, node in enumerate(situation.candidate_nodes)
+        if c.allowed[i]
+    ]
+
+
+def assistant_of(game: Game, pictures: Pictures) -> Screen:
+    """What the assistant sees."""
+    part, s = game.table.part, game.situation
+    show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
+    return {
+        "house": s.task.world,
+        "node": s.pose.node,
+        "trail": list(s.trail),
+        "goals": list(s.task.goal_nodes) if show_goal else [],
+        "way": list(way_to_goal(s, part.way)) if show_way else [],
+        "sendPictures": part.send_pictures,
+    }
+
+
+def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
+    """An episode to be watched, with what is asked about it."""
+    assert person.viewing is not None
+    part, episode = sessions.part(person.viewing[0]), sessions.viewed_episode(person)
+    return {
+        "screen": "judge",
+        "kind": part.kind,
+        "advice": part.advice,
+        "ask": part.ask or DEFAULT_QUESTIONS[part.kind],
+        "stars": STARS if part.kind == "rate" else 0,
+        "unit": f"{part.name}/{person.viewing[1]}",
+        "request": episode.task.request if part.kind == "rate" else None,
+        "frames": frames(episode.task.world, episode.task.start, episode.steps, part, pictures),
+    }
+
+
+DEFAULT_QUESTIONS = {
+    "rate": "How well did the agent do what it was asked?",
+    "describe": "What should one say to somebody who is to walk exactly this way?",
+}
+
+
+def frames(world: str, start: Pose, steps: tuple[Step, ...], part: Part, pictures: Pictures) -> list[Screen]:
+    """The pictures of an episode, one per step and one of where it ended."""
+    found: list[Screen] = []
+    for step in steps:
+        text = ""
+        if part.kind == "rate" and isinstance(step.action, Ask):
+            asked = step.action.question or "Can you help me?"
+            text = f"Question: {asked}" + (f"\nAnswer: {step.reply.text}" if step.reply and step.reply.text else "")
+        if isinstance(step.action, Move) or text:
+            pose = step.next_pose if isinstance(step.action, Move) else step.pose
+            found.append({"pano": pictures.name(world, step.pose.node), "yaw": pose.yaw, "pitch": 0, "text": text})
+    last = steps[-1].next_pose if steps else start
+    return [*found, {"pano": pictures.name(world, last.node), "yaw": last.yaw, "pitch": 0, "text": "The end."}]
+
+
+def plan_of(place: Place, pictures: Pictures) -> Screen:
+    """A house as a plan: rooms and viewpoints, metres."""
+    house, graph = place.house, place.graph
+    floor = {r.id: r.storey for r in house.rooms}
+    inner = [o for o in house.openings if o.kind != "window"]
+    return {
+        "name": house.name,
+        "rooms": [
+            {"kind": r.kind.replace("_", " "), "outline": np.round(r.polygon, 2).tolist(), "floor": floor[r.id]}
+            for r in house.rooms
+        ],
+        "doors": [{"line": np.round([o.a, o.b], 2).tolist(), "floor": floor[o.rooms[0]]} for o in inner],
+        "nodes": np.round(graph.positions[:, :2], 2).tolist(),
+        "floors": [floor[r] for r in graph.room_of_node],
+        "edges": graph.edges.tolist(),
+        "panos": [pictures.name(house.name, n) for n in range(len(graph.positions))],
+    }
+
+
+def houses_of(sessions: Sessions) -> Mapping[str, Place]:
+    """All houses in which something is played."""
+    return {name: place for table in sessions.tables.values() for name, place in table.places.items()}

@@ -1,0 +1,138 @@
+"""A study: who does what with whom, how often, and what people are told. Read from a STUDY.toml."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from embodied.records import RecordError, from_plain
+
+KINDS = ("play", "rate", "describe")
+PERSON = "person"
+LONGEST_TEXT = 2000
+"""Characters that a person may send at once."""
+
+
+class StudyError(ValueError):
+    """A STUDY.toml that cannot be run."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question that the agent may choose."""
+
+    text: str
+    price: float = 0.0
+    """What it costs, in points of the study; written down as the cost of the step."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One kind of thing that people are asked to do."""
+
+    name: str
+    kind: str = "play"
+    """'play' an episode, 'rate' one with stars, or 'describe' in words what was done in it."""
+    split: str = "val_seen"
+    """Of the data set: whose tasks are played."""
+    tasks: int = 5
+    """The first so many tasks of the split."""
+    answers: int = 1
+    """Finished episodes, or judgements, that are wanted of each."""
+    per_person: int = 3
+    """Most that one person does of this part."""
+    agent: str = PERSON
+    """Who acts: 'person', a policy that the server knows ('shortest', 'random', 'hanna', ...) or 'module:Class'."""
+    assistant: str = PERSON
+    """Who answers: 'person', 'simulated', 'none' or 'module:Class'."""
+    questions: tuple[Question, ...] = ()
+    """Questions that a person may choose; with `free_question`, own words besides."""
+    free_question: bool = True
+    budget: int | None = None
+    """Most questions in an episode; None leaves it to the task."""
+    show_way: bool = True
+    """The assistant sees the shortest way on the plan."""
+    way: int = 0
+    """Only so many steps of it, which answers then speak of; 0 is all."""
+    show_goal: bool = True
+    """The assistant sees the goal on the plan."""
+    send_pictures: bool = True
+    """The assistant may show the view of a viewpoint, chosen on the plan."""
+    of: str = ""
+    """What is judged: the episodes of this part of the study; or, with `episodes`, those of a file."""
+    episodes: str = ""
+    """A file episodes*.jsonl that `embodied eval`, `judge` or a study wrote."""
+    ask: str = ""
+    """What raters and describers are asked."""
+    advice: str = ""
+    """Shown to everybody in this part, before it begins."""
+
+    def __post_init__(self) -> None:
+        numbers = {"tasks": self.tasks, "answers": self.answers, "per_person": self.per_person}
+        if low := [n for n, v in numbers.items() if v < 1]:
+            raise ValueError(f"{low[0]} should be at least 1")
+        if self.kind not in KINDS:
+            raise ValueError(f"kind should be one of {list(KINDS)}, got {self.kind!r}")
+        if self.kind == "play" and not self.roles:
+            raise ValueError("agent or assistant should be 'person'; nobody would take part")
+        if self.kind != "play" and bool(self.of) == bool(self.episodes):
+            raise ValueError("a part that judges needs either `of`, a part of this study, or `episodes`, a file")
+        if PERSON in (self.agent,) and self.assistant != "none" and not (self.questions or self.free_question):
+            raise ValueError("nothing can be asked: give `questions`, or leave `free_question` true")
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles that people fill: 'agent', 'assistant', or 'rater', 'describer'."""
+        if self.kind != "play":
+            return ("rater" if self.kind == "rate" else "describer",)
+        return tuple(r for r, who in (("agent", self.agent), ("assistant", self.assistant)) if who == PERSON)
+
+
+@dataclass(frozen=True)
+class Study:
+    title: str
+    data: str
+    """The data set that tasks and houses come from; relative to the file."""
+    consent: str
+    """What people agree to, in paragraphs."""
+    parts: tuple[Part, ...]
+    contact: str = ""
+    thanks: str = "Thank you for taking part."
+    seed: int = 0
+    practice: bool = True
+    """Everybody plays one episode that does not count before their first in a role."""
+    people: int = 500
+    """Most people that may join."""
+    wait_seconds: float = 180.0
+    """How long somebody waits for a partner; afterwards they go on without, or are thanked."""
+    absent_seconds: float = 60.0
+    """How long a partner waits for somebody who lost the connection."""
+    idle_seconds: float = 180.0
+    """How long a partner waits for somebody who does nothing."""
+    pace: float = 1.0
+    """Seconds between the steps of a machine that a person watches."""
+    quality: str = "unlit"
+    """How panoramas are drawn that the data set does not hold."""
+    size: int = 512
+    """Their faces' side, pixels."""
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in self.parts]
+        if not names or len(set(names)) < len(names):
+            raise ValueError(f"parts should be at least one, each with a name of its own, got {names}")
+        for part in self.parts:
+            if part.of and part.of not in [p.name for p in self.parts if p.kind == "play"]:
+                raise ValueError(f"part {part.name!r} judges {part.of!r}, which is no part that is played")
+
+
+def load_study(path: Path) -> Study:
+    """The study of a STUDY.toml.
+
+    Raises:
+      StudyError: no TOML, or not a study; says where.
+    """
+    try:
+        return from_plain(Study, tomllib.loads(Path(path).read_text(encoding="utf-8")), "study")
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecordError) as e:
+        raise StudyError(f"{path}: {e}") from e

@@ -1,0 +1,158 @@
+"""Help in free words: the rule of play when people talk, who answers, and who plays with people who practise."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from embodied.action_spaces import Moves
+from embodied.envs.base import HelpEnv, required
+from embodied.interface import (
+    Action,
+    Actions,
+    Ask,
+    Intention,
+    Observations,
+    Place,
+    Reply,
+    Situation,
+    Situations,
+    Subtask,
+    Viewpoint,
+)
+from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import nearest
+from embodied.policies.baselines import Shortest
+
+SAID = "said "
+"""How the ids of sub-tasks begin that people put into words."""
+
+
+class Relay:
+    """The assistant of an environment whose answers come from elsewhere: they are known before the environment asks."""
+
+    def __init__(self) -> None:
+        self.reply: Reply | None = None
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        """Help, everywhere; the environment takes it away when the budget is spent."""
+        return (Intention.HELP,)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        """The reply that was handed over."""
+        reply, self.reply = self.reply, None
+        assert reply is not None, "whoever steps with a question has handed over the reply"
+        return reply
+
+
+class Overheard(Relay):
+    """A relay that asks where, and only where, another assistant would answer."""
+
+    def __init__(self, assistant: Any) -> None:
+        super().__init__()
+        self.assistant = assistant
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        return self.assistant.intentions(situation)
+
+
+class TalkEnv(HelpEnv):
+    """Help in free words: the answer is the instruction until the next one, and the agent goes on from where it stands.
+
+    A question costs no step; stopping ends the episode.
+    """
+
+    asking_takes_time = False
+
+    def __init__(
+        self,
+        worlds: Mapping[str, Place],
+        assistant: Relay | None = None,
+        moves: Moves | None = None,
+        prices: Mapping[str, float] | None = None,
+    ) -> None:
+        """`prices`: of questions, by their words; others are free."""
+        super().__init__(worlds, assistant, moves)
+        self._prices = prices or {}
+
+    def _replied(self, reply: Reply) -> None:
+        self.instruction = reply.text or self.instruction
+        self.target = reply.image
+        self.subtask = reply.subtask
+        self.time_on_task = 0
+
+    def _cost(self, action: Action) -> float:
+        return self._prices.get(action.question or "", 0.0) if isinstance(action, Ask) else 0.0
+
+
+def spoken_reply(situation: Situation, text: str, picture: int | None, number: int, way: int = 0) -> Reply:
+    """What a person's words mean to an environment: the way to what they show, or else the one they were shown.
+
+    Args:
+      picture: the node whose view they show, if any.
+      number: of the question in its episode.
+      way: as in `way_to_goal`.
+    """
+    graph, pose = situation.world.graph, situation.pose
+    path = way_to_goal(situation, way) if picture is None else graph.path(pose.node, picture)
+    goal = nearest(graph, path[-1], situation.task.goal_nodes)
+    subtask = Subtask(f"{SAID}{number}", path[-1], start=pose, goal=goal, path=path)
+    return Reply(text, None if picture is None else Viewpoint(situation.task.world, picture), subtask=subtask)
+
+
+def way_to_goal(situation: Situation, steps: int = 0) -> tuple[int, ...]:
+    """The shortest way to the nearest goal, only its first `steps` edges unless that is 0. Nodes."""
+    graph, node = situation.world.graph, situation.pose.node
+    way = graph.path(node, nearest(graph, node, situation.task.goal_nodes))
+    return way[: steps + 1] if steps else way
+
+
+class PathSpeaker:
+    """The simulated assistant where a data set has none: says the shortest way in plain words."""
+
+    def __init__(self) -> None:
+        self._language = PlainLanguage()
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        return (Intention.HELP,)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        world, pose = situation.world, situation.pose
+        path = world.graph.path(pose.node, nearest(world.graph, pose.node, situation.task.goal_nodes))
+        text = "You are there." if len(path) == 1 else self._language.route(world, path, pose.yaw, rng=rng)
+        reply = spoken_reply(situation, text, None, 0)
+        return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
+
+
+class Follower:
+    """Takes the shortest way and asks every few steps: somebody to practise answering with."""
+
+    def __init__(self, every: int = 3) -> None:
+        self._shortest, self._every = Shortest(), every
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        actions, _ = self._shortest.act_privileged(observations, situations, None, rngs=rngs)
+        asked = memory or [-self._every] * len(observations)
+        for i, o in enumerate(observations):
+            if o is not None and o.can_ask and o.time - asked[i] >= self._every:
+                asked[i], actions[i] = o.time, Ask(question="Where do I go from here?")
+        return actions, asked
+
+
+def loaded(name: str) -> Any:
+    """An object of the class that 'module:Class' names.
+
+    Raises:
+      ValueError: no such module or class.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError) as e:
+        raise ValueError(f"{name!r} should name a module and a class without arguments, 'module:Class' ({e})") from e

@@ -1,0 +1,63 @@
+"""What `import embodied` offers, and floor plans of people's own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+import shapely
+
+import embodied
+from embodied.generate.plan_file import house_of_plan, load_plan
+from embodied.house.house import HouseError
+
+ROOMS = [
+    {"kind": "hall", "polygon": [[0, 0], [1.8, 0], [1.8, 7], [0, 7]]},
+    {"kind": "living_room", "polygon": [[1.8, 0], [7, 0], [7, 4], [1.8, 4]]},
+    {"kind": "kitchen", "polygon": [[1.8, 4], [4.8, 4], [4.8, 7], [1.8, 7]]},
+    {"kind": "main_bedroom", "polygon": [[-3.6, 0], [0, 0], [0, 4], [-3.6, 4]]},
+    {"kind": "bathroom", "polygon": [[-3.6, 4], [0, 4], [0, 7], [-3.6, 7]]},
+]
+
+
+def written(tmp_path, rooms):
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps({"rooms": rooms}))
+    return path
+
+
+def test_import_embodied_loads_nothing_heavy_and_completes_names():
+    code = "import sys, embodied; print(sorted({'numpy', 'mujoco', 'torch'} & set(sys.modules)), dir(embodied)[:3])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.startswith("[]")
+    assert set(dir(embodied)) == set(embodied.__all__)
+    missing = [name for name in embodied.__all__ if name not in embodied.__doc__ and name != "__version__"]
+    assert missing == ["Renderer", "build_graph"], "help(embodied) names all but two"
+    assert embodied.__version__.split(".")[0].isdigit()
+
+
+def test_a_floor_plan_from_a_file_becomes_a_furnished_house_with_these_very_rooms(tmp_path):
+    house = house_of_plan(load_plan(written(tmp_path, ROOMS)), seed=0)
+    made = {room.kind: shapely.Polygon(room.polygon) for room in house.rooms}
+    assert all(made[room["kind"]].equals(shapely.Polygon(room["polygon"])) for room in ROOMS)
+    assert {p.room.rsplit("_", 1)[0] for p in house.placements} == set(made)
+    assert len(repr(house)) < 100
+
+
+@pytest.mark.parametrize(
+    ("rooms", "complaint"),
+    [
+        (ROOMS[1:], "needs a room of kind 'hall'"),
+        ([*ROOMS, {"kind": "study", "polygon": [[6, 3], [9, 3], [9, 6], [6, 6]]}], "overlap"),
+        ([*ROOMS, {"kind": "study", "polygon": [[9, 0], [12, 0], [12, 3], [9, 3]]}], "cannot be entered"),
+        ([{"kind": "hall", "polygon": [[0, 0], [3, 0], [0, 3]]}], "room 0 .hall. should be a rectangle"),
+        ([{"kind": "hall", "polygon": [[0, 0], [3.05, 0], [3.05, 3], [0, 3]]}], "grid of 0.1 m"),
+        ([{"kind": "hll", "polygon": []}], "has the kind 'hll'; use one of living_room"),
+        ([{"kind": "hall"}], "plan.json should hold"),
+    ],
+)
+def test_a_plan_that_cannot_be_built_is_refused_with_what_to_do(tmp_path, rooms, complaint):
+    with pytest.raises(HouseError, match=complaint):
+        load_plan(written(tmp_path, rooms))
