@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +26,9 @@ from embodied.serve.store import Event
 from embodied.serve.study import Part, Question, StudyError, load_study
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
+
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +105,11 @@ def test_a_mistake_in_a_study_is_told_with_its_place(tmp_path):
     ):
         with pytest.raises(StudyError, match=said):
             load_study(write_study(tmp_path, parts))
+
+
+def test_the_example_is_a_study_with_every_role():
+    study = load_study(ROOT / "examples" / "study.toml")
+    assert {r for p in study.parts for r in p.roles} == {"agent", "assistant", "rater", "describer"}
 
 
 def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(data, tmp_path):
