@@ -27,7 +27,6 @@ from embodied.serve.study import Part, Question, StudyError, load_study
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
 
-
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -225,7 +224,7 @@ def test_who_waits_too_long_is_thanked_and_gets_a_code(data):
     assert play.screen("ann")["screen"] == "wait"
     play.time += play.study.wait_seconds + 1
     play.ready("ann")
-    assert play.screen("ann")["screen"] == "done"
+    assert (play.screen("ann")["screen"], play.screen("ann")["code"]) == ("done", "CODE")
 
 
 def test_practice_comes_first_and_does_not_count(data):
@@ -278,8 +277,8 @@ class Helpful:
 
         return (Intention.HELP,)
 
-    def answer_text(self, situation, question, *, rng):
-        return spoken_reply(situation, f"you asked {question!r}", None, 1)
+    def answer(self, situation, question, *, rng):
+        return spoken_reply(situation, f"you asked {situation.question!r}", None, 1)
 
 
 def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
