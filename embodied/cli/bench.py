@@ -19,7 +19,20 @@ from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, no
 from embodied.cli.options import folder_to_write, whole
 from embodied.render.pictures import DRAWN, LOOKS
 
-PARTS = ("houses", "pictures", "steps", "views", "plays", "seen", "drive", "memory", "bakes", "light", "growth", "serve")
+PARTS = (
+    "houses",
+    "pictures",
+    "steps",
+    "views",
+    "plays",
+    "seen",
+    "drive",
+    "memory",
+    "bakes",
+    "light",
+    "growth",
+    "serve",
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
