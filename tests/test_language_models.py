@@ -153,14 +153,14 @@ def test_a_server_that_drips_is_given_up(answers):
         client_of(server, answers, timeout=0.2, tries=2).ask(ASKED, ONE)
 
 
-@pytest.mark.parametrize("form", ["schema", "tools", "text"])
-def test_three_ways_to_ask_for_json(form, answers):
+@pytest.mark.parametrize("form", ["schema", "object", "tools", "text"])
+def test_four_ways_to_ask_for_json(form, answers):
     call = said(None, tool_calls=[{"id": "1", "function": {"name": "answer", "arguments": '{"word": "yes"}'}}])
     text = said('Sure!\n```json\n{"word": "yes"}\n```')
-    with ChatServer(lambda r: {"schema": said('{"word": "yes"}'), "tools": call, "text": text}[form]) as server:
+    with ChatServer(lambda r: {"tools": call, "text": text}.get(form, said('{"word": "yes"}'))) as server:
         assert client_of(server, answers, form=form).ask(ASKED, ONE).value == {"word": "yes"}
         (request,) = server.requests
-        assert ("tools" in request, "response_format" in request) == (form == "tools", form == "schema")
+        assert ("tools" in request, "response_format" in request) == (form == "tools", form in ("schema", "object"))
 
 
 def test_another_file_is_not_taken_for_answers(tmp_path):

@@ -41,12 +41,12 @@ class Plan:
     """How large the study is."""
 
     train_houses: int = 8
-    train_tasks: int = 12
+    train_tasks: int = 8
     """Per house."""
     test_houses: int = 8
     test_tasks: int = 15
-    foresight: int = 40
-    """Tasks of the test that the oracle of asking plays."""
+    foresight: int = 24
+    """Tasks of the test that the oracles of asking play."""
 
 
 def after(steps: int, rule: AskRule) -> AskRule:
@@ -85,7 +85,7 @@ def lessons(places: dict[str, StoredPlace], look: Look, tasks: Sequence[Task]) -
         chosen.append(choice)
 
     make_env = ask_environment_maker(places, look)
-    play(make_env, Foresight(make_env, note), tasks, seed=0)
+    play(make_env, Foresight(make_env, note, doubts=True), tasks, seed=0)
     return np.stack(known), np.array(chosen, dtype=np.int64)
 
 
@@ -111,7 +111,9 @@ def run(out: Path, plan: Plan, cache: Path) -> None:
         for name, agent in baselines().items():
             rows.append(judged(name, [agent]))
         rows.append(judged("learned asker (3 seeds)", [LearnedAsker(n) for n in nets]))
-        rows.append(judged("oracle of asking", [Foresight(make_env)], tasks[:: max(1, len(tasks) // plan.foresight)]))
+        few = tasks[:: max(1, len(tasks) // plan.foresight)]
+        rows.append(judged("oracle of asking, in doubt", [Foresight(make_env, doubts=True)], few))
+        rows.append(judged("oracle of asking", [Foresight(make_env)], few))
         if not unseen:
             for name, agents in families().items():
                 curves[name] = [_point(judged(name, [a])) for a in agents]

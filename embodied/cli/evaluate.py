@@ -7,6 +7,7 @@ answer is kept in --answers, so that the same command again costs nothing and a 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -49,6 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=any_path, metavar="FILE", help="ask: seeds of the houses, one a line")
     parser.add_argument("--unseen-classes", action="store_true", help="ask: only classes that are kept from training")
     parser.add_argument("--tasks", type=whole(), default=20, metavar="N", help="at most so many tasks (default: 20)")
+    parser.add_argument("--steps", type=whole(), metavar="N", help="most steps of an episode (default: its task's)")
     parser.add_argument("--batch", type=whole(), default=8, metavar="N", help="episodes at a time (default: 8)")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: 0)")
     parser.add_argument(
@@ -91,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
 
     reword = assistant_maker(args.assistant, client, args.prompts)
     stage = _ask_stage(args) if args.kind == "ask" and args.seeds else _stage(args)
+    if args.steps:
+        tasks = [dataclasses.replace(t, horizon=min(t.horizon, args.steps)) for t in stage.tasks]
+        stage = dataclasses.replace(stage, tasks=tasks)
     agents = {name: _agent(args, name, stage, client) for name in args.agent}
 
     def make_env() -> HelpEnv:
@@ -111,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
             save_lines(args.out / episodes_file(stage.split, called), episodes)
     if args.out:
         tables.save(rows, args.out, "table")
-    text = tables.markdown(rows, [c for c in _columns(args.kind) if all(c in r.values for r in rows)])
+    text = tables.markdown(rows, [c for c in _columns(args.kind) if any(c in r.values for r in rows)])
     for name, heard in said.items():
         text += f"\n{name}: a listener arrives with {heard[0]} of {heard[1]} routes that were told"
     if clients:
