@@ -29,7 +29,7 @@ from embodied.interface import (
     Situations,
     Stop,
 )
-from embodied.policies.ask import Asker, Trail, confirm_on_sight, onward, reached
+from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
 
 EVERY = 4
 """Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
@@ -50,7 +50,7 @@ CHOICES: tuple[Choice, ...] = (
 )
 
 
-def thinks(o: Observation, trail: Trail) -> bool:
+def thinks(o: Observation, trail: Mind) -> bool:
     """Whether this is a moment to decide; between them, and on a route, one goes on."""
     return o.advised is None and (reached(o) is not None or o.time % EVERY == 0)
 
@@ -61,7 +61,7 @@ class Foresight:
     def __init__(
         self,
         make_env: Callable[[], HelpEnv],
-        note: Callable[[Observation, Trail, int], None] | None = None,
+        note: Callable[[Observation, Mind, int], None] | None = None,
         doubts: bool = False,
     ) -> None:
         """
@@ -81,7 +81,7 @@ class Foresight:
                 assert s is not None, "episodes of a batch begin together"
                 env = self._make_env()
                 env.reset(s.task)
-                memory.append((env, Trail()))
+                memory.append((env, Mind()))
         actions: Actions = [None] * len(observations)
         for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
             if o is not None and s is not None:
@@ -90,7 +90,7 @@ class Foresight:
                 env.step(actions[i])
         return actions, memory
 
-    def _one(self, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+    def _one(self, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
         choice = 0
         if thinks(o, trail):
             can = [k for k, c in enumerate(CHOICES) if isinstance(c, str) or c in o.can_ask]
@@ -101,7 +101,7 @@ class Foresight:
                 self._note(o, trail, choice)
         return carried_out(CHOICES[choice], env, o, trail, rng)
 
-    def _value(self, env: HelpEnv, o: Observation, trail: Trail, choice: Choice, rng: np.random.Generator) -> float:
+    def _value(self, env: HelpEnv, o: Observation, trail: Mind, choice: Choice, rng: np.random.Generator) -> float:
         """Weighted success in the end, after this choice, with the draws that will come."""
         ahead, mind, rng = _copy(env), copy.deepcopy(trail), copy.deepcopy(rng)
         seen = ahead.step(carried_out(choice, ahead, o, mind, rng))
@@ -133,7 +133,7 @@ def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
     return minds or [env]
 
 
-def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
     """The action of a choice; notes it in the trail."""
     if choice == "stop":
         return Stop()

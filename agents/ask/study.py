@@ -27,7 +27,7 @@ from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, as_json, markdown
 from embodied.generate import HouseConfig
 from embodied.interface import Action, Agent, Ask, Detection, Episode, Intention, Observation, Task
-from embodied.policies.ask import Asker, AskRule, Trail, baselines, between, first
+from embodied.policies.ask import Asker, AskRule, Mind, baselines, between, first
 from embodied.tasks.ask import Look
 
 AREA = (90.0, 140.0)
@@ -37,7 +37,7 @@ SEEDS = (0, 1, 2)
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudySize:
     """How large the study is."""
 
     train_houses: int = 8
@@ -52,7 +52,7 @@ class Plan:
 def after(steps: int, rule: AskRule) -> AskRule:
     """Asks for the way once so many steps have passed, and again when it has been walked; before, another rule."""
 
-    def late(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    def late(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         return Ask(Intention.ROUTE) if o.advised is None and o.time >= steps else rule(o, thing, trail)
 
     return late
@@ -80,7 +80,7 @@ def lessons(places: dict[str, StoredPlace], look: Look, tasks: Sequence[Task]) -
     known: list[np.ndarray] = []
     chosen: list[int] = []
 
-    def note(o: Observation, trail: Trail, choice: int) -> None:
+    def note(o: Observation, trail: Mind, choice: int) -> None:
         known.append(facts(o, trail))
         chosen.append(choice)
 
@@ -89,7 +89,7 @@ def lessons(places: dict[str, StoredPlace], look: Look, tasks: Sequence[Task]) -
     return np.stack(known), np.array(chosen, dtype=np.int64)
 
 
-def run(out: Path, plan: Plan, cache: Path) -> None:
+def run(out: Path, plan: StudySize, cache: Path) -> None:
     """Everything: lessons, training, judging, table and figure."""
     catalogue = load_catalogue(cache)
     look = look_of(catalogue)
@@ -160,7 +160,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--draw", action="store_true", help="only draw the figure again")
     parser.add_argument("--small", action="store_true", help="two houses of each kind, to see that it runs")
     args = parser.parse_args(words)
-    plan = Plan(2, 4, 2, 5, 4) if args.small else Plan()
+    plan = StudySize(2, 4, 2, 5, 4) if args.small else StudySize()
     draw(args.out) if args.draw else run(args.out, plan, default_cache())
 
 
