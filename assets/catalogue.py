@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -28,6 +29,7 @@ from assets.rows import DATA, CatalogueError, check_classes, read_json, read_mod
 
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
 
+log = logging.getLogger(__name__)
 Params = tuple[tuple[str, str | float], ...]
 """What a maker of built things is told, by name."""
 
@@ -59,6 +61,12 @@ class Catalogue:
     def classes(self) -> tuple[str, ...]:
         """Every object class that has an asset, sorted."""
         return tuple(sorted({a.object_class for a in self.assets.values()}))
+
+    @functools.cached_property
+    def own_classes(self) -> tuple[str, ...]:
+        """Object classes that a user's own models alone belong to, sorted."""
+        others = {a.object_class for key, a in self.assets.items() if key not in self._own}
+        return tuple(name for name in self.classes if name not in others)
 
     @functools.cached_property
     def _by_class(self) -> dict[str, tuple[Asset, ...]]:
@@ -147,7 +155,9 @@ class Catalogue:
         return materials.finish(material_key, self.cache)
 
 
-def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
+def load_catalogue(
+    cache: Path | None = None, packs: Sequence[Path] | Path | str = (), own: Sequence[Path] | Path | str = ()
+) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
 
     Args:
@@ -155,6 +165,7 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
+    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
@@ -165,4 +176,17 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    return Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    for name in catalogue.own_classes:
+        if why := _placed_nowhere(catalogue.of_class(name)):
+            log.warning("class %r is placed in no house: %s", name, why)
+    return catalogue
+
+
+def _placed_nowhere(group: Sequence[Asset]) -> str:
+    """Why no generated house can hold any of an own class's assets; '' where one can."""
+    if not any(weight > 0 for a in group for weight in a.rooms.values()):
+        return 'none of its models names a kind of room with a weight in "rooms"'
+    if all(a.support == "surface" and not a.on for a in group):
+        return 'none of its models names a class that it rests on in "on"'
+    return ""

@@ -20,6 +20,8 @@ from assets.cache import digest
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("assets", "embodied", "agents", "viz")
 """Packages whose modules are followed; all others are libraries."""
+INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "OpenGL", "gymnasium", "rerun", "psutil"})
+"""Libraries that decide no byte of any product: they show, spread or hand on what others make."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Closure:
     modules: Mapping[str, Path]
     """Module to its file, sorted."""
     libraries: tuple[str, ...]
-    """Top names of what is neither ours nor Python's, sorted."""
+    """Top names of what is neither ours nor Python's nor INDIFFERENT, sorted."""
 
 
 def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> Closure:
@@ -46,7 +48,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     """
     found: dict[str, Path] = {}
     libraries: set[str] = set()
-    known = {*OURS, *sys.stdlib_module_names, *without}
+    known = {*OURS, *sys.stdlib_module_names, *without, *INDIFFERENT}
     waiting = list(makers)
     for name in makers:
         if _file_of(name, root) is None:

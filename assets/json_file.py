@@ -47,7 +47,7 @@ def parse(text: str | bytes, what: str = "a record") -> object:
             text, object_pairs_hook=_object, parse_constant=_no_number, parse_float=_finite, parse_int=_whole
         )
         _refuse_deep(value)
-        if ("\\u" if isinstance(text, str) else b"\\u") in text:  # half a pair of surrogates is no text
+        if "\\u" in (text if isinstance(text, str) else text.decode()):  # half a pair of surrogates is no text
             json.dumps(value, ensure_ascii=False).encode()
         return value
     except (ValueError, RecursionError) as e:
@@ -160,6 +160,8 @@ def _hints(kind: type) -> dict[str, object]:
 
 def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
     origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if kind in (object, typing.Any):
+        return value
     if origin in (types.UnionType, typing.Union):
         return _build_choice(args, value, where)
     if origin is tuple:
@@ -211,7 +213,8 @@ def _build_choice(args: tuple[typing.Any, ...], value: object, where: str) -> ty
     some = [a for a in args if a is not type(None)]
     records: list[type] = [a for a in some if isinstance(a, type) and dataclasses.is_dataclass(a)]
     if len(records) < 2:
-        return _build(some[0], value, where)
+        fits = [a for a in some if type(value) is a or (a is float and type(value) is int)]
+        return _build((fits or some)[0], value, where)
     named = value.get("is") if isinstance(value, dict) else None
     for a in records:
         if a.__name__ == named:

@@ -13,6 +13,8 @@ import ctypes.util
 import functools
 import importlib.util
 import os
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,11 +72,15 @@ def choose() -> str:
     """The backend this process uses; also tells MuJoCo and PyOpenGL through their variables.
 
     Raises:
-      GLError: MUJOCO_GL names something that draws on a screen, or neither EGL nor OSMesa is there.
+      GLError: MUJOCO_GL names something that draws on a screen, MUJOCO_EGL_DEVICE_ID is no number, or neither EGL nor
+        OSMesa is there.
     """
     asked = os.environ.get("MUJOCO_GL", "").lower().strip()
     if asked and asked not in BACKENDS:
         raise GLError(f"MUJOCO_GL is {asked!r}; off-screen rendering needs one of {BACKENDS}, or unset it")
+    device = os.environ.get("MUJOCO_EGL_DEVICE_ID")
+    if device is not None and not device.strip().isdecimal():
+        raise GLError(f"MUJOCO_EGL_DEVICE_ID is {device!r}; it should be the number of a device, from 0, or unset it")
     backend = asked or _first_available()
     os.environ["MUJOCO_GL"] = backend
     os.environ["PYOPENGL_PLATFORM"] = backend
@@ -108,7 +114,10 @@ def _egl_works() -> bool:
     if name is None:
         return False
     _load_triton_first()
-    egl = ctypes.CDLL(name)
+    try:
+        egl = ctypes.CDLL(name)
+    except OSError:  # it is there, and broken
+        return False
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     query_address = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
     display_address = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
@@ -144,6 +153,9 @@ class _Owner:
     def __init__(self) -> None:
         self.context = None
         self.pid = 0
+        self.turn = threading.RLock()
+        self.depth = 0
+        """How many `drawing` of the thread whose turn it is lie in one another."""
 
 
 @functools.cache
@@ -151,24 +163,58 @@ def _owner() -> _Owner:
     return _Owner()
 
 
+@contextlib.contextmanager
+def drawing() -> Iterator[None]:
+    """This process's context, created on first use, current in the calling thread until the end; also a decorator.
+    Threads take turns.
+
+    Raises:
+      GLError: as `make_current`.
+    """
+    owner = _owner()
+    _check_process(owner)
+    with owner.turn:
+        owner.depth += 1
+        try:
+            make_current()
+            yield
+        finally:
+            owner.depth -= 1
+            if owner.depth == 0:
+                _let_go(owner)
+
+
 def make_current() -> None:
-    """Create this process's context on first use and make it current in the calling thread.
+    """Create this process's context on first use and make it current in the calling thread, which is within `drawing`.
 
     Raises:
       GLError: it cannot be created, or the parent of this forked process already had one (Mesa's
         worker threads do not survive a fork, and the first draw call would hang).
     """
     owner = _owner()
+    _check_process(owner)
+    if owner.context is None:
+        owner.context, owner.pid = _create(choose()), os.getpid()
+        atexit.register(_release_at_exit)
+    assert owner.context is not None
+    owner.context.make_current()
+
+
+def _check_process(owner: _Owner) -> None:
     if owner.context is not None and owner.pid != os.getpid():
         raise GLError(
             f"process {os.getpid()} was forked after its parent {owner.pid} had opened OpenGL, which does not "
             "survive a fork; start workers with multiprocessing.get_context('spawn'), or fork before rendering"
         )
-    if owner.context is None:
-        owner.context, owner.pid = _create(choose()), os.getpid()
-        atexit.register(release)
-    assert owner.context is not None
-    owner.context.make_current()
+
+
+def _let_go(owner: _Owner) -> None:
+    """Leave the context to the next thread; OSMesa's may be current in several."""
+    if owner.context is not None and os.environ["MUJOCO_GL"] == "egl":
+        from mujoco import egl
+
+        none = egl.EGL.EGL_NO_SURFACE
+        egl.EGL.eglMakeCurrent(egl.EGL_DISPLAY, none, none, egl.EGL.EGL_NO_CONTEXT)
 
 
 def _create(backend: str) -> Any:
@@ -178,17 +224,22 @@ def _create(backend: str) -> Any:
             from mujoco.egl import GLContext
         else:
             from mujoco.osmesa import GLContext
+        from OpenGL.error import Error
+    except (ImportError, AttributeError, OSError) as e:
+        raise GLError(f"cannot load OpenGL through {backend} ({e}). {REMEDY}") from e
+    try:
         return GLContext(64, 64)
-    except (ImportError, RuntimeError, AttributeError, OSError) as e:
-        raise GLError(f"cannot open an OpenGL context through {backend} ({e}). {REMEDY}") from e
+    except (ImportError, RuntimeError, AttributeError, OSError, Error) as e:
+        remedy = "Unset MUJOCO_EGL_DEVICE_ID" if "MUJOCO_EGL_DEVICE_ID" in str(e) else REMEDY
+        raise GLError(f"cannot open an OpenGL context through {backend} ({e}). {remedy}") from e
 
 
 def info() -> GLInfo:
     """Who draws here; opens the context if need be."""
-    make_current()
-    from OpenGL import GL
+    with drawing():
+        from OpenGL import GL
 
-    vendor, device, version = (GL.glGetString(k).decode() for k in (GL.GL_VENDOR, GL.GL_RENDERER, GL.GL_VERSION))
+        vendor, device, version = (GL.glGetString(k).decode() for k in (GL.GL_VENDOR, GL.GL_RENDERER, GL.GL_VERSION))
     software = any(word in device.lower() for word in SOFTWARE)
     return GLInfo(os.environ["MUJOCO_GL"], vendor, device, version, software)
 
@@ -199,3 +250,11 @@ def release() -> None:
     if owner.context is not None and owner.pid == os.getpid():
         owner.context.free()
     owner.context = None
+
+
+def _release_at_exit() -> None:
+    from OpenGL.error import Error
+
+    # Whoever imported dm_control after the first picture has had the display closed already, and the context with it.
+    with contextlib.suppress(Error):
+        release()

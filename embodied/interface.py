@@ -62,19 +62,44 @@ class Pose:
         return TURNS * (self.tilt + 1) + self.turn
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Sight:
-    """What can be seen from one place, as an opaque key.
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """The place of a picture. Privileged: for assistants, renderers, recordings and sources of features."""
 
-    A policy hands it to a `FeatureSource` (or to a renderer) and must not look inside: the place
-    itself is privileged. Assistants send a Sight as the target image.
+    world: str
+    node: int
+
+
+class Sight:
+    """What is seen at one step, or a picture that is shown, as a token that tells nothing by itself.
+
+    A policy hands it to a `FeatureSource` and gets numbers. Every observation has new ones, which can neither be
+    compared nor hashed, so a place is known again only by what it looks like.
     """
 
-    _world: str
-    _node: int
+    __slots__ = ("__picture", "__viewpoint")
+
+    def __init__(self, world: str, node: int, *, picture: bool = False) -> None:
+        """`picture`: it was taken at another time, by whoever shows it (`is_picture`)."""
+        self.__viewpoint, self.__picture = Viewpoint(world, node), picture
 
     def __repr__(self) -> str:
         return "Sight(...)"
+
+    def __eq__(self, other: object) -> bool:
+        raise TypeError("sights cannot be compared; compare what a FeatureSource gives for them")
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def viewpoint(sight: Sight) -> Viewpoint:
+    """Where a sight is from: for renderers, recordings and sources of features, never for a policy."""
+    return sight._Sight__viewpoint  # type: ignore[attr-defined]
+
+
+def is_picture(sight: Sight) -> bool:
+    """Whether it is a picture that was taken at another time, not what the agent sees now; as `viewpoint`."""
+    return sight._Sight__picture  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,6 +332,8 @@ class Thought:
     """What a language model was asked; None where there is none."""
     words: str = ""
     """What a language model gave as its reason."""
+    match: float | None = None
+    """HANNA: how well the picture that it was shown matches what it sees, up to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,7 +417,8 @@ class Reply:
     """What the assistant says: a text, an image, a description, or several of them."""
 
     text: str | None = None
-    image: Sight | None = None
+    image: Viewpoint | None = None
+    """Where the picture that it shows was taken; the agent gets a Sight of it."""
     description: Description | None = None
     intention: Intention = Intention.HELP
     """What was answered; an uncooperative assistant may answer another question."""
@@ -418,7 +446,7 @@ class Detection:
 class Observation:
     """Everything a policy may know at one step, and nothing else."""
 
-    sight: Sight
+    sight: Sight = field(compare=False)
     """The panorama around the agent, for a FeatureSource."""
     turn: int
     """The agent's own yaw in steps of 30 degrees, 0..11."""
@@ -426,7 +454,7 @@ class Observation:
     candidates: Candidates
     instruction: str
     """d+: the text being executed: the request, or what the assistant said."""
-    target: Sight | None
+    target: Sight | None = field(compare=False)
     """The image being looked for (HANNA), if any."""
     mode: Mode
     can_ask: tuple[Intention, ...]
@@ -445,6 +473,8 @@ class Observation:
     """Ask-v0: the best first."""
     advised: Move | Stop | None = None
     """Ask-v0: what the route that was told says to do next; None where none is being followed."""
+    moved: bool = False
+    """Whether the last step led to another place, as wheels know."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -512,6 +542,8 @@ class Episode:
     agent: str = ""
     budget: int | None = None
     """The whole number of requests that this episode was given; None without a budget."""
+    house: str = ""
+    """The start of the digest of the house it was played in: houses of other data sets have the same names."""
 
     @property
     def nodes(self) -> tuple[int, ...]:

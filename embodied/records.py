@@ -154,7 +154,7 @@ def _episode(e: interface.Episode) -> str | None:
 
 RULES |= {
     interface.Pose: lambda p: _angles(p.turn, p.tilt) or _nodes(p.node),
-    interface.Sight: lambda s: _nodes(s._node),
+    interface.Viewpoint: lambda v: _nodes(v.node),
     interface.FollowRoute: lambda g: _nodes(*g.path) if g.path else "path should hold at least one node",
     interface.Task: _task,
     interface.Route: _route,

@@ -3,8 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import operator
 
 import numpy as np
+
+
+def checked_seed(seed: object) -> int:
+    """`seed` as a plain integer; NumPy's integers are, too.
+
+    Raises:
+      TypeError: a text, a number with a point, None.
+    """
+    try:
+        return operator.index(seed)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"a seed should be an integer, got {seed!r:.60} ({type(seed).__name__})") from None
 
 
 def stream(seed: int, *names: str | int) -> np.random.Generator:
@@ -19,7 +32,10 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
 
     Returns:
       A fresh PCG64 generator.
+
+    Raises:
+      TypeError: a seed that is no whole number.
     """
-    text = "\x1f".join([f"{seed:d}", *(f"{type(n).__name__}:{n}" for n in names)])
+    text = "\x1f".join([f"{checked_seed(seed):d}", *(f"{type(n).__name__}:{n}" for n in names)])
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))

@@ -18,8 +18,9 @@ from assets.closure import code_digest
 from embodied import gl
 from embodied.house.house import House
 from embodied.house.validation import load_house
-from embodied.interface import Sight, Sighting
+from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
+from embodied.navigation.poses import FreePoses
 from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
@@ -59,6 +60,7 @@ class World:
           file: where the panoramas go, or lie, instead of the cache.
           may_differ: fields of `fingerprint` in which panoramas in `file` may differ from those that would be drawn
             here and now: a data set is read with other drivers ('renderer') and later versions ('code') than drew it.
+            With 'renderer' among them, stored ones are read without OpenGL.
         """
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.pictures = pictures
@@ -90,6 +92,19 @@ class World:
         return instance_classes(self.house)
 
     @functools.cached_property
+    def _poses(self) -> FreePoses:
+        return FreePoses(self.house, self.graph)
+
+    def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
+        """Whether the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        return self._poses.is_free(position)
+
+    def random_pose(self, *, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+        """(3,) of an eye, metres, and yaw, radians, drawn evenly over the floor where the agent can stand:
+        `world.renderer.view(*world.random_pose(rng=rng))` is a picture from there."""
+        return self._poses.draw(rng=rng)
+
+    @functools.cached_property
     def _origin(self) -> dict[str, object]:
         """What the world's geometry depends on."""
         return {
@@ -99,15 +114,22 @@ class World:
         }
 
     @functools.cached_property
-    def fingerprint(self) -> dict[str, object]:
-        """All that the panoramas depend on, and what draws them."""
+    def _made_of(self) -> dict[str, object]:
+        """All that the panoramas depend on but what draws them."""
         return (
             self._origin
             | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k not in ("look", "rays")}
             | ({"look": "gloss"} if self.pictures.shown_with == "gloss" else {})  # matte ones are older than the word
             | ({} if self.pictures.rays is None else {"rays": self.pictures.rays})
-            | {"light": self.pictures.lit_by, "renderer": str(gl.info()), "code": code_digest(*makers(self.pictures))}
+            | {"light": self.pictures.lit_by, "code": code_digest(*makers(self.pictures))}
         )
+
+    @functools.cached_property
+    def fingerprint(self) -> dict[str, object]:
+        """All that the panoramas depend on, and what draws them, or drew those that are stored where that may differ.
+        Opens OpenGL only where nothing is stored."""
+        stored = self._open_file() if "renderer" in self._may_differ and self._path is not None else None
+        return self._made_of | {"renderer": str(gl.info()) if stored is None else stored.meta.get("renderer")}
 
     @functools.cached_property
     def path(self) -> Path:
@@ -211,24 +233,15 @@ class World:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
         return self._sightings.at(node, self.house)
 
-    def node_of(self, sight: Sight) -> int:
-        """The node behind a sight; for renderers and recordings, never for a policy.
-
-        Raises:
-          ValueError: the sight is of another world.
-        """
-        if sight._world != self.name:
-            raise ValueError(f"this sight is of world {sight._world!r}, not of {self.name!r}; pass it to its own world")
-        return sight._node
-
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
         file = self._open_file()
         if file is not None and (damaged := file.damaged()):
             log.warning("%s: %s of its pictures are damaged; drawing again", self.path, len(damaged))
             file.close()
-            file = self._file = None
+            file, self._file, self._refused = None, None, True
         if file is None:
+            self.__dict__.pop("fingerprint", None)  # what was stored may have been drawn by others
             write_panoramas(self.path, self._draw_all(progress), self.fingerprint)
             self._refused = False
             self._recent.cache_clear()
@@ -268,7 +281,8 @@ class World:
             except PanoramaFileError as e:
                 log.warning("%s", e)
                 return None
-            if others := differing(file.meta, self.fingerprint, self._may_differ):
+            wanted = self._made_of if "renderer" in self._may_differ else self.fingerprint
+            if others := differing(file.meta, wanted, self._may_differ):
                 log.warning("%s holds other pictures (%s); drawing again", self.path, others)
                 file.close()
                 return None
@@ -329,7 +343,8 @@ def open_folder(
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
     graph, pictures = build_graph(house), dataclasses.replace(pictures, **changes)
-    return World(house, catalogue, graph, cache, pictures, file=folder / "panoramas.pano")
+    file = folder / "panoramas.pano"
+    return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))
 
 
 def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_differ: Collection[str] = ()) -> str:

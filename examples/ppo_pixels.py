@@ -7,9 +7,10 @@ Flats are generated from --seed and lit, once. --task point: the goal is how far
 seen from where the agent stands (what a compass and a positioning system tell; it knows no map and no other place),
 and stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of
 such an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings
-the agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in one
-it never saw, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png.
---blind shows black pictures instead: what the goal alone gives.
+the agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in
+--unseen others, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png,
+the numbers in OUT/result.json. --blind shows black pictures instead: what the goal alone gives. --eyes encoder shows
+what the encoder that ships, which does not learn, makes of three views around straight ahead.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import csv
 import dataclasses
+import json
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -34,6 +36,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from agents.vision.live import shipped_features
 from assets.cache import default_cache
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
@@ -42,7 +45,7 @@ from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig
 from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.eyes import FeatureEyes, PanoramaStore, PictureEyes, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import TURNS, FollowRoute, Pose, Task
 from embodied.language.plain import PlainLanguage
@@ -65,6 +68,8 @@ HOPS = (1, 3)
 FAR = 10.0
 """A goal so far away, or farther, looks the same, metres."""
 SIDE, ANGLE = 64, math.radians(90.0)
+AHEAD = (-1, 0, 1)
+"""Views that are seen through the encoder, in turns of 30 degrees from straight ahead."""
 STOPS = (0.25, 0.1, 0.05, 0.025)
 """How often the random walk may stop."""
 
@@ -80,13 +85,19 @@ class Arena:
 
 
 class Seeker(gymnasium.Wrapper):
-    """What PPO sees and does: colours, the goal as numbers, four actions."""
+    """What PPO sees and does: colours or features of them, the goal as numbers, four actions."""
 
     def __init__(self, env: HelpGymEnv, goals: Sequence[str], blind: bool) -> None:
         super().__init__(env)
         self._goals, self._blind = goals, blind
         goal = gymnasium.spaces.Box(-1.0, 1.0, (len(goals) or 3,), np.float32)
-        self.observation_space = gymnasium.spaces.Dict({"rgb": env.observation_space["rgb"], "goal": goal})
+        self._coloured = "rgb" in env.observation_space.spaces
+        if self._coloured:
+            seen = env.observation_space["rgb"]
+        else:
+            shape = (len(AHEAD) * env.observation_space["features"].shape[1],)
+            seen = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+        self.observation_space = gymnasium.spaces.Dict({"seen": seen, "goal": goal})
         self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
 
     def reset(self, **options: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -100,34 +111,43 @@ class Seeker(gymnasium.Wrapper):
         return self._seen(observation), float(reward), terminated, truncated, info
 
     def _seen(self, observation: dict[str, Any]) -> dict[str, np.ndarray]:
-        rgb = np.zeros_like(observation["rgb"]) if self._blind else observation["rgb"]
-        return {"rgb": rgb, "goal": self._numbered() if self._goals else self._direction()}
+        seen = observation["rgb"] if self._coloured else self._ahead(observation["features"])
+        seen = np.zeros_like(seen) if self._blind else seen
+        return {"seen": seen, "goal": self._numbered() if self._goals else self._direction()}
+
+    def _ahead(self, features: np.ndarray) -> np.ndarray:
+        """Features of the level views around straight ahead."""
+        turn = self.env._env.pose.turn
+        return features[[TURNS + (turn + k) % TURNS for k in AHEAD]].ravel()
 
     def _numbered(self) -> np.ndarray:
         goal = np.zeros(len(self._goals), np.float32)
-        goal[self._goals.index(self.env._env.task.request)] = 1.0
+        goal[self._goals.index(self.env.task.request)] = 1.0
         return goal
 
     def _direction(self) -> np.ndarray:
         """(3,) how far, and sine and cosine of where from straight ahead, left positive."""
-        play = self.env._env
-        x, y, _ = play.world.graph.positions[play.task.goal_nodes[0]] - play.world.graph.positions[play.pose.node]
-        aside = float(wrap(math.atan2(y, x) - play.pose.yaw))
+        env, positions = self.env, self.env.world.graph.positions
+        x, y, _ = positions[env.task.goal_nodes[0]] - positions[env.pose.node]
+        aside = float(wrap(math.atan2(y, x) - env.pose.yaw))
         return np.array([min(math.hypot(x, y) / FAR, 1.0), math.sin(aside), math.cos(aside)], np.float32)
 
 
 class Sight(BaseFeaturesExtractor):
-    """Three small convolutions, and the goal beside what they find."""
+    """Three small convolutions of colours, or one layer over features, and the goal beside what they find."""
 
     def __init__(self, space: gymnasium.spaces.Dict, size: int = 128) -> None:
         super().__init__(space, size + space["goal"].shape[0])
         relu, flat = torch.nn.ReLU, torch.nn.Flatten
+        if len(space["seen"].shape) == 1:
+            self.eyes = torch.nn.Sequential(torch.nn.Linear(space["seen"].shape[0], size), relu())
+            return
         layers = [torch.nn.Conv2d(3, 16, 8, 4), relu(), torch.nn.Conv2d(16, 32, 4, 2), relu()]
         layers += [torch.nn.Conv2d(32, 32, 3, 1), relu(), flat(), torch.nn.Linear(32 * 4 * 4, size), relu()]
         self.eyes = torch.nn.Sequential(*layers)
 
     def forward(self, seen: dict[str, torch.Tensor]) -> torch.Tensor:
-        return torch.cat([self.eyes(seen["rgb"]), seen["goal"]], 1)
+        return torch.cat([self.eyes(seen["seen"]), seen["goal"]], 1)
 
 
 class Curve(BaseCallback):
@@ -203,9 +223,11 @@ def find_tasks(world: World, seed: int) -> list[Task]:
     return [dataclasses.replace(t, request=t.goal.object_class) for t in tasks]
 
 
-def maker(place: Arena, blind: bool) -> Callable[[], Seeker]:
+def maker(place: Arena, blind: bool, encoded: bool) -> Callable[[], Seeker]:
     """A maker of environments that share the flats and their decoded panoramas."""
-    eyes = PictureEyes(PanoramaStore(place.worlds), ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
+    store = PanoramaStore(place.worlds)
+    pixels = PictureEyes(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
+    eyes = FeatureEyes("features", shipped_features(store)) if encoded else pixels
     moves = MonocularMoves()
 
     def make() -> Seeker:
@@ -242,14 +264,14 @@ def walker(chance: float, rng: np.random.Generator) -> Callable[[dict[str, np.nd
     return lambda o: STOP if rng.random() < chance else int(rng.integers(STOP))
 
 
-def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> float:
-    """Says how the learner and the random walk fare, and returns the share of the latter."""
+def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> dict[str, float]:
+    """Says how the learner and the random walk fare, and returns their shares of success."""
     env, rng = make(), np.random.default_rng(args.seed)
     learned = judged(env, lambda o: int(learner.predict(o, deterministic=False)[0]), args.judge, 1000)
     random = max(judged(env, walker(chance, rng), args.judge, 1000) for chance in STOPS)
     n = args.judge
     print(f"{name}: succeeds in {interval(learned, n)} of {n} episodes, random walk {interval(random, n)}", flush=True)
-    return random
+    return {"learned": learned, "random walk": random, "episodes": n}
 
 
 def draw_curve(table: Path, random: float, picture: Path) -> None:
@@ -270,6 +292,8 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=40.0)
     parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many")
     parser.add_argument("--flats", type=int, default=3, help="how many flats it learns in")
+    parser.add_argument("--unseen", type=int, default=1, help="in how many other flats it is judged")
+    parser.add_argument("--eyes", default="pixels", choices=("pixels", "encoder"), help="colours, or frozen features")
     parser.add_argument("--goals", type=int, default=4, help="how many different things it looks for")
     parser.add_argument("--blind", action="store_true", help="black pictures, to compare with")
     parser.add_argument("--envs", type=int, default=16)
@@ -285,7 +309,7 @@ def main() -> None:
 
     home = arena(args, range(args.flats))
     print(f"{len(home.tasks)} tasks {', '.join(home.goals)}", flush=True)
-    make = maker(home, args.blind)
+    make = maker(home, args.blind, args.eyes == "encoder")
     learner = PPO(
         "MultiInputPolicy",
         DummyVecEnv([lambda: Monitor(make())] * args.envs),
@@ -301,11 +325,14 @@ def main() -> None:
     )
     learner.learn(args.steps, callback=Curve(args.out / "curve.csv", args.minutes))
     learner.save(args.out / "agent.zip")
-    random = report("flats it learned in", make, learner, args)
-    draw_curve(args.out / "curve.csv", random, args.out / "curve.png")
-    away = arena(args, [args.flats], home.goals)
+    result = {"flats it learned in": report("flats it learned in", make, learner, args)}
+    draw_curve(args.out / "curve.csv", result["flats it learned in"]["random walk"], args.out / "curve.png")
+    away = arena(args, range(args.flats, args.flats + args.unseen), home.goals)
     if away.tasks:
-        report("a flat it never saw", maker(away, args.blind), learner, args)
+        others = maker(away, args.blind, args.eyes == "encoder")
+        result["flats it never saw"] = report("flats it never saw", others, learner, args)
+    settings = {name: value for name, value in vars(args).items() if name != "out"}
+    (args.out / "result.json").write_text(json.dumps({"settings": settings, "steps": learner.num_timesteps, **result}))
 
 
 if __name__ == "__main__":

@@ -93,8 +93,8 @@ def edited(change) -> str:
         (lambda h: h["rooms"][0].update(id="../up"), "an id is made of"),
         (lambda h: h["rooms"][0].update(polygon=[[0, 0]]), "simple counter-clockwise polygon"),
         (lambda h: h["rooms"][0].update(accent_wall=9), "its walls are 0 to 3"),
-        (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "finite number"),
-        (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "finite number"),
+        (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "NaN is no JSON"),
+        (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "401 digits"),
         (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
         (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
         (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
@@ -186,7 +186,7 @@ def test_a_flipped_byte_in_a_panorama_file_is_found(tmp_path):
     write_panoramas(path, [faces, faces], {})
     with PanoramaFile(path) as file:
         assert not file.damaged()
-        offset = file.index["nodes"][1]["depth"][0]
+        offset = file.index.nodes[1]["depth"][0]
     data = bytearray(path.read_bytes())
     data[offset + 3] ^= 1
     path.write_bytes(data)

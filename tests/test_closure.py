@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import pytest
 import assets.closure
 from assets.closure import ROOT, closure, code_digest
 from assets.importing import importer
+from embodied.datasets.build import program
 from embodied.light import colours, settings, unwrap
 from embodied.render.pictures import PictureSettings
 from embodied.scene import collision
 from embodied.world import makers
 
+PROJECT = (ROOT / "pyproject.toml").read_text()
 TOP = "from __future__ import annotations"
 
 
@@ -158,4 +161,20 @@ def test_versions_of_libraries_are_in_the_key(monkeypatch):
     before = key(ROOT, *makers(PictureSettings()))
     monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mujoco" else "")
     assert key(ROOT, *makers(PictureSettings())) != before
+    code_digest.cache_clear()
+
+
+def test_an_optional_package_that_comes_or_goes_leaves_data_sets_as_they_are(monkeypatch):
+    """What the project needs decides; what is installed besides does not."""
+    needed = re.findall(r'^ +"([\w-]+)', re.search(r"\ndependencies = \[(.*?)\n\]", PROJECT, re.S)[1], re.M)
+    code_digest.cache_clear()
+    before, version = program(), assets.closure._version
+    names = {d.lower().replace("_", "-"): tops for tops, ds in assets.closure._distributions().items() for d in ds}
+    kept = {names.get(n.lower(), n) for n in needed}
+    monkeypatch.setattr(assets.closure, "_version", lambda n: version(n) if n in kept else "another")
+    code_digest.cache_clear()
+    assert program() == before
+    monkeypatch.setattr(assets.closure, "_version", lambda n: "another" if n == "shapely" else version(n))
+    code_digest.cache_clear()
+    assert program() != before
     code_digest.cache_clear()

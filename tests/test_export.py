@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
+import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from conftest import two_rooms
+from dm_control import mjcf as dm_mjcf
 from handmade import HandCatalogue, furnished
 
+from embodied.house.shapes import footprint
 from embodied.scene.export import export_glb, export_mjcf
 from embodied.scene.house_meshes import house_parts
 from embodied.scene.lit_pages import LitMesh, LitPages
@@ -29,10 +34,53 @@ def test_the_mjcf_folder_is_the_same_house_and_needs_nothing_else(house, tmp_pat
     original = compile_scene(house, HandCatalogue()).model
     assert again.ngeom == original.ngeom and again.nmesh == original.nmesh and again.nmat == original.nmat
     for g in range(again.ngeom):
-        assert again.geom(g).name == original.geom(g).name
+        assert again.geom(g).name == original.geom(g).name.replace("/", ".")
     assert np.allclose(again.geom_pos, original.geom_pos, atol=1e-5)
     assert np.allclose(again.geom_rgba, original.geom_rgba, atol=1e-5)
     assert np.array_equal(again.mesh_vert, original.mesh_vert)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_the_mjcf_opens_in_dm_control_and_is_whole_there(house, tmp_path, free):
+    odd = dataclasses.replace(house.placements[0], id="bed/sofa_1")
+    house = dataclasses.replace(house, placements=(odd, *house.placements[1:]))
+    chosen = loose(house, HandCatalogue()) if free else frozenset()
+    path = export_mjcf(house, HandCatalogue(), tmp_path, free=chosen)
+    root = dm_mjcf.from_path(str(path))
+    again = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert (again.ngeom, again.njnt, again.ncam) == (model.ngeom, len(chosen), len(house.rooms))
+    assert {again.geom(g).name for g in range(again.ngeom)} == {model.geom(g).name for g in range(model.ngeom)}
+    assert root.find("camera", "living_room_1") is not None
+
+
+def test_the_cameras_of_the_mjcf_stand_in_their_rooms_and_look_along_them(house, tmp_path):
+    model = mujoco.MjModel.from_xml_path(str(export_mjcf(house, HandCatalogue(), tmp_path)))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for k in range(model.ncam):
+        x, y, z = data.cam_xpos[k]
+        ahead, up = -data.cam_xmat[k].reshape(3, 3)[:, 2], data.cam_xmat[k].reshape(3, 3)[:, 1]
+        room = house.room_by_id[model.camera(k).name]
+        polygon = shapely.Polygon(room.polygon)
+        assert z == pytest.approx(1.5) and np.allclose(up, [0, 0, 1], atol=1e-6)
+        assert polygon.contains(shapely.Point(x, y)) and polygon.contains(shapely.Point(x + ahead[0], y + ahead[1]))
+        assert not any(footprint(p).contains(shapely.Point(x, y)) for p in house.placements if p.size[2] > 0.03)
+
+
+HOSTILE = '"><!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><include file="/etc/passwd"/>&e;'
+
+
+def test_names_that_are_xml_stay_names_in_mjcf(house, tmp_path):
+    box = next(p for p in house.placements if p.asset == "hand/red_box")
+    odd = dataclasses.replace(house, name=HOSTILE, placements=(dataclasses.replace(box, id=HOSTILE),))
+    path = export_mjcf(odd, HandCatalogue(), tmp_path, free=frozenset([HOSTILE]))
+    root = ET.fromstring(path.read_text())
+    assert "<!" not in path.read_text() and root.find(".//include") is None
+    names = [b.get("name") for b in root.iter("body")]
+    assert names == [HOSTILE.replace("/", ".")]
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.body(1).name == HOSTILE.replace("/", ".")
 
 
 def test_a_free_export_has_joints_and_settles(house, tmp_path):

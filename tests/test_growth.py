@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import cv2
 import numpy as np
 import pytest
 
-from embodied.bench import growth
+from embodied.bench import growth, timing, world
 from embodied.bench.light import Kept, Shot
+from embodied.cli import main
 
 
 def house(area: float) -> growth.Grown:
@@ -27,7 +30,7 @@ def test_a_house_is_lit_once_per_code_seed_and_quality(tmp_path, monkeypatch):
     )
 
     def run(seed: int, areas: tuple[float, ...]) -> dict:
-        return growth.growth(None, tmp_path, tmp_path, seed=seed, areas=areas)
+        return growth.growth(None, tmp_path, tmp_path, seed=seed, areas=areas).facts
 
     run(7, (40.0, 100.0))
     facts = run(7, (40.0, 100.0, 400.0))
@@ -56,3 +59,12 @@ def test_a_picture_of_the_bench_is_drawn_once(tmp_path):
         np.testing.assert_array_equal(shot.rgb, rgb)
         assert (shot.plain is None) == (way == "fast")
     assert asked == ["diffuse", "fast"] and not kept.empty(7) and kept.empty(8)
+
+
+def test_every_part_that_is_named_is_measured(tmp_path, monkeypatch, capsys):
+    made = timing.Measure("a thing", 2.0, "s", 1.0, 3.0, 5)
+    monkeypatch.setattr(world, "houses", lambda catalogue, seed: iter([made]))
+    monkeypatch.setattr(growth, "growth", lambda *args, **options: timing.Report({"slope": 1.1}, "the slope"))
+    assert main(["bench", "growth", "houses", "--cache", str(tmp_path), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["growth"] == {"slope": 1.1} and [m["value"] for m in facts["measures"]] == [2.0]

@@ -25,7 +25,7 @@ from embodied.assistants.route_system import (
 from embodied.envs.base import ActionError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
-from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Sight, Step, Stop, Thought
+from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
@@ -61,7 +61,7 @@ def test_the_reply_is_the_route_that_ends_nearest_the_goal():
     env = line_env()
     env.reset(LINE_TASK)
     reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
-    assert (reply.text, reply.image) == ("go two", Sight("line", 3))
+    assert (reply.text, reply.image) == ("go two", Viewpoint("line", 3))
     assert (reply.subtask.target, reply.subtask.goal, reply.subtask.start) == (3, 3, Pose(1, 3, 1))
 
 
@@ -104,12 +104,12 @@ def test_an_episode_follows_algorithm_7_line_by_line():
     o = env.reset(LINE_TASK)
     assert (o.mode, o.instruction, o.target, o.time, o.time_on_task) == (Mode.MAIN, "find a mug", None, 0, 0)
     o = env.step(Ask())
-    assert (o.mode, o.instruction, o.target) == (Mode.SUB, "go two", Sight("line", 3))
+    assert (o.mode, o.instruction, viewpoint(o.target)) == (Mode.SUB, "go two", Viewpoint("line", 3))
     assert (env.pose, o.time, o.time_on_task) == (Pose(1, 3, 1), 1, 0), "entered the route, looking along its angles"
     o = env.step(Move(env.situation.candidate_nodes.index(2)))
     assert (o.mode, o.time_on_task, env.pose.node) == (Mode.SUB, 1, 2)
     o = env.step(Stop())
-    assert (o.mode, o.instruction, o.target) == (Mode.MAIN, "find a mug", Sight("line", 3)), (
+    assert (o.mode, o.instruction, viewpoint(o.target)) == (Mode.MAIN, "find a mug", Viewpoint("line", 3)), (
         "departed early: image of g*"
     )
     assert (env.pose.node, o.time, o.time_on_task, env.situation.targets) == (2, 3, 0, (3,))

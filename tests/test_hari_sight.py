@@ -25,7 +25,7 @@ from agents.hari.policy import policy_of
 from agents.hari.pretraining import Curriculum, learn_once, pretraining_success
 from agents.hari.rules import RULES, RuleAgent
 from agents.hari.sight import Headings, Seeing, hidden_channels
-from agents.hari.sight_study import Covered
+from agents.hari.study import Covered
 from agents.hari.words import collate, feature_words, percept
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer
@@ -35,7 +35,7 @@ from embodied.envs.hari import HariEnv, HariRules
 from embodied.envs.make import environment_maker
 from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
-from embodied.interface import FindObject, Pose, Sight, Task
+from embodied.interface import FindObject, Pose, Sight, Task, viewpoint
 
 D = 4
 CONFIG = ExecutionConfig(
@@ -70,9 +70,9 @@ class Eyes:
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, 4) float32."""
-        world, out = WORLDS[sight._world], np.zeros((36, D), dtype=np.float32)
-        here = np.asarray(world.graph.positions)[sight._node]
-        ends = (12.8, 0.8) if sight._world == "east" else (0.8, 12.8)
+        world, out = WORLDS[viewpoint(sight).world], np.zeros((36, D), dtype=np.float32)
+        here = np.asarray(world.graph.positions)[viewpoint(sight).node]
+        ends = (12.8, 0.8) if viewpoint(sight).world == "east" else (0.8, 12.8)
         for channel, x in enumerate(ends):  # of the mug and of the book
             offset = np.array([x, 1.2]) - here[:2]
             turn = round(math.atan2(offset[1], offset[0]) / (math.pi / 6)) % 12

@@ -16,6 +16,7 @@ from conftest import two_rooms
 from assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house.house import HouseError, Placement
+from embodied.mattersim.graphs import load_graphs
 from embodied.navigation.free_space import EYE, free_floor, leaves, sight_floor
 from embodied.navigation.graph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 
@@ -208,4 +209,73 @@ def test_excluded_viewpoints_are_left_out_and_broken_files_refused(tmp_path):
         from_matterport(path)
     path.write_text(path.read_text()[:50])
     with pytest.raises(HouseError, match="connectivity file"):
+        from_matterport(path)
+
+
+def real(tmp_path, **changes):
+    """A connectivity file as Matterport's: without rooms; `changes` are of its last viewpoint."""
+    path = tmp_path / "scan_connectivity.json"
+    to_matterport(line(), two_rooms(), path)
+    items = [{k: v for k, v in i.items() if k != "room"} for i in json.loads(path.read_text())]
+    items[-1] |= changes
+    path.write_text(json.dumps(items))
+    return path, items
+
+
+def test_of_a_real_scan_in_pieces_the_largest_is_taken_and_the_rest_is_named(tmp_path, caplog):
+    path, items = real(tmp_path)
+    for i in items:
+        i["unobstructed"][-1] = False
+    items[-1]["unobstructed"] = [False] * len(items)
+    path.write_text(json.dumps(items))
+    graph = from_matterport(path)
+    assert graph.ids == ("a", "b", "c") and np.isfinite(graph.distance).all()
+    assert "scan_connectivity.json is in 2 pieces" in caplog.text and "left out: d" in caplog.text
+    path.write_text(json.dumps([i | {"room": "living_room_1"} for i in items]))
+    with pytest.raises(HouseError, match="scan_connectivity.json: no edge leads from 'd'.*export the house again"):
+        from_matterport(path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pose": [float("nan")] * 16},
+        {"pose": [float("inf")] * 16},
+        {"pose": ["1"] * 16},
+        {"pose": 3},
+        {"pose": [1.0] * 12},
+        {"included": {}},
+        {"included": None},
+        {"unobstructed": "true"},
+        {"unobstructed": [True]},
+        {"unobstructed": [{}] * 4},
+        {"image_id": 7},
+        {"image_id": None},
+    ],
+)
+def test_a_viewpoint_that_is_none_is_named_with_its_file_by_both_readers(tmp_path, changes):
+    path, _ = real(tmp_path, **changes)
+    for read in (lambda: from_matterport(path), lambda: load_graphs(str(tmp_path), ("scan",))):
+        with pytest.raises(
+            ValueError, match=r"scan_connectivity\.json.*(viewpoint 3|is no JSON).*write one with"
+        ) as caught:
+            read()
+        assert len(str(caught.value)) < 400
+    load_graphs.cache_clear()
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{}x", "3", '{"a": 1}', "\xff", "[[]]", "[null]", "[]", ""])
+def test_what_is_no_connectivity_file_is_refused_by_both_readers(tmp_path, text):
+    path = tmp_path / "scan_connectivity.json"
+    path.write_bytes(text.encode("latin-1"))
+    for read in (lambda: from_matterport(path), lambda: load_graphs(str(tmp_path), ("scan",))):
+        with pytest.raises(ValueError, match=r"scan_connectivity\.json"):
+            read()
+
+
+def test_the_way_that_is_open_in_one_direction_only_is_named(tmp_path):
+    path, items = real(tmp_path)
+    items[0]["unobstructed"][1] = False
+    path.write_text(json.dumps(items))
+    with pytest.raises(HouseError, match="symmetric.*'a' to 'b'"):
         from_matterport(path)

@@ -50,7 +50,8 @@ def test_faces_are_right_handed_cameras_one_per_axis():
 
 
 @pytest.mark.parametrize(
-    ("yaw", "pitch", "vfov"), [(0.0, 0.0, 1.2), (0.7, 0.4, 1.0), (-2.5, -1.1, 1.5), (3.0, 1.5, 0.8)]
+    ("yaw", "pitch", "vfov"),
+    [(0.0, 0.0, 1.2), (0.7, 0.4, 1.0), (-2.5, -1.1, 1.5), (3.0, 1.5, 0.8), (0.4, -math.pi / 2, 1.0)],
 )
 def test_a_resampled_view_equals_the_closed_form(yaw, pitch, vfov):
     rgb, depth, ids = analytic().view(yaw, pitch, vfov, (48, 60))
@@ -188,7 +189,7 @@ def test_a_truncated_or_foreign_file_is_refused(stored):
 def test_a_flipped_byte_is_noticed_where_it_matters(stored):
     path, _ = stored
     with PanoramaFile(path) as file:
-        offset, length, _ = file.index["nodes"][1]["depth"]
+        offset, length, _ = file.index.nodes[1]["depth"]
     data = bytearray(path.read_bytes())
     data[offset + length // 2] ^= 0xFF
     path.write_bytes(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from types import SimpleNamespace
 
@@ -14,9 +15,11 @@ from hand_worlds import grid_world, thing
 
 from assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
+from embodied.generate.another_day import another_day
 from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, POLITE, add_people, meet, sits, stands
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
+from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import RADIUS, NavGraph, graph_of, unreachable_rooms
 from embodied.tasks.goals import find_instances
@@ -223,3 +226,31 @@ def test_people_are_not_objects_to_look_for():
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_people():
     assert populated()[0] == populated()[0]
+
+
+def test_on_another_day_people_are_elsewhere_and_small_things_moved_but_the_furniture_stays():
+    chair = Placement("dining_chair_1", CHAIR.key, CHAIR.object_class, "r0", (1.0, 1.0, 0.0), 0.0, CHAIR.size)
+    mugs = tuple(
+        Placement(f"mug_{k + 90}", "hand/mug", "mug", "r0", (0.9 + 0.06 * k, 0.97, LAP + 0.02), 0.0, (0.03, 0.03, 0.1))
+        for k in range(4)
+    )
+    mugs = tuple(dataclasses.replace(m, parent=chair.id, surface="seat") for m in mugs)
+    house, world = populated(figures=(FIGURE, SLIM))
+    house = dataclasses.replace(house, placements=(chair, *mugs, *house.placements))
+    days = [
+        another_day(house, world.graph, catalogue(FIGURE, SLIM), (0, 14, 14, 30), day=day) for day in (0, 1, 1, 2, 3)
+    ]
+    assert days[0] is house and days[1].digest == days[2].digest, "a day is the same whenever it is looked at"
+    things = [{p.id: p for p in d.placements if p.object_class != CLASS} for d in days]
+    small = {m.id for m in mugs}
+    furniture = [{i: p for i, p in t.items() if i not in small} for t in things]
+    assert all(f == furniture[0] for f in furniture) and all(set(t) <= set(things[0]) for t in things)
+    assert len({len(t) for t in things}) > 1, "something is put away on some day"
+    seat = shapely.box(0.85, 0.85, 1.15, 1.1)
+    for there in things[1:]:
+        bases = [footprint(p) for p in there.values() if p.id in small]
+        assert all(seat.contains(b) for b in bases)
+        assert not any(a.intersects(b) for a, b in itertools.combinations(bases, 2))
+    assert any(there[i].position != things[0][i].position for there in things[1:] for i in there)
+    met = [{p.position for p in people_of(d)} for d in days]
+    assert met[0] and all(met[0] != m for m in met[1:])

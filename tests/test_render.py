@@ -6,6 +6,7 @@ import dataclasses
 import math
 import multiprocessing
 
+import cv2
 import mujoco
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from handmade import HandCatalogue, furnished
 from embodied import gl
 from embodied.render import visibility
 from embodied.render.camera import camera_at, face_cameras
-from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z
+from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z, two_thirds
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.render.pictures import QUALITIES, PictureSettings
 from embodied.scene.house_meshes import owners
@@ -144,11 +145,11 @@ def test_leaving_out_what_is_hidden_changes_no_pixel(renderer):
 def test_hidden_rooms_are_left_out(renderer, house):
     """In the living room's corner beside the door one cannot look into the bedroom."""
     seen = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5))
-    width = sum(high - low for low, high in seen["bedroom_1"])
+    width = sum(s.high - s.low for s in seen["bedroom_1"])
     assert width < 0.3, "only a sliver through the door"
     faces = [renderer._in_view(camera, (64, 64)) for camera in face_cameras((4.8, 3.7, 1.5))]
     assert np.logical_or.reduce(faces).sum() < renderer._is_visual.sum() - 5
-    aside = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5), (2.0, 3.0))
+    aside = visibility.visible_rooms(house, visibility.portals_of(house), (4.8, 3.7, 1.5), visibility.Sector(2.0, 3.0))
     assert "bedroom_1" in seen and "bedroom_1" not in aside, "one looks away from the door"
 
 
@@ -159,12 +160,44 @@ def test_a_field_of_view_lies_within_its_compass_directions():
         camera = camera_at((0, 0, 0), yaw, pitch, vfov)
         forward, up = np.array(camera.forward), np.array(camera.up)
         right, tall, wide = np.cross(forward, up), math.tan(vfov / 2), 1.5 * math.tan(vfov / 2)
-        low, high = visibility.sector_of(forward, right, up, wide, tall)
+        sector = visibility.sector_of(forward, right, up, wide, tall)
         rays = forward + rng.uniform(-1, 1, (300, 1)) * wide * right + rng.uniform(-1, 1, (300, 1)) * tall * up
-        off = (np.arctan2(rays[:, 1], rays[:, 0]) - low) % (2 * math.pi)
-        assert (off <= high - low).all()
+        off = (np.arctan2(rays[:, 1], rays[:, 0]) - sector.low) % (2 * math.pi)
+        assert (off <= sector.high - sector.low).all()
         upright = abs(pitch) + vfov / 2 > math.pi / 2
-        assert ((low, high) == visibility.FULL) == upright, (yaw, pitch, vfov)
+        assert (sector == visibility.FULL) == upright, (yaw, pitch, vfov)
+
+
+def test_a_box_is_seen_in_every_sector_that_holds_a_point_of_it():
+    rng = np.random.default_rng(0)
+    middles, reaches = rng.uniform(-3, 3, (300, 3)), rng.uniform(0.01, 1.5, (300, 3))
+    yaw, slope = (rng.uniform(-a, a, 300) for a in (np.pi, 1.0))
+    eye = np.array([0.3, -0.2, 0.1])
+    x, y, z = (middles + rng.uniform(-1, 1, (300, 3)) * reaches - eye).T
+    spans = visibility.spans_of(eye, middles, reaches)
+    missed = 0
+    for k in range(300):
+        sector = visibility.Sector(yaw[k], yaw[k] + 1.0, slope[k], slope[k] + 0.5)
+        holds = ((np.arctan2(y, x) - sector.low) % (2 * np.pi) <= 1.0) & (
+            np.abs(z / np.hypot(x, y) - slope[k] - 0.25) < 0.25
+        )
+        seen = spans.within(np.tile(sector, (300, 1)), np.arange(300))
+        assert seen[holds].all()
+        missed += (~seen).sum()
+    assert missed > 300 * 100, "most boxes lie elsewhere"
+
+
+def test_what_hangs_above_a_door_is_not_seen_through_it(house):
+    seen = visibility.visible_rooms(house, visibility.portals_of(house), (2.0, 1.0, 1.5), visibility.Sector(-0.5, 0.5))
+    for sector in seen["bedroom_1"]:
+        assert sector.top < 0.6, "the door is lower than the ceiling"
+
+
+@pytest.mark.parametrize(("height", "width"), [(3, 3), (6, 9), (192, 150)])
+def test_two_thirds_are_the_mean_over_each_pixels_area(height, width):
+    picture = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
+    expected = cv2.resize(picture, (width // 3 * 2, height // 3 * 2), interpolation=cv2.INTER_AREA)[::-1]
+    np.testing.assert_array_equal(two_thirds(picture), expected)
 
 
 def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():

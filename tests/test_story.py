@@ -13,11 +13,11 @@ from embodied.interface import (
     Move,
     Pose,
     Reply,
-    Sight,
     Step,
     Stop,
     Subtask,
     Task,
+    Viewpoint,
 )
 from viz.story import Story, described
 
@@ -40,15 +40,15 @@ def told(story, *steps):
 
 
 def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_looked_for():
-    reply = Reply("Go on.", Sight("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
+    reply = Reply("Go on.", Viewpoint("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
     asked = told(Story(task_of("hanna")), step_of(Ask(), reply=reply))
-    assert asked.route == (0, 1, 2) and asked.image == Sight("line", 1)
+    assert asked.route == (0, 1, 2) and asked.image == Viewpoint("line", 1)
     assert asked.dialogue[1:] == ["**Agent** (step 0): Can you help me?", "**Assistant:** Go on."]
     sub = {"mode": Mode.SUB, "targets": (1,), "subtask": "r1"}
     told(asked, step_of(Move(0), to=1, **sub), step_of(Stop(), at=1, to=1, **sub))
-    assert asked.route == (0, 1, 2) and asked.image == Sight("line", 1)
+    assert asked.route == (0, 1, 2) and asked.image == Viewpoint("line", 1)
     told(asked, step_of(Move(0), at=1, to=2, targets=(2,)))
-    assert asked.route == () and asked.image == Sight("line", 2) and asked.nodes == [0, 1, 2]
+    assert asked.route == () and asked.image == Viewpoint("line", 2) and asked.nodes == [0, 1, 2]
     assert "leaves the route" in asked.told()
 
 

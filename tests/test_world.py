@@ -11,7 +11,6 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.interface import Sight
 from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
@@ -55,6 +54,14 @@ def test_a_panorama_from_the_file_is_the_one_that_was_drawn(world):
     assert np.abs(kept.depth - drawn.depth).max() <= 0.0005 + 1e-6
     error = np.abs(kept.rgb.astype(int) - drawn.rgb)
     assert error.mean() < 1.25 and np.square(error).mean() < 255**2 / 10**4, "40 dB; files are JPEG of quality 90"
+
+
+def test_a_camera_at_a_node_sees_a_face_of_its_panorama(world):
+    face, size = world.panorama(0), (world.pictures.size,) * 2
+    view = world.camera(world.graph.positions[0], math.pi / 2, 0.0, math.pi / 2, size)
+    np.testing.assert_array_equal(view.ids, face.ids[1])
+    np.testing.assert_array_equal(view.depth, face.depth[1])
+    assert np.abs(view.rgb.astype(int) - face.rgb[1]).max() <= 2
 
 
 def test_sightings_agree_with_the_panorama(world, house):
@@ -119,14 +126,11 @@ def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplo
         assert file.meta["house"] == edited.digest
 
 
-def test_unknown_nodes_folders_and_sights_are_refused(world, tmp_path):
+def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
     with pytest.raises(IndexError, match="0 to 2"):
         world.panorama(3)
     with pytest.raises(FileNotFoundError, match=r"house\.json"):
         open_folder(tmp_path, HandCatalogue(), tmp_path)
-    assert world.node_of(Sight(world.name, 2)) == 2
-    with pytest.raises(ValueError, match="other house"):
-        world.node_of(Sight("other house", 2))
 
 
 def test_a_world_without_pictures_says_so(house, tmp_path):
@@ -144,3 +148,31 @@ def test_a_misspelt_setting_is_refused(house, tmp_path):
 def test_unknown_quality_is_refused_at_once(house, tmp_path):
     with pytest.raises(ValueError, match="pretty"):
         make(house, tmp_path, quality="pretty")
+
+
+def test_every_instance_id_has_a_class_walls_and_doors_too(world):
+    view = world.renderer.view((1.0, 1.05, 1.5), 0.0, vfov=1.2, size=(48, 64))
+    shown = set(np.array(world.classes)[view.ids].ravel())
+    assert {"wall", "floor", "door"} <= shown and len(world.classes) == len(world.owners) + 1
+    for name, owner in zip(world.classes[1:], world.owners, strict=True):
+        placed = world.house.placement_by_id.get(owner)
+        assert name and (placed is None or name == placed.object_class)
+
+
+def test_random_poses_are_free_and_spread_over_the_floor(world):
+    rng = np.random.default_rng(0)
+    poses = [world.random_pose(rng=rng) for _ in range(200)]
+    rooms = [next(r.id for r in world.house.rooms if _inside(r, eye)) for eye, _ in poses]
+    assert all(world.is_free(eye) and world.is_free(eye[:2]) and eye[2] == 1.5 for eye, _ in poses)
+    assert 0.2 < np.mean([r == "bedroom_1" for r in rooms]) < 0.8 and np.ptp([yaw for _, yaw in poses]) > 5
+    assert not world.is_free((1.2, 0.9)), "a table stands there"
+    assert not world.is_free((0.05, 2.0)) and not world.is_free((-5.0, 2.0, 1.5)) and not world.is_free((2.5, 2.6, -3))
+    with pytest.raises(ValueError, match="finite"):
+        world.is_free((float("nan"), 0.0))
+    view = world.renderer.view(*poses[0], size=(16, 16))
+    assert view.rgb.shape == (16, 16, 3)
+
+
+def _inside(room, eye) -> bool:
+    xy = np.array(room.polygon)
+    return bool((xy.min(0) <= eye[:2]).all() and (eye[:2] <= xy.max(0)).all())

@@ -21,7 +21,7 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Sight, Step, Stop, Task
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
 from embodied.navigation.free_space import EYE
 from embodied.render.panorama import Panorama
 from embodied.render.photograph import PhotoCamera
@@ -117,6 +117,8 @@ def record(
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
+        if step.seconds is not None:  # people took part
+            recording.set_time("seconds", duration=step.seconds)
         log_step(recording, world, task, step, state, views)
         yield step
     if state.last is not None:
@@ -312,7 +314,7 @@ def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> N
 def log_aim(recording: rr.RecordingStream, world: World, state: Story, views: Views) -> None:
     """The route that the agent was told and the picture of what it looks for, while they hold."""
     if state.image is not None:
-        picture = sight_picture(views.seen, state.image, views.sizes.panorama)
+        picture = views.seen.panorama(state.image.node).equirect(views.sizes.panorama)
         recording.log("view/target", encoded(picture, views.sizes.jpeg))
     if state.route:
         nodes = list(state.route if len(state.route) > 1 else 2 * state.route)
@@ -337,6 +339,8 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
     for name, p in (thought.asks or {}).items():
         if name != "nothing":  # what remains to one
             recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
+    if thought.match is not None:
+        recording.log("plot/probability/match", rr.Scalars(thought.match))
 
 
 def mode_name(step: Step) -> str:
@@ -380,11 +384,6 @@ def event_text(world: World, step: Step) -> str:
 def event_level(step: Step) -> str:
     """Asking stands out in the log."""
     return "WARN" if isinstance(step.action, Ask) else "INFO"
-
-
-def sight_picture(world: World, sight: Sight, height: int) -> np.ndarray:
-    """The equirectangular panorama of a Sight, (height, 2 height, 3) uint8."""
-    return world.panorama(world.node_of(sight)).equirect(height)
 
 
 def camera_turn(yaw: float, pitch: float) -> np.ndarray:

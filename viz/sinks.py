@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_cli
 
-from assets.cache import atomic_path
+from assets.cache import atomic_path, write_json
 from embodied.errors import UnableError
 
 APPLICATION = "embodied"
@@ -36,6 +38,8 @@ HERE = "127.0.0.1"
 PATIENCE = 60.0
 """Seconds that a viewer may take to accept the last of a recording."""
 
+MAGIC = b"RRF"
+"""What a .rrd file begins with, before the number of its format."""
 FOOTER = b"RRF2FOOT"
 """What stands 12 bytes before the end of a .rrd file that was finished (Rerun 0.41)."""
 
@@ -132,14 +136,32 @@ def open_recording(
             raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
 
 
+def check_recording(rrd: Path) -> None:
+    """Refuse what is no recording; warn of one that was cut short.
+
+    Raises:
+      ValueError: another kind of file.
+    """
+    with open(rrd, "rb") as f:
+        begin, end = f.read(4), f.seek(0, os.SEEK_END)
+        f.seek(max(0, end - 12))
+        footer = f.read(8)
+    if not begin.startswith(MAGIC):
+        raise ValueError(f"{rrd} is no recording of Rerun; make one with `embodied demo` or `embodied rollout --rrd`")
+    if footer != FOOTER:
+        print(f"warning: {rrd} was cut short or changed; its last moments may be missing", file=sys.stderr)
+
+
 def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
     """Show a .rrd file in the native viewer, or serve it to browsers; returns when that is closed or stopped.
 
     Raises:
       UnableError: there is no screen, or the viewer could not be started.
     """
-    command = [viewer_program(), str(rrd), "--bind", bind, *LIMITS]
+    check_recording(rrd)
+    command = [viewer_program(), str(Path(rrd).absolute()), "--bind", bind, *LIMITS]  # never an option
     if serve:
+        _warn_of(bind)
         _refuse_taken(bind)
         command += ["--serve-web", "--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
         print(f"watch in a browser: {page(bind)}; Ctrl-C ends it", flush=True)
@@ -148,7 +170,7 @@ def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
         command += ["--port", "auto"]
     status = 0
     with contextlib.suppress(KeyboardInterrupt):  # reaches the viewer as well
-        status = subprocess.run(command, check=False, stdout=subprocess.DEVNULL).returncode
+        status = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, env=viewer_environment()).returncode
     if status:
         raise UnableError(
             f"the Rerun viewer ended with status {status}; look at what it wrote above, or use --serve and a browser"
@@ -198,23 +220,29 @@ def _spawned() -> str:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            env=viewer_environment(),
         )
         _wait_for(viewer, HERE, (PORT,), "use --serve and a browser, or --rrd and a file")
     return _url(PORT)
+
+
+def _warn_of(bind: str) -> None:
+    if bind != HERE:
+        print(f"warning: everybody who reaches {bind} can look at what is served and send data to it", file=sys.stderr)
 
 
 @contextlib.contextmanager
 def _serve(bind: str) -> Iterator[None]:
     """A server for recordings and the web viewer's page, both at the address `bind`, while the body runs."""
     _refuse_taken(bind)
-    if bind != HERE:
-        print(f"warning: everybody who reaches {bind} can look at what is served and send data to it", file=sys.stderr)
+    _warn_of(bind)
     ports = ["--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
     server = subprocess.Popen(
         [viewer_program(), "--serve-web", "--bind", bind, *ports, *LIMITS],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,  # Ctrl-C is for us
+        env=viewer_environment(),
     )
     try:
         reached = HERE if bind == EVERYWHERE else bind
@@ -242,6 +270,21 @@ def _wait_for(program: subprocess.Popen, host: str, ports: tuple[int, ...], reme
 def viewer_program() -> str:
     """The viewer that came with rerun-sdk, whatever PATH says."""
     return str(Path(rerun_cli.__file__).parent / ("rerun.exe" if sys.platform == "win32" else "rerun"))
+
+
+def viewer_environment() -> dict[str, str]:
+    """The variables of a viewer that we start: it reads its settings from a folder where its statistics are off."""
+    return {**os.environ, "XDG_CONFIG_HOME": _quiet_settings().name}
+
+
+@functools.cache
+def _quiet_settings() -> tempfile.TemporaryDirectory[str]:
+    """Removed when the program ends; viewers read it when they begin."""
+    folder = tempfile.TemporaryDirectory(prefix="embodied-viewer-")
+    file = Path(folder.name) / "rerun" / "analytics.json"
+    where = {"config_file_path": str(file), "data_dir_path": str(file.parent)}
+    write_json(file, {"analytics_enabled": False, "analytics_id": "", "metadata": {}, **where})
+    return folder
 
 
 def _need_screen() -> None:

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from embodied.interface import TURNS, Ask, Description, Feature, Intention, Mode, Place, Pose, Reply, Sight, Step, Task
+from embodied.interface import (
+    TURNS,
+    Ask,
+    Description,
+    Feature,
+    Intention,
+    Mode,
+    Place,
+    Pose,
+    Reply,
+    Step,
+    Task,
+    Viewpoint,
+)
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
@@ -50,7 +63,7 @@ class Story:
         """HARI's stack of goals, the top last."""
         self.route: tuple[int, ...] = ()
         """Nodes of the route that the agent was told and has not left."""
-        self.image: Sight | None = None
+        self.image: Viewpoint | None = None
         """What the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
         self.count = 0
         self.requests = 0
@@ -71,7 +84,7 @@ class Story:
             self.goals.pop()
         left = self.last is not None and self.last.mode is Mode.SUB and step.mode is Mode.MAIN
         if left and self.task.kind == "hanna":
-            self.image = Sight(self.task.world, step.targets[0])
+            self.image = Viewpoint(self.task.world, step.targets[0])
             self.dialogue.append(f"**Agent** (step {self.count}): *leaves the route and goes on by itself*")
 
     def after(self, step: Step) -> None:

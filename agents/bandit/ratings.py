@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +39,26 @@ class Rater:
 
 
 CLEAN = Rater()
+
+
+def fitted(scores: Sequence[float], ratings: Sequence[float], granularity: int) -> Rater:
+    """The rater that people resemble: the skew by least squares, then the variance that is left.
+
+    Args:
+      scores: true scores in [0, 1].
+      ratings: what people gave, in [0, 1].
+
+    Raises:
+      ValueError: fewer than two ratings.
+    """
+    if len(scores) < 2:
+        raise ValueError(f"a rater is fitted to at least two ratings, got {len(scores)}")
+    s, r = np.asarray(scores, float), np.asarray(ratings, float)
+    exponents = np.geomspace(0.1, 10.0, 201)
+    skew = float(min(exponents, key=lambda e: float(((s**e - r) ** 2).sum())))
+    spread = sum(deviation(m) ** 2 for m in s**skew)
+    variance = float(((s**skew - r) ** 2).sum() / spread) if spread else 0.0
+    return Rater(granularity, variance, skew)
 
 
 def rater_of(perturbation: str, strength: float) -> Rater:

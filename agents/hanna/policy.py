@@ -127,14 +127,14 @@ class HannaPolicy:
         asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
         reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
 
-        trails = [t.here(o) for t, o in zip(memory.trails, seen, strict=True)] if memory.trails else []
+        trails = self._trails(memory.trails, seen) if memory.trails else []
         actions: list[Action | None] = [None] * len(observations)
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
             n, rng = len(o.candidates), rngs[position]
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
-            thought = thought_of(moves[row], asks[row], reason, n)
+            thought = thought_of(moves[row], asks[row], reason, n, trails[row].match if trails else None)
             weights = moves[row, : n + 1]
             known = False
             if trails:
@@ -169,6 +169,15 @@ class HannaPolicy:
             moments,
             tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
+
+    def _trails(self, trails: Sequence[Trail], observations: Sequence[Observation]) -> list[Trail]:
+        """The trails when a step begins, by what the agents see."""
+        current = self.bank.gather([o.sight for o in observations]).cpu().numpy()
+        target = self.bank.gather([o.target for o in observations]).cpu().numpy()
+        return [
+            t.here(o, panorama, None if o.target is None else picture)
+            for t, o, panorama, picture in zip(trails, observations, current, target, strict=True)
+        ]
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
@@ -235,12 +244,15 @@ class HannaPolicy:
         return self._encoded[text]
 
 
-def thought_of(moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int) -> Thought:
+def thought_of(
+    moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int, match: float | None = None
+) -> Thought:
     """What the networks said, as it is written down: `moves` has stop first, a Thought has it last."""
     return Thought(
         moves=np.append(moves[1 : candidates + 1], moves[0]),
         asks={"help": float(ask), "nothing": float(1 - ask)},
         reasons=reasons,
+        match=match,
     )
 
 

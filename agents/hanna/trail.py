@@ -4,7 +4,7 @@ The likeliest move of an agent that misread its words leads to and fro between t
 knows which of its moves lead towards where it has been, under the words that it still follows, and how often it was
 there; never more than it has walked itself. A place is known again by its panorama; the way back lies opposite the way
 there. Who is shown the panorama of where to go knows in the same manner when it is there, and, if it has been there
-before, which way leads there.
+before, which way leads there. Places are known again by what they look like (agents.hanna.recognition).
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from agents.hanna.percept import HEADINGS, VIEWS
-from embodied.interface import Action, Mode, Move, Observation, Sight
+from agents.hanna.recognition import PlaceMap
+from embodied.interface import Action, Mode, Move, Observation
 
 UNLIKELY = 1e-6
 """Added to what is thought of an untried way, so that one that seems impossible is tried in the end."""
@@ -28,55 +29,77 @@ class Trail:
     """What one episode knows of its way so far; directions are views, 0..35, which keep neighbours apart by 30 degrees
     only: whatever lies in the same view as a place that was visited counts as leading there (docs/sources.md, S36)."""
 
-    leads: Mapping[tuple[Sight, int], Sight] = field(default_factory=dict)
+    map: PlaceMap = field(default_factory=PlaceMap)
+    """What the places look like; their numbers are meant below."""
+    place: int = 0
+    """Where the agent takes itself to be."""
+    picture: int | None = None
+    """Which of the pictures that it was shown it is looking for."""
+    goal: int | None = None
+    """Where that picture was taken; None without one, or where it is not on the map."""
+    match: float | None = None
+    """How well the picture matches what is seen here."""
+    leads: Mapping[tuple[int, int], int] = field(default_factory=dict)
     """Where the last move in a view from a place led, in either direction."""
-    visits: Mapping[tuple[Sight, str], int] = field(default_factory=dict)
+    visits: Mapping[tuple[int, str], int] = field(default_factory=dict)
     """How many steps began at a place under these words."""
-    thoughts: Mapping[tuple[str, Sight | None, Sight], Mapping[int, float]] = field(default_factory=dict)
-    """How likely the ways in each view seemed to lead on, under words and image, from a place."""
-    begun: tuple[Sight, int] | None = None
+    thoughts: Mapping[tuple[str, int | None, int], Mapping[int, float]] = field(default_factory=dict)
+    """How likely the ways in each view seemed to lead on, under words and picture, from a place."""
+    begun: tuple[int, int] | None = None
     """The last move, which led to where the next step begins."""
 
-    def here(self, observation: Observation) -> Trail:
-        """The trail when a step begins: where the last move led, and one visit more."""
-        o, leads = observation, dict(self.leads)
+    def here(self, observation: Observation, panorama: np.ndarray, picture: np.ndarray | None = None) -> Trail:
+        """The trail when a step begins: where the agent is, where the last move led, and one visit more.
+
+        Args:
+          panorama, picture: (36, D) features of what is around it and of what it is shown.
+        """
+        places, place = self.map.seen(panorama)
+        shown = goal = match = None
+        if picture is not None:
+            places, shown = places.shown(picture)
+            goal, scores = places.find(shown)
+            match = float(scores[place])
+        leads = dict(self.leads)
         if self.begun is not None:
             origin, view = self.begun
-            leads[self.begun] = o.sight
-            leads[o.sight, opposite(view)] = origin
-        key = o.sight, o.instruction
+            leads[self.begun] = place
+            leads[place, opposite(view)] = origin
+        key = place, observation.instruction
         visits = {**self.visits, key: self.visits.get(key, 0) + 1}
-        return dataclasses.replace(self, leads=leads, visits=visits, begun=None)
+        return dataclasses.replace(
+            self, map=places, place=place, picture=shown, goal=goal, match=match, leads=leads, visits=visits, begun=None
+        )
 
     def left(self, observation: Observation, action: Action | None) -> Trail:
         """The trail when a step ends with `action`."""
         if not isinstance(action, Move):
             return self
-        return dataclasses.replace(self, begun=(observation.sight, int(observation.candidates.view[action.candidate])))
+        return dataclasses.replace(self, begun=(self.place, int(observation.candidates.view[action.candidate])))
 
     def times(self, observation: Observation) -> np.ndarray:
         """(n,) how often the agent was, under these words, where each candidate's view is known to lead."""
         o = observation
-        ends = [self.leads.get((o.sight, view)) for view in o.candidates.view.tolist()]
+        ends = [self.leads.get((self.place, view)) for view in o.candidates.view.tolist()]
         return np.array([0 if end is None else self.visits.get((end, o.instruction), 0) for end in ends])
 
     def thinking(self, observation: Observation, moves: np.ndarray) -> Trail:
-        """The trail with what is thought here of the ways that lead on, under these words and this image.
+        """The trail with what is thought here of the ways that lead on, under these words and this picture.
 
         Args:
           moves: (n,) probabilities of the candidates; those in one view add up.
         """
         o = observation
         ways = {int(view): float(moves[o.candidates.view == view].sum()) for view in np.unique(o.candidates.view)}
-        quest = o.instruction, o.target
-        return dataclasses.replace(self, thoughts={**self.thoughts, (*quest, o.sight): ways})
+        key = o.instruction, self.picture, self.place
+        return dataclasses.replace(self, thoughts={**self.thoughts, key: ways})
 
-    def ways(self, start: Sight) -> dict[Sight, tuple[int, int | None]]:
-        """How many known moves lead from `start` to every place on the trail, and the view in which they begin."""
-        roads: dict[Sight, list[tuple[int, Sight]]] = {}
+    def ways(self) -> dict[int, tuple[int, int | None]]:
+        """How many known moves lead from here to every place on the trail, and the view in which they begin."""
+        start, roads = self.place, dict[int, list[tuple[int, int]]]()
         for (origin, view), end in self.leads.items():
             roads.setdefault(origin, []).append((view, end))
-        found: dict[Sight, tuple[int, int | None]] = {start: (0, None)}
+        found: dict[int, tuple[int, int | None]] = {start: (0, None)}
         queue = deque([start])
         while queue:
             place = queue.popleft()
@@ -89,11 +112,11 @@ class Trail:
 
     def untried(self, observation: Observation, back: float) -> int | None:
         """The view in which the way begins to the best of all ways that were not tried yet, by what was thought of them
-        under these words and this image, times `back` for each move that lies between; None without one."""
-        o, ways = observation, self.ways(observation.sight)
+        under these words and this picture, times `back` for each move that lies between; None without one."""
+        ways, quest = self.ways(), (observation.instruction, self.picture)
         best, chosen = 0.0, None
         for (words, image, place), thought in self.thoughts.items():
-            if (words, image) != (o.instruction, o.target) or place not in ways:
+            if (words, image) != quest or place not in ways:
                 continue
             steps, first = ways[place]
             for view, probability in thought.items():
@@ -111,8 +134,8 @@ def weigh(trail: Trail, observation: Observation, weights: np.ndarray, again: fl
 def weigh_by_image(
     trail: Trail, observation: Observation, weights: np.ndarray, search: float = 0.0
 ) -> tuple[np.ndarray, bool]:
-    """`weights` of an agent that goes by the image of where to go, if it is shown one: it stops where it sees that
-    very image and nowhere else, and walks straight to it where it has been there.
+    """`weights` of an agent that goes by the image of where to go, if it is shown one: it stops where it recognises
+    what the image shows and nowhere else, and walks straight to it where it has been there.
 
     Args:
       weights: (n + 1,) of the actions, stop first.
@@ -123,13 +146,13 @@ def weigh_by_image(
       The same anew, and whether the agent knows where it has to go, so that it need not ask.
     """
     o, n = observation, len(observation.candidates)
-    if o.target is None:
+    if trail.picture is None:
         return weights, False
-    if o.target == o.sight:
+    if trail.goal == trail.place:
         return np.append(1.0, np.zeros(n)), True
     moves = np.where(np.arange(n + 1) > 0, weights, 0.0)
     towards = lambda view: moves * np.append(False, o.candidates.view == view)
-    _, way = trail.ways(o.sight).get(o.target, (0, None))
+    _, way = (0, None) if trail.goal is None else trail.ways().get(trail.goal, (0, None))
     if towards(way).any():
         return towards(way), True
     if search and o.mode is Mode.MAIN:

@@ -1,5 +1,5 @@
 """FeatureBank: the features of many worlds in one tensor, looked up by Sight; of every lighting that a world is seen
-in."""
+in, and of pictures that were taken at another time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from embodied.gym.semantic_features import SightRows
-from embodied.interface import Sight
+from embodied.interface import Sight, is_picture, viewpoint
 
 
 class FeatureBank:
@@ -33,6 +33,7 @@ class FeatureBank:
         self._table = torch.from_numpy(np.concatenate([self._rows.filled(w) for w in (worlds, *others)]))
         self._lighting = dict.fromkeys(self._rows.spans, 0)
         self.lightings = 1 + len(others)
+        self._shown: int | None = None
         self.size, self.digest = self._rows.size, digest
 
     def to(self, device: torch.device | str) -> FeatureBank:
@@ -46,6 +47,22 @@ class FeatureBank:
         drawn = rng.integers(self.lightings, size=len(self._rows.spans)).tolist()
         other = object.__new__(FeatureBank)
         other.__dict__.update(self.__dict__, _lighting=dict(zip(self._rows.spans, drawn, strict=True)))
+        return other
+
+    def showing(self, pictures: Mapping[str, np.ndarray]) -> FeatureBank:
+        """The bank with other features for pictures (embodied.interface.is_picture): of the same worlds, taken at
+        another time."""
+        if SightRows(pictures).spans != self._rows.spans or SightRows(pictures).size != self._rows.size:
+            raise ValueError("pictures must be of the same worlds, with as many nodes and features")
+        table = torch.from_numpy(self._rows.filled(pictures)).to(self._table.device)
+        other = object.__new__(FeatureBank)
+        other.__dict__.update(self.__dict__, _table=torch.cat([self._table, table]), _shown=len(self._table))
+        return other
+
+    def blind(self) -> FeatureBank:
+        """The bank in which everything is black: all features are zero."""
+        other = object.__new__(FeatureBank)
+        other.__dict__.update(self.__dict__, _table=torch.zeros_like(self._table))
         return other
 
     def features(self, sight: Sight) -> np.ndarray:
@@ -64,4 +81,7 @@ class FeatureBank:
         return self._table[rows, torch.tensor(views, device=self._table.device)]
 
     def _row(self, sight: Sight) -> int:
-        return self._rows.row(sight) + self._rows.count * self._lighting[sight._world]
+        row = self._rows.row(sight)
+        if self._shown is not None and is_picture(sight):
+            return row + self._shown
+        return row + self._rows.count * self._lighting[viewpoint(sight).world]

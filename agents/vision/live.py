@@ -8,7 +8,7 @@ from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import Encoder, load_encoder
 from agents.vision.features import encode_panoramas
 from embodied.gym.eyes import PanoramaStore
-from embodied.interface import VIEWS, Sight
+from embodied.interface import VIEWS, Sight, Viewpoint, viewpoint
 
 
 class LiveFeatures:
@@ -16,12 +16,12 @@ class LiveFeatures:
 
     def __init__(self, encoder: Encoder, store: PanoramaStore) -> None:
         self._encoder, self._store = encoder, store
-        self._known: dict[tuple[str, int], np.ndarray] = {}
+        self._known: dict[Viewpoint, np.ndarray] = {}
         self.size = encoder.size
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32; about 25 ms of processor time the first time, 100 kB for ever."""
-        key = sight._world, sight._node
+        key = viewpoint(sight)
         if key not in self._known:
             made = encode_panoramas(self._encoder, [self._store.at(sight)])[0]
             self._known[key] = made.astype(np.float32).reshape(VIEWS, self.size)

@@ -319,7 +319,7 @@ def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: 
 
 def carried_out(before: Observation, now: Observation) -> int:
     """The action that led from one observation to the next, as an agent knows it itself; stop where it stood still."""
-    if now.sight != before.sight:
+    if now.moved:
         return WORDS.index("forward")
     if now.turn != before.turn:
         return WORDS.index("left" if (now.turn - before.turn) % TURNS == 1 else "right")

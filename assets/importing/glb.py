@@ -1,45 +1,82 @@
-"""Binary glTF 2.0 files: looked through before a library parses them, then read as RawParts."""
+"""Binary glTF 2.0 files as RawParts: triangles, colours and pictures as the format means them.
+
+Why not trimesh's loader, nor Assimp's: the one drops what it does not know without a word (second texture coordinates,
+texture transforms, sparse accessors, skins, fans), the other reads files beside the model, in C++, unchecked; and
+what a file requires must be read here all the same, to refuse it by name.
+"""
 
 from __future__ import annotations
 
 import base64
 import binascii
 import io
-import json
 import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from PIL import Image
 
-from assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart
+from assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
 from assets.importing.meshing import face_normals
 from assets.importing.obj import FARTHEST, MAX_FACES, MeshError
 from assets.importing.sh3f import MAX_ENTRY
+from assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
+from assets.json_file import parse
+from assets.json_file import shown as short
 from assets.records import Finish
 
-JSON_CHUNK = 0x4E4F534A
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 PICTURES = ("PNG", "JPEG")
 """The two kinds of picture that glTF 2.0 knows (section 3.8.3)."""
+FOREIGN = ("image/webp", "image/ktx2", "image/avif", "image/vnd-ms.dds")
+"""Kinds of pictures of extensions, beside which files may hold the others."""
+HONOURED = ("KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness")
+DRACO = "KHR_draco_mesh_compression"
+REFUSED = {
+    DRACO: "its mesh is compressed by Draco; export it again with compression switched off",
+    "EXT_meshopt_compression": "it is compressed by meshopt; export it again, or copy it with gltfpack without -c",
+    "KHR_texture_basisu": "its textures are KTX2 (Basis Universal); export it again with PNG or JPEG textures",
+    "EXT_texture_webp": "its textures are WebP; export it again with PNG or JPEG textures",
+    "EXT_texture_avif": "its textures are AVIF; export it again with PNG or JPEG textures",
+    "EXT_mesh_gpu_instancing": "it repeats its meshes by instancing; export it again with instances made real",
+}
+"""Extensions whose data are not read, and what to do."""
+LOOKS = "KHR_materials_"
+"""Beginning of extensions that refine a look; without them the material is drawn as the core of the format says."""
+KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+MAX_NODES = 20_000
+CLAMPED, MIRRORED = 33071, 33648
+"""CLAMP_TO_EDGE and MIRRORED_REPEAT."""
+FADED = 0.1
+"""Opacity below which blended texels are cut away."""
+METAL = 0.5
+"""Metalness from which a face is drawn as metal."""
 
 
-def read_glb(path: Path) -> tuple[RawPart, ...]:
-    """The parts of a binary glTF file, one for each of its meshes, y up.
+class RefusedError(ValueError):
+    """What a file asks for is not read; the message has the remedy."""
+
+
+def read_glb(path: Path, tell: Tell) -> tuple[RawPart, ...]:
+    """The parts of a binary glTF file, y up: one for each of its materials, or of its meshes without one.
+
+    Args:
+      tell: is told what the file asks for and does not get.
 
     Raises:
-      MeshError: not a .glb file, empty, too large, damaged, or not finite.
+      MeshError: not a .glb file, empty, too large, damaged, not finite, or in need of an extension that is not read.
     """
     if path.stat().st_size > MAX_ENTRY:
         raise MeshError(f"{path} is larger than {MAX_ENTRY} bytes; simplify the model")
     data = path.read_bytes()
     try:
-        _look_through(data)
-        # From bytes, so that nothing beside the file itself can be opened.
-        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
-        meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
-        parts = tuple(_part(i, m) for i, m in enumerate(meshes))
+        parts = _Reader(*_chunks(data), tell).parts()
+    except RefusedError as e:
+        raise MeshError(f"{path} cannot be read: {e}") from e
     except Exception as e:
         why = f"{e}" or type(e).__name__
         raise MeshError(f"{path} cannot be read as .glb ({why[:200]}); export it again as binary glTF 2.0") from e
@@ -48,69 +85,452 @@ def read_glb(path: Path) -> tuple[RawPart, ...]:
     return parts
 
 
-def _look_through(data: bytes) -> None:
-    """Refuse what a parser should not be given.
-
-    Raises:
-      ValueError: no JSON chunk, pictures that are not PNG or JPEG inside the file, accessors beyond any model.
-    """
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON of a file and its binary chunk."""
     magic, version, _ = struct.unpack_from("<4sII", data)
     length, kind = struct.unpack_from("<II", data, 12)
     if magic != b"glTF" or version != 2 or kind != JSON_CHUNK or 20 + length > len(data):
         raise ValueError("the file does not begin as glTF 2.0 does")
-    header = json.loads(data[20 : 20 + length].decode("utf-8"))
-    counts = [a["count"] for a in header.get("accessors", [])]
-    if not all(isinstance(n, int) and 0 <= n <= 3 * MAX_FACES for n in counts) or sum(counts) > 20 * MAX_FACES:
-        raise ValueError(f"an accessor's count is impossible, or the model has more than {MAX_FACES} triangles")
-    start = 20 + length + (-length) % 4 + 8
-    for image in header.get("images", []):
+    header = parse(data[20 : 20 + length], "a header")
+    if not isinstance(header, dict):
+        raise ValueError(f"its header should be an object, got {short(header)}")
+    start = 20 + length + (-length) % 4
+    if start + 8 > len(data):
+        return header, b""
+    size, kind = struct.unpack_from("<II", data, start)
+    return header, data[start + 8 : start + 8 + size] if kind == BINARY_CHUNK else b""
+
+
+@dataclass(frozen=True)
+class _Texture:
+    picture: Image.Image
+    coordinates: int
+    """Which TEXCOORD_n."""
+    turn: np.ndarray
+    """(2, 2), and..."""
+    shift: np.ndarray
+    """(2,): what becomes of those, v down."""
+    clamped: tuple[bool, bool]
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """What a primitive's material says."""
+
+    name: str | None
+    factor: np.ndarray
+    """(4,) linear rgb and opacity."""
+    picture: _Texture | None
+    roughness: float
+    metallic: float
+    both: _Texture | None
+    """Roughness in green, metalness in blue; multiplied by the two numbers."""
+    two_sided: bool
+    least: float | None
+    """Opacity below which a texel is cut away; None for all of them being there."""
+    blended: bool
+
+
+class _Reader:
+    """One file while it is read: what it holds by number."""
+
+    def __init__(self, header: dict[str, Any], body: bytes, tell: Tell) -> None:
+        self.header, self.body, self.tell = header, body, tell
+        counts = [a["count"] for a in header.get("accessors", [])]
+        if not all(isinstance(n, int) and 0 <= n <= 3 * MAX_FACES for n in counts) or sum(counts) > 20 * MAX_FACES:
+            raise ValueError(f"an accessor's count is impossible, or the model has more than {MAX_FACES} triangles")
+        self._check_extensions()
+        self._pictures = [
+            None if image.get("mimeType") in FOREIGN else self._picture(image) for image in header.get("images", [])
+        ]
+        self._surfaces: dict[int, _Surface] = {}
+
+    def _check_extensions(self) -> None:
+        """Refuse what the file cannot be read without; tell what it can do without."""
+        required = self.header.get("extensionsRequired", [])
+        for name in required:
+            if name in REFUSED:
+                raise RefusedError(f"{REFUSED[name]} ({name})")
+            if name not in HONOURED and not name.startswith(LOOKS):
+                raise RefusedError(f"it requires the extension {name}, which is not read; export it again without it")
+        for name in self.header.get("extensionsUsed", []):
+            if name not in HONOURED and name not in required:
+                self.tell(f"its extension {name} is not drawn")
+        if self.header.get("animations"):
+            self.tell("its animations are not played: it stands as it is saved")
+
+    def _picture(self, image: dict[str, Any]) -> Image.Image:
         try:
-            with Image.open(io.BytesIO(_picture(image, header, data[start:])), formats=PICTURES) as opened:
-                opened.verify()
-        except (OSError, SyntaxError) as e:  # the parser would open anything, and leave out what it cannot open
+            with Image.open(io.BytesIO(self._picture_bytes(image)), formats=PICTURES) as opened:
+                if opened.width * opened.height > MAX_PIXELS:
+                    raise ValueError(
+                        f"a picture has {opened.width} x {opened.height} pixels, at most {MAX_PIXELS} are read"
+                    )
+                return shrunk(opened, MAX_TEXTURE)
+        except (OSError, SyntaxError) as e:
             raise ValueError(f"its pictures should be whole {' or '.join(PICTURES)} files stored in it") from e
 
+    def _picture_bytes(self, image: dict[str, Any]) -> bytes:
+        return self._view(image["bufferView"]).tobytes() if "bufferView" in image else _inline(image.get("uri", ""))
 
-def _picture(image: dict[str, Any], header: dict[str, Any], body: bytes) -> bytes:
-    """The bytes of a picture of the file, from its binary chunk `body` or written out as base64."""
-    if "bufferView" not in image:
-        _, comma, text = str(image.get("uri", "")).partition("base64,")
-        try:
-            return base64.b64decode(text, validate=True) if comma else b""
-        except binascii.Error:
-            return b""
-    view = header["bufferViews"][image["bufferView"]]
-    first = view.get("byteOffset", 0)
-    return body[first : first + view["byteLength"]] if first >= 0 else b""
+    def _view(self, number: int) -> memoryview:
+        """The bytes of a buffer view."""
+        view = self.header["bufferViews"][number]
+        if "EXT_meshopt_compression" in view.get("extensions", {}):
+            raise RefusedError(f"{REFUSED['EXT_meshopt_compression']} (EXT_meshopt_compression)")
+        buffer = self.header["buffers"][view["buffer"]]
+        data = _inline(buffer["uri"]) if "uri" in buffer else self.body
+        first, size = view.get("byteOffset", 0), view["byteLength"]
+        if number < 0 or first < 0 or first + size > len(data):
+            raise ValueError(f"buffer view {number} lies outside the file")
+        return memoryview(data)[first : first + size]
+
+    def _accessor(self, number: int, width: int) -> np.ndarray:
+        """(n, width) float64, normalised where it says so, sparse values put in."""
+        accessor = self.header["accessors"][number]
+        kind, held = np.dtype(KINDS[accessor["componentType"]]), WIDTHS[accessor["type"]]
+        if number < 0 or held != width:
+            raise ValueError(f"accessor {number} should hold {width} numbers each")
+        count, sparse = accessor["count"], accessor.get("sparse")
+        if "bufferView" in accessor:
+            out = self._numbers(accessor, kind, count, held).copy()
+        elif sparse:
+            out = np.zeros((count, held), kind)
+        else:
+            raise ValueError(f"accessor {number} has no data")
+        if sparse:
+            where = self._numbers(sparse["indices"], None, sparse["count"], 1)[:, 0]
+            out[where] = self._numbers(sparse["values"], kind, sparse["count"], held)
+        out = out.astype(np.float64)
+        return np.maximum(out / np.iinfo(kind).max, -1.0) if accessor.get("normalized") and kind.kind in "iu" else out
+
+    def _numbers(self, where: dict[str, Any], kind: np.dtype | None, count: int, width: int) -> np.ndarray:
+        kind = kind or np.dtype(KINDS[where["componentType"]])
+        view = self.header["bufferViews"][where["bufferView"]]
+        step = view.get("byteStride") or kind.itemsize * width
+        data = self._view(where["bufferView"])
+        return np.ndarray((count, width), kind, data, where.get("byteOffset", 0), (step, kind.itemsize))
+
+    def parts(self) -> tuple[RawPart, ...]:
+        """All triangles of the scene, gathered by what they look like."""
+        gathered: dict[object, list[RawPart]] = {}
+        faces = 0
+        for number, (node, matrix) in enumerate(self._nodes()):
+            for primitive in self.header["meshes"][node["mesh"]]["primitives"]:
+                for part in self._primitive(node, primitive, matrix, number):
+                    faces += len(part.faces)
+                    if faces > MAX_FACES:
+                        raise ValueError(f"it has more than {MAX_FACES} triangles; simplify the model")
+                    key = (part.name, part.finish, id(part.image), part.two_sided, part.least, part.uv is None)
+                    gathered.setdefault(key, []).append(part)
+        return tuple(_joined(parts) for parts in gathered.values())
+
+    def _nodes(self) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+        """The nodes of the scene that have a mesh, with their (4, 4) matrices."""
+        nodes = self.header.get("nodes", [])
+        self.matrices: dict[int, np.ndarray] = {}
+        children = {c for n in nodes for c in n.get("children", ())}
+        scenes = self.header.get("scenes")
+        roots = (
+            scenes[self.header.get("scene", 0)].get("nodes", []) if scenes else sorted({*range(len(nodes))} - children)
+        )
+        if scenes and len(scenes) > 1:
+            self.tell(f"it has {len(scenes)} scenes, of which one is read")
+        ways = [(root, np.eye(4)) for root in reversed(roots)]
+        meshes, seen = [], 0
+        while ways:
+            number, above = ways.pop()
+            seen += 1
+            if seen > MAX_NODES:
+                raise ValueError(f"it has more than {MAX_NODES} nodes, or one below itself")
+            node = nodes[number]
+            matrix = self.matrices[number] = above @ _matrix(node)
+            if "mesh" in node:
+                meshes.append((node, matrix))
+            ways += [(child, matrix) for child in reversed(node.get("children", ()))]
+        yield from meshes
+
+    def _primitive(
+        self, node: dict[str, Any], primitive: dict[str, Any], matrix: np.ndarray, number: int
+    ) -> Iterator[RawPart]:
+        attributes = primitive["attributes"]
+        faces = self._faces(primitive)
+        if not len(faces):
+            return
+        vertices = self._vertices(node, primitive)
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise ValueError(f"a face of node {number} names a vertex that is not there")
+        if "skin" in node and "JOINTS_0" in attributes:
+            vertices = self._skinned(node, attributes, vertices)
+            matrix = np.eye(4)
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+        if not (np.abs(vertices) <= FARTHEST).all() or not np.abs(face_normals(vertices, faces)).max() > 0:
+            raise ValueError(f"mesh {number} has vertices that are not finite, or no area")
+        surface = self._surface(primitive.get("material"), "COLOR_0" in attributes)
+        colours = np.ones((len(vertices), 4))
+        if "COLOR_0" in attributes:
+            given = self.header["accessors"][attributes["COLOR_0"]]
+            read = self._accessor(attributes["COLOR_0"], WIDTHS[given["type"]])
+            colours[:, : read.shape[1]] = read
+        yield from self._dressed(surface, f"mesh_{number}", vertices, faces, attributes, colours)
+
+    def _faces(self, primitive: dict[str, Any]) -> np.ndarray:
+        """(m, 3) int64; none for points and lines, which are told."""
+        mode, attributes = primitive.get("mode", 4), primitive["attributes"]
+        count = self.header["accessors"][attributes["POSITION"]]["count"]
+        if "bufferView" not in self.header["accessors"][attributes["POSITION"]] and DRACO in primitive.get(
+            "extensions", {}
+        ):
+            raise RefusedError(f"{REFUSED[DRACO]} ({DRACO})")
+        corners = np.arange(count)
+        if "indices" in primitive:
+            corners = self._accessor(primitive["indices"], 1)[:, 0].astype(np.int64)
+        if mode == 4:
+            return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+        steps = np.arange(max(0, len(corners) - 2))
+        if mode == 5:  # every second one of a strip is wound the other way
+            order = np.stack([steps, steps + 1 + steps % 2, steps + 2 - steps % 2], axis=1)
+        elif mode == 6:
+            order = np.stack([steps * 0, steps + 1, steps + 2], axis=1)
+        else:
+            self.tell("its points and lines are left out: they have no surface")
+            return np.empty((0, 3), np.int64)
+        faces = corners[order]
+        return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+
+    def _vertices(self, node: dict[str, Any], primitive: dict[str, Any]) -> np.ndarray:
+        """(n, 3) positions, moved by what morph targets weigh at rest."""
+        out = self._accessor(primitive["attributes"]["POSITION"], 3)
+        weights = node.get("weights") or self.header["meshes"][node["mesh"]].get("weights") or ()
+        for weight, target in zip(weights, primitive.get("targets", ())):
+            if weight and "POSITION" in target:
+                out = out + weight * self._accessor(target["POSITION"], 3)
+        return out
+
+    def _skinned(self, node: dict[str, Any], attributes: dict[str, int], vertices: np.ndarray) -> np.ndarray:
+        """(n, 3) vertices in the pose that the skeleton is saved in (section 3.7.3.3); world."""
+        skin = self.header["skins"][node["skin"]]
+        self.tell("its skeleton does not move: it stands in the pose that it is saved in")
+        joints = np.stack([self.matrices.get(j, np.eye(4)) for j in skin["joints"]])
+        if "inverseBindMatrices" in skin:
+            inverse = self._accessor(skin["inverseBindMatrices"], 16).reshape(-1, 4, 4).transpose(0, 2, 1)
+            joints = joints @ inverse[: len(joints)]
+        out, total = np.zeros((len(vertices), 3)), np.zeros((len(vertices), 1))
+        whole = np.concatenate([vertices, np.ones((len(vertices), 1))], axis=1)
+        for k in range(8):
+            if f"JOINTS_{k}" not in attributes:
+                break
+            which = self._accessor(attributes[f"JOINTS_{k}"], 4).astype(int)
+            weights = self._accessor(attributes[f"WEIGHTS_{k}"], 4)
+            for i in range(4):
+                moved = np.einsum("nij,nj->ni", joints[which[:, i]], whole)[:, :3]
+                out, total = out + weights[:, i : i + 1] * moved, total + weights[:, i : i + 1]
+        return out / np.maximum(total, 1e-9)
+
+    def _surface(self, number: int | None, coloured: bool) -> _Surface:
+        if number is None:  # nobody said what it is: neither the format's bare metal, nor brighter than paper
+            grey = np.array([1.0, 1, 1, 1]) if coloured else np.array([*[0.6038] * 3, 1.0])
+            return _Surface(None, grey, None, 0.7, 0.0, None, False, None, False)
+        if number not in self._surfaces:
+            self._surfaces[number] = self._read_surface(self.header["materials"][number])
+        return self._surfaces[number]
+
+    def _read_surface(self, material: dict[str, Any]) -> _Surface:
+        core, more = material.get("pbrMetallicRoughness", {}), material.get("extensions", {})
+        factor, picture = core.get("baseColorFactor", [1, 1, 1, 1]), core.get("baseColorTexture")
+        roughness, metallic, both = (
+            core.get("roughnessFactor", 1.0),
+            core.get("metallicFactor", 1.0),
+            core.get("metallicRoughnessTexture"),
+        )
+        name = material.get("name") or None
+        if older := more.get("KHR_materials_pbrSpecularGlossiness"):
+            factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
+            roughness, metallic, both = 1 - older.get("glossinessFactor", 1.0), 0.0, None
+        shown = f"material {name!r}"
+        if metallic == 1.0 and both is None and "metallicFactor" not in core:
+            self.tell(f"{shown} says nothing of metal, which makes it metal in glTF; give it a metallicFactor")
+        for field in ("normalTexture", "emissiveTexture"):
+            if field in material:
+                self.tell(f"the {field} of {shown} is not drawn")
+        if any(material.get("emissiveFactor", ())):
+            self.tell(f"{shown} does not glow by its emissiveFactor; name it in 'glow', and its light in 'emits'")
+        factor = np.array([float(x) for x in factor])
+        if factor.shape != (4,) or not (np.abs(factor) <= 1e6).all():
+            raise ValueError(f"{shown} should have a colour of four numbers")
+        mode = material.get("alphaMode", "OPAQUE")
+        if clear := more.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0):
+            factor[3] = min(factor[3] if mode == "BLEND" else 1.0, 1 - 0.9 * float(clear))
+            mode = "BLEND"
+        least = {"MASK": float(material.get("alphaCutoff", 0.5)), "BLEND": FADED}.get(mode)
+        return _Surface(
+            name,
+            factor,
+            self._texture(picture, shown),
+            float(roughness),
+            float(metallic),
+            self._texture(both, shown),
+            bool(material.get("doubleSided", False)),
+            least,
+            mode == "BLEND",
+        )
+
+    def _texture(self, info: dict[str, Any] | None, shown: str) -> _Texture | None:
+        if info is None:
+            return None
+        texture = self.header["textures"][info["index"]]
+        if "source" not in texture:
+            others = sorted(texture.get("extensions", {"no extension": {}}))
+            raise RefusedError(
+                next((f"{REFUSED[n]} ({n})" for n in others if n in REFUSED), f"a texture of {shown} has no picture")
+            )
+        sampler = self.header["samplers"][texture["sampler"]] if "sampler" in texture else {}
+        wraps = sampler.get("wrapS"), sampler.get("wrapT")
+        picture = self._pictures[texture["source"]]
+        if picture is None:
+            raise RefusedError(f"a texture of {shown} is neither PNG nor JPEG; export it again with such textures")
+        mirror = wraps[0] == MIRRORED, wraps[1] == MIRRORED
+        change = info.get("extensions", {}).get("KHR_texture_transform", {})
+        c, s = np.cos(float(change.get("rotation", 0.0))), np.sin(float(change.get("rotation", 0.0)))
+        turn = np.array([[c, s], [-s, c]]) * np.array(change.get("scale", [1.0, 1.0]), float)
+        return _Texture(
+            mirrored(picture, *mirror) if any(mirror) else picture,
+            int(change.get("texCoord", info.get("texCoord", 0))),
+            turn / (1.0 + np.array(mirror))[:, None],
+            np.array(change.get("offset", [0.0, 0.0]), float) / (1.0 + np.array(mirror)),
+            (wraps[0] == CLAMPED, wraps[1] == CLAMPED),
+        )
+
+    def _coordinates(self, texture: _Texture, attributes: dict[str, int], faces: np.ndarray) -> np.ndarray | None:
+        """(m, 3, 2) uv of the corners, v up; None, and told, where the mesh has none."""
+        name = f"TEXCOORD_{texture.coordinates}"
+        if name not in attributes:
+            self.tell(f"a mesh has a texture and no {name}; it is drawn in the texture's mean colour")
+            return None
+        uv = self._accessor(attributes[name], 2) @ texture.turn.T + texture.shift
+        if not (np.abs(uv) <= FARTHEST).all():
+            raise ValueError("texture coordinates are not finite")
+        half = 0.5 / np.array(texture.picture.size)
+        uv = np.where(texture.clamped, np.clip(uv, half, 1 - half), uv)
+        return (uv * [1, -1] + [0, 1])[faces]
+
+    def _dressed(
+        self,
+        surface: _Surface,
+        mesh: str,
+        vertices: np.ndarray,
+        faces: np.ndarray,
+        attributes: dict[str, int],
+        colours: np.ndarray,
+    ) -> Iterator[RawPart]:
+        """The faces with their colours; metal ones apart from others, where a texture says which are."""
+        image = uv = None
+        tint = colours[faces].mean(axis=1) * surface.factor  # (m, 4) linear
+        if surface.picture is not None:
+            uv = self._coordinates(surface.picture, attributes, faces)
+            image = surface.picture.picture
+            if uv is None:
+                mean = np.asarray(image.convert("RGB"), float).reshape(-1, 3).mean(0) / 255
+                tint[:, :3] *= to_linear(mean)
+                image = None
+        opacity = float(np.clip(tint[:, 3].mean(), 0, 1)) if surface.blended else 1.0
+        least = surface.least
+        if image is not None:
+            even = tint[:, :3].mean(0)
+            if np.ptp(tint[:, :3], axis=0).max() > 0.02:
+                self.tell(f"the colours of the vertices of {mesh} are averaged over its texture")
+            image = self._tinted(image, even)
+            if least is not None and image.mode == "RGBA":
+                least = min(1.0, least / max(float(tint[:, 3].mean()), 1e-6)) if not surface.blended else least
+            elif image.mode == "RGBA":
+                image = self._tinted(image.convert("RGB"), np.ones(3))
+        elif surface.least is not None and not surface.blended and tint[:, 3].mean() < surface.least:
+            self.tell(f"{mesh} is left out: its opacity is below its alphaCutoff")
+            return
+        shades = to_srgb(tint[:, :3])
+        flat = shades.mean(0)
+        if image is None and np.ptp(shades, axis=0).max() > 1 / 255:
+            image, uv = palette(shades)
+        red, green, blue = (round(float(c), 4) for c in flat)
+        rough, metal = np.full(len(faces), surface.roughness), np.full(len(faces), surface.metallic)
+        if surface.both is not None and (at := self._coordinates(surface.both, attributes, faces)) is not None:
+            values = sampled(surface.both.picture.convert("RGB"), at.mean(axis=1))
+            rough, metal = rough * values[:, 1], metal * values[:, 2]
+        area = np.linalg.norm(face_normals(vertices, faces), axis=1) + 1e-30
+        for chosen in (metal >= METAL, metal < METAL):
+            if chosen.any():
+                finish = Finish(
+                    (red, green, blue, round(opacity, 4)),
+                    roughness=round(float(np.average(rough[chosen], weights=area[chosen])), 3),
+                    metallic=round(float(np.average(metal[chosen], weights=area[chosen])), 3),
+                )
+                corners = None if uv is None else uv[chosen]
+                yield RawPart(
+                    surface.name or mesh,
+                    vertices,
+                    faces[chosen],
+                    corners,
+                    finish,
+                    image,
+                    two_sided=surface.two_sided,
+                    least=least if image is not None and image.mode == "RGBA" else None,
+                )
+
+    def _tinted(self, image: Image.Image, factor: np.ndarray) -> Image.Image:
+        """The picture times a colour, each made once, so that parts that share it are told to look alike."""
+        key = (id(image), tuple(np.round(factor, 4)), image.mode)
+        held = self.__dict__.setdefault("_made", {})
+        if key not in held:
+            held[key] = (tinted(image, factor, linear=True), image)
+        return held[key][0]
 
 
-def _part(i: int, mesh: trimesh.Trimesh) -> RawPart:
-    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    if not (np.abs(vertices) <= FARTHEST).all() or not np.abs(face_normals(vertices, faces)).max() > 0:
-        raise ValueError(f"mesh {i} has vertices that are not finite, or no area")
-    material = getattr(mesh.visual, "material", None)
-    name = str(getattr(material, "name", None) or f"mesh_{i}")
-    factor = getattr(material, "baseColorFactor", None)
-    color = np.array([204, 204, 204, 255] if factor is None else factor, dtype=float) / 255.0
-    red, green, blue, alpha = (round(float(c), 4) for c in color)
-    rough, metal = (getattr(material, f, None) for f in ("roughnessFactor", "metallicFactor"))
-    finish = Finish(
-        (red, green, blue, alpha),
-        roughness=0.7 if rough is None else float(rough),
-        metallic=0.0 if metal is None else float(metal),
+def _inline(uri: str) -> bytes:
+    """The bytes that a data: URI spells out in base64.
+
+    Raises:
+      ValueError: it is none: nothing beside the file itself is opened.
+    """
+    _, comma, text = str(uri).partition("base64,")
+    if not (comma and str(uri).startswith("data:")):
+        raise ValueError("its pictures should be whole PNG or JPEG files, and its buffers lie, stored in it")
+    try:
+        return base64.b64decode(text, validate=True)
+    except binascii.Error as e:
+        raise ValueError("what it spells out as base64 is damaged") from e
+
+
+def _matrix(node: dict[str, Any]) -> np.ndarray:
+    """(4, 4) of a node relative to its parent."""
+    if "matrix" in node:
+        return np.array(node["matrix"], float).reshape(4, 4).T
+    x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
     )
-    picture, uv = getattr(material, "baseColorTexture", None), getattr(mesh.visual, "uv", None)
-    if picture is None or uv is None or len(uv) != len(vertices):
-        return RawPart(name, vertices, faces, None, finish)
-    coords = np.asarray(uv, dtype=np.float64)
-    if not (np.abs(coords) <= FARTHEST).all():
-        raise ValueError(f"mesh {i} has texture coordinates that are not finite")
-    return RawPart(name, vertices, faces, coords[faces], finish, _shrunk(picture))
+    out = np.eye(4)
+    out[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
+    out[:3, 3] = node.get("translation", [0, 0, 0])
+    return out
 
 
-def _shrunk(picture: Image.Image) -> Image.Image:
-    if picture.width * picture.height > MAX_PIXELS:
-        raise ValueError(f"a picture has {picture.width} x {picture.height} pixels, at most {MAX_PIXELS} are read")
-    picture = picture.convert("RGBA" if "A" in picture.getbands() else "RGB")
-    picture.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
-    return picture
+def _joined(parts: list[RawPart]) -> RawPart:
+    """Parts that look alike as one."""
+    first = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    one = parts[0]
+    return RawPart(
+        one.name,
+        np.concatenate([p.vertices for p in parts]),
+        np.concatenate([p.faces + k for p, k in zip(parts, first)]),
+        None if one.uv is None else np.concatenate([p.uv for p in parts if p.uv is not None]),
+        one.finish,
+        one.image,
+        two_sided=one.two_sided,
+        least=one.least,
+    )

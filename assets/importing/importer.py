@@ -7,8 +7,9 @@ Sweet Home 3D does itself. The asset frame (assets.records.MeshPart) is (x, -z, 
 
 from __future__ import annotations
 
+import functools
 import io
-import json
+import logging
 import struct
 import warnings
 import zipfile
@@ -18,16 +19,22 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.closure import code_digest
 from assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
 from assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
 from assets.importing.mtl_finish import corrected, finish_of
-from assets.importing.obj import MeshError, MtlMaterial, libraries, parse_mtl, parse_obj
+from assets.importing.obj import Group, MeshError, MtlMaterial, Obj, decoded, libraries, parse_mtl, parse_obj
 from assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from assets.importing.sh3f import Pack, PackError
+from assets.importing.textures import cut, filled, palette, shrunk, tinted
+from assets.json_file import read_json
 from assets.records import Finish, ImportRecipe, MeshPart, bounds
+
+log = logging.getLogger(__name__)
 
 READER = "assets.importing.own"
 """The module that imports models of all formats: its code is part of every cache key."""
@@ -45,10 +52,16 @@ ROUNDING = 0.5
 SOFT = ("cloth", "bedding", "leather", "terry")
 SOFT_CREASE = np.radians(62.0)
 """Covers of what is padded, and the angle at which faces of those share a smooth normal: six faces make a round arm."""
+HOLES = 2
+"""Times the budget that the triangles of one part may be after the holes of its texture are cut."""
+CLEAR = 0.3
+"""What keeps texels fainter than this is blended, not masked: its opacity is the mean over them."""
 FOLDS = 9_000
 """Faces by which the bedding of a model may grow to hold its folds, each part by its area."""
 
 
+Tell = Callable[[str], None]
+"""Is told in words what a model asks for and does not get."""
 Reader = Callable[[str], bytes]
 """The bytes of a file by its name; PackError or FileNotFoundError where there is none."""
 
@@ -68,73 +81,178 @@ class RawPart:
     image: Image.Image | None = None
     cover: str | None = None
     """What it wears, folds alone where it has an image (assets.importing.covers)."""
+    two_sided: bool = False
+    """Seen from behind, too, where it is open."""
+    least: float | None = 0.5
+    """Opacity below which texels of the image are cut away; None for none."""
 
 
 def import_model(pack: Pack, recipe: ImportRecipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
     """The parts of a library's model (the OBJ entry `obj`, that of the recipe's key if None), from
     the cache if it is there and sound."""
     obj = obj or pack.entries[recipe.model or recipe.key].model
-    return cached(recipe, pack.digest, cache, lambda: read_obj(pack.read, obj, f"{pack.path.name}: {obj}"))
+    read = functools.partial(read_obj, pack.read, obj, f"{pack.path.name}: {obj}")
+    return cached(recipe, pack.digest, cache, lambda tell: read(), quiet=True)  # the packs are reviewed
 
 
 def cached(
-    recipe: ImportRecipe, source: str, cache: Path, read: Callable[[], tuple[RawPart, ...]]
+    recipe: ImportRecipe, source: str, cache: Path, read: Callable[[Tell], tuple[RawPart, ...]], *, quiet: bool = False
 ) -> tuple[MeshPart, ...]:
-    """The finished parts of `recipe`; `read` and the import run only when the cache lacks them.
+    """The finished parts of `recipe`; `read` and the import run only when the cache lacks them. What they tell is
+    logged each time, unless `quiet`.
 
     Args:
       source: digest of the pack or file that `read` reads.
     """
     folder = Path(cache) / "assets" / source[:16]
-    told = {k: v for k, v in asdict(recipe).items() if k != "model" or v}
-    stem = recipe.key.replace("/", "__") + "-" + digest(code_digest(READER, without=APART), told)[:12]
+    facts = {k: v for k, v in asdict(recipe).items() if k != "model" or v}
+    stem = recipe.key.replace("/", "__") + "-" + digest(code_digest(READER, without=APART), facts)[:12]
     parts = _load(folder, stem)
     if parts is None:
-        _save(folder, stem, finish_parts(read(), recipe))
+        told: dict[str, None] = {}
+        finished = finish_parts(read(told.setdefault), recipe, told.setdefault)
+        _save(folder, stem, finished, list(told))
         parts = _load(folder, stem)
     if parts is None:
         raise PackError(f"{folder / stem} cannot be read back after writing; check the disk and delete {folder}")
-    return parts
+    for words in () if quiet else parts[1]:
+        log.warning("model %s: %s", recipe.key, words)
+    return parts[0]
 
 
-def read_obj(read: Reader, name: str, where: str, remedy: str = "install the pack again") -> tuple[RawPart, ...]:
+def read_obj(
+    read: Reader, name: str, where: str, remedy: str = "install the pack again", tell: Tell | None = None
+) -> tuple[RawPart, ...]:
     """The parts of the OBJ file `name`, with its MTL and textures read by `read`.
 
     Args:
       remedy: what to do about a texture that cannot be read.
+      tell: is told what the files ask for and do not get. None for the packs, which were reviewed without: colours of
+        their materials and vertices then do not tint textures, and a material's texture is all or nothing.
 
     Raises:
       MeshError, PackError: damaged or missing files.
     """
     folder = PurePosixPath(name).parent
-    obj = parse_obj(read(name).decode("latin-1"), where)
+    obj = parse_obj(decoded(read(name)), where)
+    own, say = tell is not None, tell or _silent
     materials: dict[str, MtlMaterial] = {}
-    for library in obj.libraries:
-        materials |= parse_mtl((_read_if_there(read, str(folder / library)) or b"").decode("latin-1"))
-    images: dict[str, Image.Image | None] = {}
-    parts = []
+    for statement in obj.libraries:
+        whole, *several = (_read_if_there(read, n) for n in _library_names(folder, statement))
+        found = [data for data in (several if whole is None else [whole]) if data is not None]
+        if not found:
+            say(f"its material library {statement!r} is not there; put it beside the model")
+        for data in found:
+            materials |= parse_mtl(decoded(data))
+    for what in obj.unread:
+        say(f"its {what} are left out; export them as triangles")
+    pictures = _Pictures(read, folder, remedy, say)
+    parts: list[RawPart] = []
     for group in obj.groups:
-        material = materials.get(group.material, MtlMaterial(group.material))
-        image = None
-        if material.texture and (group.uv_corners >= 0).all():
-            if material.texture not in images:
-                images[material.texture] = _image(read, _texture_name(folder, material.texture), remedy)
-            image = images[material.texture]
-        uv = obj.uvs[group.uv_corners] if image is not None else None
-        parts.append(
-            RawPart(group.material, obj.vertices, group.corners, uv, finish_of(material, image is not None), image)
-        )
+        material = materials.get(group.material)
+        if material is None:
+            if group.material:
+                say(f"no library has its material {group.material!r}; it is drawn in grey")
+            grey = (1.0,) * 3 if own and obj.colours is not None else MtlMaterial("").diffuse
+            material = MtlMaterial(group.material, diffuse=(grey[0], grey[1], grey[2]))
+        _tell_of(material, say)
+        image = pictures.of(material)
+        there = np.asarray((group.uv_corners >= 0).all(axis=1))
+        if own and image is not None and not there.all():
+            say(f"some faces of material {material.name!r} have no texture coordinates; they have the mean colour")
+        if not own and not there.all():
+            there[:] = False
+        for chosen in (there, ~there):
+            if chosen.any() or not len(chosen):
+                parts.append(_obj_part(obj, group, chosen, material, image, own))
     return tuple(parts)
+
+
+def _obj_part(
+    obj: Obj, group: Group, chosen: np.ndarray, material: MtlMaterial, image: Image.Image | None, own: bool
+) -> RawPart:
+    """Those faces of a group that all have texture coordinates, or none."""
+    corners, uv = group.corners[chosen], None
+    shades = np.broadcast_to(material.diffuse, (len(corners), 3))
+    if own and obj.colours is not None:
+        shades = shades * obj.colours[corners].mean(axis=1)
+    if image is not None and material.texture is not None and (group.uv_corners[chosen] >= 0).all():
+        uv = obj.uvs[group.uv_corners[chosen]] * material.texture.scale + material.texture.shift
+        if material.texture.clamped:
+            uv = np.clip(uv, 0.5 / np.array(image.size), 1 - 0.5 / np.array(image.size))
+        if own and shades.mean() > 0:  # black beside a texture is what exporters write for "see there"
+            image = tinted(image, shades.mean(axis=0), linear=False)
+    elif image is not None and own:
+        shades, image = shades * np.asarray(image.convert("RGB"), float).reshape(-1, 3).mean(0) / 255, None
+    else:
+        image = None
+    if image is None and own and len(shades) and np.ptp(shades, axis=0).max() > 1 / 255:
+        image, uv = palette(shades)
+    red, green, blue = (float(c) for c in (shades.mean(axis=0) if own and len(shades) else material.diffuse))
+    finish = finish_of(replace(material, diffuse=(red, green, blue)), image is not None)
+    return RawPart(group.material, obj.vertices, corners, uv, finish, image)
+
+
+def _tell_of(material: MtlMaterial, say: Tell) -> None:
+    if material.dissolve is None and material.transparency is not None and material.transparency >= 1:
+        say(f"material {material.name!r} has Tr 1, which means fully clear; it is taken for opaque, write d to be sure")
+    if any(material.emission):
+        say(f"material {material.name!r} does not glow by its Ke; name it in 'glow', and its light in 'emits'")
+    for statement in dict.fromkeys(material.unread):
+        say(f"the {statement} of material {material.name!r} is not drawn")
+
+
+class _Pictures:
+    """The textures of one OBJ file, each opened once."""
+
+    def __init__(self, read: Reader, folder: PurePosixPath, remedy: str, say: Tell) -> None:
+        self._read, self._folder, self._remedy, self._say = read, folder, remedy, say
+        self._held: dict[object, Image.Image | None] = {}
+
+    def of(self, material: MtlMaterial) -> Image.Image | None:
+        """The colours of a material's texture, and its opacity map as their transparency; None for none."""
+        if material.texture is None:
+            if material.opacity_map is not None:
+                self._say(f"the map_d of material {material.name!r} is not drawn without a map_Kd")
+            return None
+        key = material.texture.name, material.opacity_map
+        if key not in self._held:
+            image = self._open(material.texture.name)
+            if image is not None and material.opacity_map is not None:
+                opacity = self._open(material.opacity_map.name)
+                if opacity is not None:
+                    grey = opacity.getchannel("A") if opacity.mode == "RGBA" else opacity.convert("L")
+                    image = image.convert("RGB")
+                    image.putalpha(grey.resize(image.size))
+            self._held[key] = image
+        return self._held[key]
+
+    def _open(self, name: str) -> Image.Image | None:
+        if name not in self._held:
+            self._held[name] = _image(self._read, _texture_name(self._folder, name), self._remedy)
+            if self._held[name] is None:
+                self._say(f"its texture {name!r} is not there; put it beside the model")
+        return self._held[name]
+
+
+def _silent(words: str) -> None:
+    """For models that nobody has to be told of."""
 
 
 def obj_files(read: Reader, name: str) -> tuple[str, ...]:
     """The MTL files and textures that the OBJ file `name` names, whether they are there or not."""
     folder, found = PurePosixPath(name).parent, []
-    for library in libraries(read(name).decode("latin-1")):
-        found.append(str(folder / library))
-        materials = parse_mtl((_read_if_there(read, found[-1]) or b"").decode("latin-1"))
-        found += [_texture_name(folder, m.texture) for m in materials.values() if m.texture]
+    for statement in libraries(decoded(read(name))):
+        for library in _library_names(folder, statement):
+            found.append(library)
+            for m in parse_mtl(decoded(_read_if_there(read, library) or b"")).values():
+                found += [_texture_name(folder, t.name) for t in (m.texture, m.opacity_map) if t is not None]
     return tuple(dict.fromkeys(found))
+
+
+def _library_names(folder: PurePosixPath, statement: str) -> tuple[str, ...]:
+    """The files that an mtllib statement may mean: one whose name has blanks, or several."""
+    return tuple(dict.fromkeys(_texture_name(folder, n.strip('"')) for n in (statement, *statement.split())))
 
 
 def _texture_name(folder: PurePosixPath, texture: str) -> str:
@@ -149,13 +267,20 @@ def _read_if_there(read: Reader, name: str) -> bytes | None:
         return None
 
 
-def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[MeshPart, Image.Image | None]]:
-    """Sized, turned, welded, decimated and shaded parts with their texture images.
+def finish_parts(
+    raw: tuple[RawPart, ...], recipe: ImportRecipe, tell: Tell = lambda words: None
+) -> list[tuple[MeshPart, Image.Image | None]]:
+    """Sized, turned, welded, decimated, cut and shaded parts with their texture images.
+
+    Args:
+      tell: is told what of the model is not drawn as it says.
 
     Raises:
       MeshError: nothing is left, or numbers are not finite.
     """
-    raw = tuple(_looking(p, dict(recipe.looks)) for p in raw if p.name not in recipe.dropped)
+    budget = recipe.faces or next(n for side, n in FACE_BUDGETS if max(recipe.size) <= side)
+    looking = (_looking(p, dict(recipe.looks)) for p in raw if p.name not in recipe.dropped)
+    raw = tuple(p for p in (_cut(p, HOLES * budget, tell) for p in looking) if len(p.faces))
     if not raw:
         raise MeshError(f"{recipe.key} has no faces; the model is empty or damaged")
     placed = _placed(raw, recipe)
@@ -172,7 +297,6 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
     if not prepared:
         raise MeshError(f"{recipe.key} has only degenerate faces; the model is damaged")
     total = sum(len(f) for _, _, f, _ in prepared)
-    budget = recipe.faces or next(n for side, n in FACE_BUDGETS if max(recipe.size) <= side)
     bedding = sum(_area(v, f) for p, v, f, _ in prepared if p.cover == "bedding")
     out = []
     for part, points, faces, uv in prepared:
@@ -187,12 +311,58 @@ def finish_parts(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[tuple[M
             points, faces, uv = rounded(points, faces, uv, _crease(part), room)
         keep = sound_faces(points, faces)  # folding and clipping may flatten a sliver
         faces, uv = faces[keep], None if uv is None else uv[keep]
-        if sheet:
-            out.append(
-                _part(part, points, np.ascontiguousarray(faces[:, ::-1]), None if uv is None else uv[:, ::-1], recipe)
-            )
+        if part.two_sided and not sheet:
+            faces, uv, back = _turned_out(points, faces, uv)
+        else:
+            back = np.full(len(faces), sheet)
+        if back.any():
+            behind = np.ascontiguousarray(faces[back][:, ::-1])
+            out.append(_part(part, points, behind, None if uv is None else uv[back][:, ::-1], recipe))
         out.append(_part(part, points, faces, uv, recipe))
     return _to_size(out, recipe.size)
+
+
+def _cut(part: RawPart, room: int, tell: Tell) -> RawPart:
+    """The part without what its texture's transparency takes away, the texture without transparency."""
+    image, least, finish = part.image, part.least, part.finish
+    if image is None or part.uv is None or image.mode != "RGBA":
+        return part
+    vertices, faces, uv = part.vertices, part.faces, part.uv
+    if least is not None:
+        made = cut(vertices, faces, uv, image, least, room)
+        if made is None:
+            tell(f"the holes in the texture of material {part.name!r} are too fine to be cut; it is drawn without them")
+        else:
+            vertices, faces, uv = made
+        alpha = np.asarray(image.getchannel("A")) / 255.0
+        seen = alpha[alpha >= least]
+        if least < CLEAR and len(seen) and seen.mean() < 0.95:
+            finish = replace(finish, color=(*finish.color[:3], round(finish.color[3] * float(seen.mean()), 4)))
+    image = filled(image, least or 0.0)
+    return replace(part, vertices=vertices, faces=faces, uv=uv, image=image, finish=finish)
+
+
+def _turned_out(
+    points: np.ndarray, faces: np.ndarray, uv: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """The faces of a part that its maker calls two-sided: of closed pieces, those wound inside out are turned; of
+    open ones, (m,) bool says that they need a back."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, which, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    n = len(faces)
+    meets = np.repeat(np.arange(n), 3), n + faces.reshape(-1)  # faces and vertices as nodes of one graph
+    links = coo_matrix((np.ones(3 * n), meets), shape=(n + len(points),) * 2)
+    piece = connected_components(links, directed=False)[1][:n]
+    rim = (counts[which.reshape(-1)].reshape(-1, 3) != 2).any(axis=1)
+    is_open = np.zeros(piece.max() + 1, bool)
+    is_open[piece[rim]] = True
+    middle = points[faces].reshape(-1, 3).mean(axis=0)
+    volume = np.bincount(piece, np.linalg.det(points[faces] - middle))
+    inside_out = (~is_open & (volume < 0))[piece]
+    faces = np.where(inside_out[:, None], faces[:, ::-1], faces)
+    if uv is not None:
+        uv = np.where(inside_out[:, None, None], uv[:, ::-1], uv)
+    return faces, uv, is_open[piece]
 
 
 def _area(points: np.ndarray, faces: np.ndarray) -> float:
@@ -222,16 +392,14 @@ def _placed(raw: tuple[RawPart, ...], recipe: ImportRecipe) -> list[np.ndarray]:
     low, high = used.min(axis=0), used.max(axis=0)
     if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.ptp(used, axis=0).max() <= 0:
         raise MeshError(f"{recipe.key} has no extent or is not finite; the model is damaged")
-    yaw = round(recipe.yaw)
-    width, depth, height = recipe.size
-    if yaw % 180 == 90:
-        width, depth = depth, width
-    scale = np.array([width, height, depth]) / np.where(high - low > 1e-9, high - low, 1.0)
-    centre = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     angle = np.radians(recipe.yaw)
     c, s = np.round(np.cos(angle), 12), np.round(np.sin(angle), 12)
     spin = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    return [((v - centre) * scale)[:, [0, 2, 1]] * [1.0, -1.0, 1.0] @ spin for v in turned]
+    upright = [(v - low)[:, [0, 2, 1]] * [1.0, -1.0, 1.0] @ spin for v in turned]
+    used = np.concatenate([v[np.unique(p.faces)] for p, v in zip(raw, upright)])
+    low, high = used.min(axis=0), used.max(axis=0)
+    scale = np.array(recipe.size) / np.where(high - low > 1e-9, high - low, 1.0)
+    return [(v - [*(low + high)[:2] / 2, low[2]]) * scale for v in upright]
 
 
 def _part(
@@ -268,24 +436,16 @@ def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
             with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
                 if opened.width * opened.height > MAX_PIXELS:
                     raise PackError(f"texture {name} has {opened.width} x {opened.height} pixels; make it smaller")
-                clear = opened.mode in ("RGBA", "LA") or "transparency" in opened.info
-                image = opened.convert("RGBA" if clear else "RGB")
+                return shrunk(opened, MAX_TEXTURE)
         except UnidentifiedImageError as e:
             raise PackError(f"texture {name} cannot be read: it is none of {', '.join(FORMATS)}; {remedy}") from e
         except PackError:
             raise
         except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as e:
             raise PackError(f"texture {name} cannot be read ({e}); {remedy}") from e
-    if clear and np.asarray(image)[..., 3].min() > 250:
-        image = image.convert("RGB")
-    scale = MAX_TEXTURE / max(image.size)
-    if scale < 1.0:
-        width, height = (max(1, round(s * scale)) for s in image.size)
-        image = image.resize((width, height), Image.Resampling.LANCZOS)
-    return image
 
 
-def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]]) -> None:
+def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]], told: list[str]) -> None:
     """Write textures, then the arrays, then the manifest that makes both believed."""
     sums: dict[str, str] = {}
     arrays: dict[str, np.ndarray] = {}
@@ -306,22 +466,23 @@ def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | Non
     with atomic_path(folder / f"{stem}.npz") as temporary:
         np.savez(temporary, allow_pickle=False, **arrays)
         sums[f"{stem}.npz"] = digest(temporary.read_bytes())
-    write_json(folder / f"{stem}.json", {"finishes": finishes, "sha256": sums})
+    write_json(folder / f"{stem}.json", {"finishes": finishes, "told": told, "sha256": sums})
 
 
-def _load(folder: Path, stem: str) -> tuple[MeshPart, ...] | None:
-    """The cached parts, or None where a file is missing or does not match its checksum."""
+def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | None:
+    """The cached parts and what they tell, or None where a file is missing or does not match its checksum."""
     try:
-        manifest = json.loads((folder / f"{stem}.json").read_text())
+        manifest = read_json(folder / f"{stem}.json")
         files = {name: (folder / name).read_bytes() for name in manifest["sha256"]}
         if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
             return None
         finishes = [_finish(row, folder) for row in manifest["finishes"]]
         with np.load(io.BytesIO(files[f"{stem}.npz"]), allow_pickle=False) as arrays:
-            return tuple(
+            parts = tuple(
                 MeshPart(arrays[f"v{i}"], arrays[f"f{i}"], arrays[f"n{i}"], arrays[f"t{i}"], finish)
                 for i, finish in enumerate(finishes)
             )
+        return parts, [str(words) for words in manifest["told"]]
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
         return None
 

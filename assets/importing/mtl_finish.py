@@ -57,6 +57,8 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
             alpha = min(alpha, 0.35)
     elif SHINY.search(name):
         roughness = min(roughness, 0.4)
+    roughness = roughness if material.roughness is None else material.roughness
+    metallic = metallic if material.metallic is None else material.metallic
     red, green, blue = (round(float(c), 4) for c in color)
     return Finish(
         (red, green, blue, round(max(alpha, 0.1), 3)),

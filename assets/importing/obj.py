@@ -1,13 +1,17 @@
 """Wavefront OBJ and MTL, read into index arrays per material.
 
 Why not trimesh's loader: it cuts polygons into fans, which fills the hollows of the concave ones
-that the packs are full of, and it keeps neither smoothing nor transparency apart.
+that the packs are full of, and it keeps neither smoothing nor transparency apart. tinyobjloader has
+release candidates only.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +22,27 @@ MAX_CORNERS = 20_000
 """Of one polygon."""
 
 
+Polygon = tuple[list[str], int, int]
+"""The corners of a face as written, and how many vertices and texture coordinates stand above it."""
+UNREAD = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "curved surfaces"}
+MAPS = {"map_kd": "texture", "map_d": "opacity_map"}
+OPTIONS = {"s": 3, "o": 3, "t": 3, "mm": 2}
+"""Numbers that an option of a map may take; others take one or a word."""
+
+
 class MeshError(ValueError):
     """A mesh that cannot be used: says where and why."""
+
+
+@dataclass(frozen=True)
+class MtlMap:
+    """A picture that an MTL file names, and how it is laid on: texture coordinates times `scale` plus `shift`."""
+
+    name: str
+    """As written: relative to the MTL file."""
+    scale: tuple[float, float] = (1.0, 1.0)
+    shift: tuple[float, float] = (0.0, 0.0)
+    clamped: bool = False
 
 
 @dataclass(frozen=True)
@@ -31,10 +54,26 @@ class MtlMaterial:
     specular: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shininess: float = 0.0
-    opacity: float = 1.0
+    dissolve: float | None = None
+    """d: opacity."""
+    transparency: float | None = None
+    """Tr: 1 - d by the format; some programs write opacity here."""
     illum: int = 2
-    texture: str | None = None
-    """File name of map_Kd, relative to the MTL file."""
+    roughness: float | None = None
+    metallic: float | None = None
+    texture: MtlMap | None = None
+    """map_Kd."""
+    opacity_map: MtlMap | None = None
+    """map_d."""
+    unread: tuple[str, ...] = ()
+    """Statements about pictures that are not drawn, such as map_Bump."""
+
+    @property
+    def opacity(self) -> float:
+        """`dissolve`, or else what `transparency` leaves; a Tr of 1 alone is taken for opacity: nobody models air."""
+        if self.dissolve is not None:
+            return self.dissolve
+        return 1.0 if self.transparency is None or self.transparency >= 1 else 1.0 - self.transparency
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +95,11 @@ class Obj:
     """(k, 2) float64."""
     groups: tuple[Group, ...]
     libraries: tuple[str, ...]
-    """Names of the MTL files it wants."""
+    """What its mtllib statements say: the names of one or more MTL files each."""
+    colours: np.ndarray | None = None
+    """(n, 3) sRGB of the vertices, where the file gives them."""
+    unread: tuple[str, ...] = ()
+    """Statements of geometry that is left out: lines, points, curves, surfaces."""
 
 
 def parse_obj(text: str, where: str) -> Obj:
@@ -67,75 +110,117 @@ def parse_obj(text: str, where: str) -> Obj:
     """
     vertices: list[str] = []
     uvs: list[str] = []
-    faces: dict[str, list[list[str]]] = {}
-    libraries: list[str] = []
+    faces: dict[str, list[Polygon]] = {}
+    libraries, unread = [], set()
     current = faces.setdefault("", [])
-    for line in text.replace("\\\n", " ").splitlines():
-        head, _, rest = line.lstrip().partition(" ")
+    for head, rest in _statements(text):
         if head == "v":
-            vertices.append(rest)
+            vertices.append(rest.partition("#")[0])
         elif head == "vt":
-            uvs.append(rest)
+            uvs.append(rest.partition("#")[0])
         elif head == "f":
-            current.append(rest.split())
+            current.append((rest.partition("#")[0].split(), len(vertices), len(uvs)))
         elif head == "usemtl":
-            current = faces.setdefault(rest.strip(), [])
+            current = faces.setdefault(rest, [])
         elif head == "mtllib":
-            libraries.append(rest.strip())
+            libraries.append(rest)
+        elif head in UNREAD:
+            unread.add(UNREAD[head])
     points = _numbers(vertices, 3, where)
-    coords = _numbers(uvs, 2, where)
+    coords = _numbers([v if len(v.split()) > 1 else f"{v} 0" for v in uvs], 2, where)
     groups = tuple(_group(name, polygons, points, len(coords), where) for name, polygons in faces.items() if polygons)
     groups = tuple(g for g in groups if len(g.corners))
     if not groups:
         raise MeshError(f"{where} has no faces; the model is empty or damaged")
     if (total := sum(len(g.corners) for g in groups)) > MAX_FACES:
         raise MeshError(f"{where} has {total} triangles, at most {MAX_FACES} are read; simplify the model")
-    return Obj(points, coords, groups, tuple(dict.fromkeys(libraries)))
+    colours = _colours(vertices, where)
+    return Obj(points, coords, groups, tuple(dict.fromkeys(libraries)), colours, tuple(sorted(unread)))
 
 
 def libraries(text: str) -> tuple[str, ...]:
-    """The names of the MTL files that an OBJ file wants, without reading its mesh."""
-    found = [line.lstrip().partition(" ") for line in text.replace("\\\n", " ").splitlines()]
-    return tuple(dict.fromkeys(rest.strip() for head, _, rest in found if head == "mtllib"))
+    """What the mtllib statements of an OBJ file say, without reading its mesh."""
+    return tuple(dict.fromkeys(rest for head, rest in _statements(text) if head == "mtllib"))
+
+
+def decoded(data: bytes) -> str:
+    """The text of an OBJ or MTL file, which is UTF-8 today and was Latin-1 once."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _statements(text: str) -> Iterator[tuple[str, str]]:
+    """The first word and the rest of every line; a backslash at its end joins it with the next."""
+    for line in re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines():
+        head, *rest = line.split(None, 1) or [""]
+        yield head, rest[0].strip() if rest else ""
 
 
 def parse_mtl(text: str) -> dict[str, MtlMaterial]:
-    """The materials of an MTL file by name; lines it does not know are ignored."""
+    """The materials of an MTL file by name; statements it does not know are ignored."""
     materials: dict[str, MtlMaterial] = {}
     name = None
-    for line in text.splitlines():
-        words = line.split()
-        if not words:
-            continue
-        head, rest = words[0], words[1:]
+    for head, rest in _statements(text):
         if head == "newmtl":
-            name = line.split(None, 1)[1].strip() if rest else ""
+            name = rest
             materials[name] = MtlMaterial(name)
-        elif name is not None and (change := _material_field(head, rest, line)):
-            materials[name] = dataclasses.replace(materials[name], **change)
+        elif name is not None and rest:
+            old = materials[name]
+            if head.lower().startswith(("map_", "bump", "disp", "decal", "norm", "refl")):
+                change = {MAPS[head.lower()]: _map(rest)} if head.lower() in MAPS else {"unread": (*old.unread, head)}
+            else:
+                change = _material_field(head, rest.partition("#")[0].split())
+            materials[name] = dataclasses.replace(old, **change)
     return materials
 
 
-def _material_field(head: str, rest: list[str], line: str) -> dict:
+def _material_field(head: str, rest: list[str]) -> dict[str, Any]:
     colors = {"Kd": "diffuse", "Ks": "specular", "Ke": "emission"}
+    shares = {"d": "dissolve", "Tr": "transparency", "Pr": "roughness", "Pm": "metallic"}
     try:
         if head in colors:
             values = [min(1.0, max(0.0, float(x))) for x in rest[:3]]
             return {colors[head]: tuple(values) if len(values) == 3 else (values[0],) * 3}
+        if head in shares:
+            return {shares[head]: min(1.0, max(0.0, float(rest[-1])))}
         if head == "Ns":
             return {"shininess": float(rest[0])}
-        if head == "d":
-            return {"opacity": min(1.0, max(0.0, float(rest[-1])))}
-        if head == "Tr":
-            return {"opacity": min(1.0, max(0.0, 1.0 - float(rest[-1])))}
         if head == "illum":
             return {"illum": int(float(rest[0]))}
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         return {}
-    if head == "map_Kd" and rest:
-        text = line.split(None, 1)[1].strip()
-        return {"texture": rest[-1] if text.startswith("-") else text}
     return {}
+
+
+def _map(text: str) -> MtlMap:
+    """A picture's options and its name, which may hold blanks."""
+    found: dict[str, Any] = {}
+    while option := re.match(r"-(\w+)\s+", text):
+        text, number = text[option.end() :], re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+")
+        values: list[float] = []
+        while len(values) < OPTIONS.get(option[1], 1) and (m := number.match(text)):
+            values.append(float(m[1]))
+            text = text[m.end() :]
+        if option[1] == "clamp":
+            found["clamped"] = text.split(None, 1)[0] == "on"
+        elif option[1] in ("s", "o") and values:
+            first = 1.0 if option[1] == "s" else 0.0
+            found["scale" if option[1] == "s" else "shift"] = (values[0], values[1] if len(values) > 1 else first)
+        if not values and " " in text:  # a word: on, off, l
+            text = text.split(None, 1)[1]
+    return MtlMap(text.strip().strip('"'), **found)
+
+
+def _colours(lines: list[str], where: str) -> np.ndarray | None:
+    """(n, 3) sRGB that follow the positions on the lines of vertices, from 0 to 1 or to 255; None for none."""
+    if not lines or any(len(line.split()) < 6 for line in lines):
+        return None
+    colours = _numbers([" ".join(line.split()[3:]) for line in lines], 3, where)
+    return np.clip(colours / (255.0 if colours.max() > 1.0 else 1.0), 0, 1)
 
 
 def _numbers(lines: list[str], width: int, where: str) -> np.ndarray:
@@ -153,15 +238,15 @@ def _numbers(lines: list[str], width: int, where: str) -> np.ndarray:
     return out
 
 
-def _group(name: str, polygons: list[list[str]], points: np.ndarray, uv_count: int, where: str) -> Group:
+def _group(name: str, polygons: list[Polygon], points: np.ndarray, uv_count: int, where: str) -> Group:
     by_size: dict[int, list[list[int]]] = {}
     try:
-        for words in polygons:
+        for words, vertices, uvs in polygons:
             if len(words) > 2:
                 parts = [w.split("/") for w in words]
-                v = [_index(p[0], len(points)) for p in parts]
-                t = [_index(p[1], uv_count) if len(p) > 1 and p[1] else -1 for p in parts]
-                by_size.setdefault(len(words), []).append(v + t)
+                v = [_index(p[0], vertices, len(points)) for p in parts]
+                t = [_index(p[1], uvs, uv_count) if len(p) > 1 and p[1] else -1 for p in parts]
+                by_size.setdefault(len(words), []).append(v + (t if min(t) >= 0 else [-1] * len(t)))
     except (ValueError, IndexError) as e:
         raise MeshError(f"{where} has a face with a bad index ({e}); the model is damaged") from e
     corners, uv_corners = [np.empty((0, 3), np.int64)], [np.empty((0, 3), np.int64)]
@@ -177,9 +262,10 @@ def _group(name: str, polygons: list[list[str]], points: np.ndarray, uv_count: i
     return Group(name, np.concatenate(corners), np.concatenate(uv_corners))
 
 
-def _index(word: str, count: int) -> int:
+def _index(word: str, before: int, count: int) -> int:
+    """From 0 on, of `count`; a negative one counts back from the `before` that stand above it in the file."""
     i = int(word)
-    i = i - 1 if i > 0 else count + i
+    i = i - 1 if i > 0 else before + i if i < 0 else -1
     if not 0 <= i < count:
         raise IndexError(f"index {word} of {count}")
     return i

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from assets.cache import digest
 from assets.importing.glb import read_glb
-from assets.importing.importer import RawPart, Reader, cached, import_model, obj_files, read_obj
+from assets.importing.importer import RawPart, Reader, Tell, cached, import_model, obj_files, read_obj
 from assets.importing.mtl_finish import corrected
 from assets.importing.obj import MeshError
 from assets.importing.sh3f import MAX_ENTRY, open_pack
@@ -95,7 +95,7 @@ def import_own(model: OwnModel, recipe: ImportRecipe, cache: Path) -> tuple[Mesh
         entry = pack.entries[model.entry]
         return import_model(pack, replace(recipe, rotation=entry.rotation), cache, entry.model)
     read = read_glb if model.file.suffix.lower() == ".glb" else _read_obj_file
-    return cached(recipe, source_digest(model), cache, lambda: read(model.file))
+    return cached(recipe, source_digest(model), cache, lambda tell: read(model.file, tell))
 
 
 def source_digest(model: OwnModel) -> str:
@@ -123,15 +123,20 @@ def _digest_of(read: Reader, name: str) -> str | None:
         return None
 
 
-def _read_obj_file(path: Path) -> tuple[RawPart, ...]:
-    return read_obj(_reader(path), path.name, str(path), remedy="save it again as PNG, JPEG, BMP or TGA")
+def _read_obj_file(path: Path, tell: Tell) -> tuple[RawPart, ...]:
+    return read_obj(_reader(path), path.name, str(path), "save it again as PNG, JPEG, BMP or TGA", tell)
 
 
 def _reader(path: Path) -> Reader:
-    """Reads files named relative to `path`, none outside its folder."""
+    """Reads files named relative to `path`, none outside its folder. A file of another folder, or of a name in other
+    capitals, is looked for beside `path`: models are moved, and made where capitals do not count."""
 
     def read(name: str) -> bytes:
         file = _inside(path.parent, name)
+        if file is None or not file.is_file():
+            last = PurePosixPath(name).name.lower()
+            beside = [p.name for p in sorted(path.parent.iterdir()) if p.name.lower() == last]
+            file = _inside(path.parent, beside[0]) if beside else None
         if file is None or not file.is_file():
             raise FileNotFoundError(name)
         if file.stat().st_size > MAX_ENTRY:

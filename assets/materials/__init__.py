@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
 from pathlib import Path
 
 import cv2
@@ -12,6 +11,7 @@ import numpy as np
 
 from assets.cache import atomic_path, digest, write_json
 from assets.closure import code_digest
+from assets.json_file import read_json
 from assets.materials import maps
 from assets.materials.maps import Maps, normal_map
 from assets.materials.material import ROLES, Material, detail_of
@@ -93,7 +93,7 @@ def _read_mean(folder: Path) -> dict | None:
     """What `_write` noted, or None unless all three maps are whole."""
     note = folder / "maps.json"
     try:
-        mean = json.loads(note.read_text())
+        mean = read_json(note)
         sizes = {name: (folder / name).stat().st_size for name in IMAGES}
         numbers = [*mean["color"], mean["roughness"]]
         whole = (

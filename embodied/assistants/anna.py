@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Intention, Pose, Reply, Route, Sight, Situation, Subtask
+from embodied.interface import Intention, Pose, Reply, Route, Situation, Subtask, Viewpoint
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -73,7 +73,7 @@ class Anna:
             goal=goal,
             path=route.path[: route.path.index(depart) + 1],
         )
-        return Reply(text=route.instruction, image=Sight(name, depart), subtask=subtask)
+        return Reply(text=route.instruction, image=Viewpoint(name, depart), subtask=subtask)
 
 
 class _Home:

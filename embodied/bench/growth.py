@@ -14,6 +14,7 @@ import shapely
 
 from assets.cache import write_bytes, write_json
 from assets.catalogue import Catalogue
+from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
 from embodied.light.baking import bake, forget
 from embodied.light.settings import light_code
@@ -53,7 +54,7 @@ def growth(
     quality: str = "fast",
     areas: Sequence[float] = AREAS,
     progress: Callable[[str], None] = lambda text: None,
-) -> dict:
+) -> Report:
     """Light a house of each area, write `out`/growth.json and `out`/growth.png.
 
     Houses that growth.json already holds, lit by the same code with the same seed and quality, are not lit again.
@@ -62,7 +63,7 @@ def growth(
       seed: of the smallest house; the others have the next ones.
 
     Returns:
-      What growth.json holds: houses, slope of the logarithms and what they were measured with.
+      The facts are what growth.json holds: houses, slope of the logarithms and what they were measured with.
     """
     path = Path(out) / "growth.json"
     made = {"code": light_code(), "seed": seed, "quality": quality}
@@ -76,7 +77,7 @@ def growth(
     facts = {**made, "slope": slope(found), "aim": AIM, "houses": houses}
     write_json(path, facts, indent=1)
     write_bytes(Path(out) / "growth.png", figure(found, quality))
-    return facts
+    return Report(facts, table(facts))
 
 
 def _known(path: Path, made: dict) -> dict[str, dict]:

@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter
 from assets.cache import atomic_path, write_bytes, write_json
 from assets.closure import code_digest
 from embodied import gl
+from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
@@ -68,17 +69,9 @@ class Shot:
     """Seconds of all cores that tracing it took."""
 
 
-@dataclass(frozen=True)
-class LightReport:
-    """What `embodied bench light` shows."""
-
-    facts: dict
-    text: str
-
-
 def compare(
     catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
-) -> LightReport:
+) -> Report:
     """Draw VIEWS rooms of each of HOUSES houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
     Every picture is kept in `out`/shots: a run that was stopped goes on where it was, if the code is the same.
@@ -109,7 +102,7 @@ def compare(
         out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes()
     )
     write_json(out / "light.json", facts, indent=1)
-    return LightReport(facts, table(facts))
+    return Report(facts, table(facts))
 
 
 def viewpoints(

@@ -37,6 +37,15 @@ class Measure:
         return self.value >= self.aim if self.unit in ("1/s", "x") else self.value <= self.aim
 
 
+@dataclass(frozen=True)
+class Report:
+    """What a benchmark shows that is no list of measures."""
+
+    facts: dict
+    text: str
+    """Markdown."""
+
+
 def measure(
     name: str,
     body: Callable[[], object],
@@ -91,7 +100,7 @@ def ratio(name: str, slow: Measure, fast: Measure, *, aim: float | None = None) 
 
 
 def share(name: str, part: Measure, whole: Measure, *, aim: float | None = None) -> Measure:
-    """The time of `part` in that of `whole`, both from one run."""
+    """`part` over `whole`, both from one run: of times, the share of the first; of rates, that of the second's time."""
     repeats = min(part.repeats, whole.repeats)
     return Measure(name, part.value / whole.value, "share", part.low / whole.high, part.high / whole.low, repeats, aim)
 

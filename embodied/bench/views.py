@@ -1,102 +1,68 @@
-"""Whole views before a judge that has seen photographs: how far are its features of ours from those of traced ones?"""
+"""Benchmarks of views of a panorama: angles seen before and new ones, and viewpoints that are not in memory yet."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import functools
+import itertools
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import cv2
-import numpy as np
+from assets.catalogue import Catalogue
+from embodied.bench.seen import FLAT
+from embodied.bench.timing import Measure, measure, one_core
+from embodied.datasets.skyboxes import write_skybox
+from embodied.generate import generate_house
+from embodied.mattersim.pictures import Skyboxes, skybox_folder
+from embodied.render.panorama import VFOV36, Panorama, perspective_grid
+from embodied.world import open_world
 
-from assets.cache import digest, write_bytes
-from assets.closure import code_digest
-from embodied.bench.light import VFOV, viewpoints
-from embodied.light.baking import bake
-from embodied.light.reference import Tracer
-from embodied.render.camera import camera_at
-
-if TYPE_CHECKING:
-    from embodied.world import World
-
-SIZE = (224, 336)
-"""Height and width of a view."""
-RAYS = 32
-"""Per pixel of the traced ones."""
-PITCH = -0.1
-"""Radians by which views look up."""
+SIZE = 512
+"""Side of a face, pixels."""
+VIEWS = 12
+"""Headings of one timed call."""
+AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
+"""Height and width, and how many views per second are promised: of rgb; of rgb, depth and ids."""
+SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and ids": ("rgb", "depth", "ids")}
 
 
-@dataclass(frozen=True, eq=False)
-class ViewPair:
-    """One view twice."""
-
-    house: str
-    drawn: np.ndarray
-    """(h, w, 3) uint8, as the world draws it."""
-    traced: np.ndarray
-    """The same size, by the path tracer alone."""
-
-
-def kept_pair(world: World, folder: Path) -> ViewPair:
-    """The longest view of the largest room of a house; each half from `folder` if the same code has put it there."""
-    _, eye, yaw = viewpoints(world.house, world.catalogue, 1)[0]
-    light = bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "fast")
-
-    def drawn() -> np.ndarray:
-        return world.renderer.view(eye, yaw, PITCH, VFOV, SIZE).rgb
-
-    def traced() -> np.ndarray:
-        camera = camera_at(eye, yaw, PITCH, VFOV)
-        tracer = Tracer(light, world.house, quality="reference", rays=RAYS)
-        return tracer.picture(eye, camera.forward, camera.up, VFOV, SIZE)[0]
-
-    stem, code = folder / world.house.name, code_digest(__name__)
-    return ViewPair(
-        world.name,
-        _kept(Path(f"{stem}_drawn_{digest(world.fingerprint, code)[:16]}.png"), drawn),
-        _kept(Path(f"{stem}_traced_{digest(light.manifest['key'], code)[:16]}.png"), traced),
-    )
+def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
+    """Views per second of processor time of one viewpoint of a flat, on one core."""
+    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, quality="unlit") as world:
+        panorama = world.renderer.panorama(world.graph.positions[0])
+    with one_core(), tempfile.TemporaryDirectory() as folder:
+        for (height, width), colours, everything in AIMS:
+            size, name = (height, width), f"views of {width} x {height}"
+            for shown, channels in SHOWN.items():
+                aim = {"rgb": colours, "rgb, depth and ids": everything}.get(shown)
+                yield _rate(f"{name}, {shown}", functools.partial(_look, panorama, channels, size, lambda k: k), aim)
+            for shown in ("rgb", "rgb, depth and ids"):
+                fresh = itertools.count(VIEWS)
+                look = functools.partial(_look, panorama, SHOWN[shown], size, lambda k, fresh=fresh: next(fresh) + 0.5)
+                yield _rate(f"{name}, {shown}, new angles", look)
+        write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
+        for shown, depth in (("rgb", False), ("rgb and depth", True)):
+            yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", functools.partial(_open, folder, depth))
 
 
-def _kept(path: Path, draw: Callable[[], np.ndarray]) -> np.ndarray:
-    if not path.exists():
-        write_bytes(path, cv2.imencode(".png", draw()[..., ::-1])[1].tobytes())
-    return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Measure:
+    return measure(name, body, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
 
 
-def likeness(pairs: Sequence[ViewPair], features: Callable[[np.ndarray], np.ndarray]) -> dict[str, float | int | None]:
-    """Cosine distances (0: the same, 1: nothing in common) of a judge's features, means over `pairs`.
-
-    Args:
-      features: from (n, h, w, 3) uint8 to (n, k).
-
-    Returns:
-      'views'; 'own', from each view to the path tracer's picture of it; 'others', from each traced picture to those of
-      the other houses, which says how much an 'own' is; 'nearest', the share of views that are nearer to their own
-      traced picture than to all others; None where there are too few.
-    """
-    if not pairs:
-        return {"views": 0, "own": None, "others": None, "nearest": None}
-    drawn, traced = (_unit(features(np.stack([getattr(p, way) for p in pairs]))) for way in ("drawn", "traced"))
-    away, among = 1 - drawn @ traced.T, 1 - traced @ traced.T
-    many = len(pairs) > 1
-    return {
-        "views": len(pairs),
-        "own": float(np.diag(away).mean()),
-        "others": float(among[~np.eye(len(pairs), dtype=bool)].mean()) if many else None,
-        "nearest": float((away.argmin(1) == np.arange(len(pairs))).mean()) if many else None,
-    }
+def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], number: Callable[[int], float]) -> None:
+    """VIEWS level views; `number` turns how many there were into how many steps of 30 degrees one looks to the left."""
+    for k in range(VIEWS):
+        grid = perspective_grid(panorama.size, number(k) * math.pi / 6, 0.0, VFOV36, *size)
+        for channel in channels:
+            panorama.through(grid, channel)
 
 
-def write_pairs(pairs: Sequence[ViewPair], path: Path) -> None:
-    """One sheet (JPEG): every view as drawn, and right of it as traced; two of them in a row."""
-    cells = [np.concatenate([p.drawn, p.traced], axis=1) for p in pairs]
-    cells += [np.full_like(cells[0], 255)] * (-len(cells) % 2)
-    picture = np.concatenate([np.concatenate(cells[k : k + 2], axis=1) for k in range(0, len(cells), 2)])
-    write_bytes(path, cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes())
-
-
-def _unit(x: np.ndarray) -> np.ndarray:
-    return x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
+def _open(folder: str, depth: bool) -> None:
+    """VIEWS times the first picture of a skybox."""
+    for _ in range(VIEWS):
+        boxes = Skyboxes(folder, 1)
+        boxes.rgb("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))
+        if depth:
+            boxes.metres("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))

@@ -12,24 +12,21 @@ import psutil
 from tqdm import tqdm
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, from_values, measure, one_core, ratio, share
+from embodied.bench.timing import Measure, from_values, measure, ratio, share
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
-from embodied.interface import VIEW_PITCHES, VIEW_YAWS, Move
+from embodied.interface import Move
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.render.camera import Camera, face_cameras
 from embodied.render.classic import Renderer
-from embodied.render.panorama import Panorama
 from embodied.scene.model import compile_scene
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 
 LARGE = HouseConfig(area=(400.0, 440.0))
 """A house of about 125 viewpoints; Matterport3D has 117 per building."""
-VIEW_AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
-"""Height and width of perspective views, and how many per second are promised: of rgb; of rgb, depth and ids."""
 TYPICAL = HouseConfig(area=(110.0, 130.0))
 
 
@@ -75,7 +72,6 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: s
         yield share("panorama with depth and ids of rgb alone", whole, colours, aim=1.4)
         panorama = renderer.panorama(eyes[0])
         yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15, aim=15.0)
-        yield from _views(panorama)
     if quality != "unlit":
         with open_world(house, catalogue, cache, size=256, quality="unlit") as plain:
             unlit = _face(plain.renderer, cameras, "unlit", None)
@@ -91,18 +87,6 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: s
 def _face(renderer: Renderer, cameras: Sequence[Camera], quality: str, aim: float | None) -> Measure:
     name, draw = f"256x256 cube face, rgb, {quality}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras]
     return measure(name, draw, per=len(cameras), repeats=5, aim=aim)
-
-
-def _views(panorama: Panorama) -> Iterator[Measure]:
-    """Perspective views of a panorama in memory, on one core: the 36 directions of the literature."""
-    directions = list(zip(VIEW_YAWS, VIEW_PITCHES, strict=True))
-    with one_core():
-        for (height, width), colours, everything in VIEW_AIMS:
-            size, name = (height, width), f"views of {width} x {height}"
-            rgb = lambda size=size: [panorama.view_rgb(yaw, pitch, size=size) for yaw, pitch in directions]
-            whole = lambda size=size: [panorama.view(yaw, pitch, size=size) for yaw, pitch in directions]
-            yield measure(f"{name}, rgb", rgb, "1/s", per=len(directions), aim=colours)
-            yield measure(f"{name}, rgb, depth and ids", whole, "1/s", per=len(directions), aim=everything)
 
 
 def naive_view(house: House, catalogue: Catalogue, eye: np.ndarray) -> Callable[[], None]:

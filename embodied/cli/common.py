@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 PATIENCE = 2.0
 """Seconds after which a bar appears."""
+SELDOM = 30.0
+"""Seconds between two states of a bar that no terminal shows, where each is a line."""
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
@@ -66,11 +68,19 @@ def catalogue_of(args: argparse.Namespace) -> Catalogue:
     return load_catalogue(args.cache, tuple(args.pack), tuple(args.own))
 
 
+def pause() -> float:
+    """Seconds between two states of a progress bar."""
+    return 0.1 if sys.stderr.isatty() else SELDOM
+
+
 class Stages:
     """A bar over the named stages of a command; it appears when they take longer than two seconds."""
 
     def __init__(self, *names: str) -> None:
-        self._names, self._bar = iter(names), tqdm(total=len(names), delay=PATIENCE, leave=False, unit="stage")
+        self._names, self._bar = (
+            iter(names),
+            tqdm(total=len(names), delay=PATIENCE, leave=False, unit="stage", mininterval=pause()),
+        )
         self._bar.set_description_str(next(self._names), refresh=False)
 
     def next(self) -> None:
@@ -87,7 +97,7 @@ class Stages:
 
 def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> Iterable[T]:
     """`items`, with a progress bar that appears when they take longer than two seconds."""
-    return tqdm(items, name, total=total, unit=unit, delay=PATIENCE, leave=False)
+    return tqdm(items, name, total=total, unit=unit, delay=PATIENCE, leave=False, mininterval=pause())
 
 
 def fetch(catalogue: Catalogue, house: House) -> None:

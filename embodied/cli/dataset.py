@@ -3,6 +3,10 @@
 Interrupt it whenever you like: the same command goes on from there, and the files do not depend
 on the number of workers. One house is one unit of work. Whoever needs words only leaves the pictures
 out by --panoramas none; they can be drawn later, by the same command without it.
+
+`embodied dataset from-people --people STUDY.people --data DATA --out DIR` writes DATA again with the words of the
+people of `embodied serve`: their routes for HANNA, VLN and ILIAD, their sub-goals for VNLA, and, where they gave
+stars, rater.json, which says what rater of BANDIT they resemble.
 """
 
 from __future__ import annotations
@@ -11,18 +15,19 @@ import argparse
 import dataclasses
 from collections.abc import Iterable
 
-from embodied.cli.common import add_cache, add_json, add_packs, note, show
-from embodied.cli.options import LOOK_HELP, face, folder_to_write, whole
+from embodied.cli.common import add_cache, add_json, add_packs, note, pause, show
+from embodied.cli.options import HOUSES, LOOK_HELP, any_path, face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import LOOKS, QUALITIES, PictureSettings
 
+FROM_PEOPLE = "from-people"
 WORDS_ONLY = ("hari",)
 """Kinds that are not drawn unless asked: all that HARI's agent perceives are words, its learner and its tables (4.7
 and 4.8) need no pictures, and lighting the houses would be most of the work."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("kind", choices=KINDS, help="what is to be done in the houses")
+    parser.add_argument("kind", choices=(*KINDS, FROM_PEOPLE), help="what is to be done in the houses")
     parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the data set")
     sizes = "; ".join(f"{name}: {described(name)}" for name in SCALES)
     parser.add_argument(
@@ -33,7 +38,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--houses",
-        type=whole(),
+        type=whole(1, HOUSES),
         metavar="N",
         help="instead of --scale: houses to learn from; a tenth to validate, a fifth to test in",
     )
@@ -41,7 +46,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--tasks", type=whole(), metavar="N", help="with --houses: training tasks (default: 100 per house)"
     )
     parser.add_argument(
-        "--test-houses", type=whole(), metavar="N", help="with --houses: houses to test in, with as many tasks each"
+        "--test-houses",
+        type=whole(1, HOUSES),
+        metavar="N",
+        help="with --houses: houses to test in, with as many tasks each",
     )
     parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
     parser.add_argument(
@@ -69,13 +77,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--ood",
-        type=whole(0),
+        type=whole(0, HOUSES),
         default=0,
         metavar="N",
         help="houses out of distribution besides (split 'test_ood'), with furniture, looks, speakers and words that "
         "all other houses then lack (default: %(default)s)",
     )
     parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
+    parser.add_argument("--people", type=any_path, metavar="DIR", help="from-people: the folder of a study")
+    parser.add_argument("--data", type=any_path, metavar="DIR", help="from-people: the data set it was played in")
+    parser.add_argument("--people-only", action="store_true", help="from-people: leave out all routes but people's")
     _add_drawing(parser)
     parser.add_argument(
         "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
@@ -102,7 +113,33 @@ def _add_drawing(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def from_people(args: argparse.Namespace) -> int:
+    """A data set with what people said."""
+    from agents.bandit.ratings import fitted
+    from assets.cache import write_json
+    from embodied.datasets.store import Dataset
+    from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
+    from embodied.serve.sessions import STARS
+
+    if args.people is None or args.data is None:
+        raise ValueError("from-people needs --people, the folder of a study, and --data, the data set it was played in")
+    source, words = Dataset(args.data), worded_by_people(args.people)
+    rated = rated_by_people(args.people, source)
+    data = write_people_dataset(source, words, args.out, only=args.people_only)
+    facts: dict[str, object] = {"folder": str(args.out), "digest": data.digest, "wordings": len(words)}
+    text = f"{data.table()}\n{len(words)} wordings of people; digest {data.digest[:16]}, in {args.out}"
+    if len(rated) > 1:
+        rater = fitted([s for s, _ in rated], [(n - 1) / (STARS - 1) for _, n in rated], STARS - 1)
+        write_json(args.out / "rater.json", dataclasses.asdict(rater))
+        facts["rater"] = dataclasses.asdict(rater)
+        text += f"\n{len(rated)} ratings resemble {rater}, in rater.json"
+    show(args, facts, text)
+    return 0
+
+
 def run(args: argparse.Namespace) -> int:
+    if args.kind == FROM_PEOPLE:
+        return from_people(args)
     from tqdm import tqdm
 
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
@@ -132,7 +169,7 @@ def run(args: argparse.Namespace) -> int:
     )
 
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
-        return tqdm(jobs, "houses", total=total, unit="house")
+        return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
 
     build_dataset(
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray

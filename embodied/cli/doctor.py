@@ -10,6 +10,7 @@ import argparse
 import importlib.metadata
 import platform
 import shutil
+import tempfile
 import warnings
 from dataclasses import asdict, dataclass
 
@@ -166,10 +167,15 @@ def body(_: argparse.Namespace) -> Finding:
 
 
 def disk(args: argparse.Namespace) -> Finding:
-    """Free space where the cache lives."""
-    place = args.cache
+    """Free space where the cache lives, and whether it can be written."""
+    place = args.cache.absolute()
     while not place.exists():
         place = place.parent
+    try:
+        tempfile.TemporaryFile(dir=place).close()
+    except OSError as e:
+        text = f"{args.cache} cannot be written ({e.strerror}), where meshes, light and pictures go"
+        return Finding("cache", False, text, "set EMBODIED_CACHE or --cache to a folder that you may write")
     free = shutil.disk_usage(place).free / 2**30
     return Finding(
         "disk",

@@ -7,7 +7,9 @@ the episodes, to --out.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,7 +18,9 @@ from embodied.cli.options import add_hari_rules, add_rules, any_path, folder_to_
 from embodied.datasets.scale import KINDS
 
 if TYPE_CHECKING:
-    from embodied.interface import Episode
+    from embodied.datasets.store import Dataset
+    from embodied.envs.hari import HariRules
+    from embodied.interface import Assistant, Episode
 
 COLUMNS = {
     "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
@@ -35,6 +39,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
     add_rules(parser)
     add_hari_rules(parser)
+    parser.add_argument(
+        "--assistant", metavar="MODULE:CLASS", help="who answers requests, instead of the kind's own assistant"
+    )
     parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where to write the table and the episodes")
@@ -49,18 +56,36 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    import json
-
-    from assets.cache import write_bytes
     from embodied.datasets.store import Dataset
-    from embodied.evaluation import as_programs, tables
-    from embodied.evaluation.evaluate import LOOKING, agent, agent_names, evaluate
-    from embodied.records import episodes_file, fingerprint, save_lines
+    from embodied.envs.make import assistant_of
+    from embodied.evaluation.evaluate import agent_names
+    from embodied.locks import locked
 
     data = Dataset(args.data)
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     names, variants = args.agent or agent_names(args.kind), hari_rules_of(args)
+    for split in args.split:
+        data.names(split)
+    if unknown := sorted(set(names) - set(agent_names(args.kind))):
+        raise ValueError(f"unknown agents {unknown}; those of {args.kind!r} are {list(agent_names(args.kind))}")
+    if args.assistant:
+        sys.path.insert(0, "")  # a module in the folder one stands in
+    assistant = assistant_of(args.assistant)
+    with locked(args.out) if args.out else contextlib.nullcontext():
+        return judge(args, data, names, variants, assistant)
+
+
+def judge(
+    args: argparse.Namespace, data: Dataset, names: Sequence[str], variants: HariRules, assistant: Assistant | None
+) -> int:
+    """The table, and what goes into --out."""
+    import json
+
+    from assets.cache import write_bytes
+    from embodied.evaluation import as_programs, tables
+    from embodied.evaluation.evaluate import LOOKING, agent, evaluate
+    from embodied.records import episodes_file, fingerprint, save_lines
 
     def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")
@@ -79,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
         agents = {name: agent(args.kind, name, worlds, args.rules) for name in names}
-        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants)
+        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants, assistant=assistant)
         rows += evaluate(whole, agents, seed=args.seed, limit=args.tasks, keep=keep, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
@@ -93,6 +118,7 @@ def run(args: argparse.Namespace) -> int:
             tasks=args.tasks,
             rules=args.rules,
             hari=dataclasses.asdict(variants),
+            assistant=args.assistant,
         )
         write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))

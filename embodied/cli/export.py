@@ -13,11 +13,20 @@ needs changed. `python -m embodied.mattersim` then runs the programs without a c
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
-from embodied.cli.options import any_path, file_to_write, folder_to_write, video_side, whole
+from embodied.cli.options import (
+    any_path,
+    file_ending_in,
+    file_to_write,
+    folder_to_write,
+    house_folder,
+    video_side,
+    whole,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,9 +72,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
         sub.add_argument(
-            "--house", type=any_path, required=True, metavar="DIR", help="folder that `embodied house` wrote"
+            "--house", type=house_folder, required=True, metavar="DIR", help="folder that `embodied house` wrote"
         )
-        place = folder_to_write if name == "mjcf" else file_to_write
+        place = {"mjcf": folder_to_write, "glb": file_ending_in(".glb"), "usd": file_to_write}[name]
         sub.add_argument("--out", type=place, required=True, metavar="PATH", help="file to write (mjcf: folder)")
         sub.add_argument(
             "--light", choices=("none", "fast", "normal", "high"), default="normal",
@@ -103,10 +112,11 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if args.what in PROGRAMS:
-        return run_program(args)
-    others = {"parquet": run_parquet, "lerobot": run_lerobot}
-    return others.get(args.what, run_house)(args)
+    from embodied.locks import locked
+
+    runs = {"parquet": run_parquet, "lerobot": run_lerobot, **dict.fromkeys(PROGRAMS, run_program)}
+    with locked(args.out) if args.what in (*PROGRAMS, "parquet", "mjcf") else contextlib.nullcontext():
+        return runs.get(args.what, run_house)(args)
 
 
 def run_program(args: argparse.Namespace) -> int:
@@ -137,7 +147,7 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from agents.vision.run import encoder_of
     from embodied.datasets.folders import names_of
 
-    encoder = encoder_of(args)
+    encoder = encoder_of(args.encoder, args.network)
     drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
@@ -177,6 +187,8 @@ def run_lerobot(args: argparse.Namespace) -> int:
     data = Dataset(args.data)
     if args.episodes:
         episodes = [e for path in args.episodes for e in load_lines(path, Episode)]
+        for episode in episodes:
+            data.place_of(episode)
     else:
         whole_split = data.split(args.split)
         expert = agent(data.kind, "shortest")

@@ -18,7 +18,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_json, note, show
-from embodied.cli.options import any_folder, any_path, file_to_write, whole
+from embodied.cli.options import any_folder, any_path, file_ending_in, whole
 
 if TYPE_CHECKING:
     from agents.iliad.nav.showing import NavTold
@@ -47,7 +47,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--word", default="banana", help="the word it is about (default: %(default)s)")
     add_nav_data(parser, required=False)
     parser.add_argument("--teacher", choices=("learned", "grammar"), help="NAV: who describes (default: who taught it)")
-    parser.add_argument("--rrd", type=file_to_write, metavar="FILE", help="NAV: record the first episode, for Rerun")
+    parser.add_argument(
+        "--rrd", type=file_ending_in(".rrd"), metavar="FILE", help="NAV: record the first episode, for Rerun"
+    )
     add_json(parser)
 
 
@@ -113,7 +115,7 @@ def walks(args: argparse.Namespace) -> int:
         raise ValueError(
             "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
         )
-    source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
+    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
     config: NavConfig = config_of(args.student)
     teacher = args.teacher or config.teacher
     if teacher == "learned" and args.shared is None:

@@ -8,12 +8,14 @@ a part of the price: lights.json in its folder lists them.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
+import re
 from typing import TYPE_CHECKING
 
 from assets.cache import write_json
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
-from embodied.cli.options import any_path
+from embodied.cli.options import house_folder, whole
 from embodied.house.house import LANDSCAPES, SEASONS
 
 if TYPE_CHECKING:
@@ -24,9 +26,12 @@ TIMES = {"dawn": 6.5, "morning": 9.0, "noon": 12.5, "afternoon": 15.5, "dusk": 1
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    parser.add_argument("folder", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     parser.add_argument(
-        "--time", metavar="TIME", help=f"one of {', '.join(TIMES)}, or an hour such as 17.5; written into house.json"
+        "--time",
+        type=hour,
+        metavar="TIME",
+        help=f"one of {', '.join(TIMES)}, or an hour such as 17:30 or 17.5; written into house.json",
     )
     parser.add_argument("--weather", choices=("clear", "hazy", "overcast"), help="written into house.json")
     parser.add_argument("--landscape", choices=LANDSCAPES, help="what windows show; written into house.json")
@@ -37,7 +42,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="fast for data sets, normal for looking, high for single pictures (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
-        "--lights", type=int, default=1, metavar="K",
+        "--lights", type=whole(1, 100), default=1, metavar="K",
         help="light it K times: as it is, and with hour, weather and lamps drawn from its seed (default: %(default)s)",
     )  # fmt: skip
     add_cache(parser)
@@ -46,6 +51,18 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from embodied.locks import locked
+
+    if not (args.folder / "house.json").exists():
+        raise FileNotFoundError(f"{args.folder} holds no house.json; name a folder that `embodied house` wrote")
+    changes = [getattr(args, n) for n in ("time", "weather", "lamps", "landscape", "season")]
+    writes = args.lights > 1 or any(c is not None for c in changes)
+    with locked(args.folder) if writes else contextlib.nullcontext():
+        return light(args)
+
+
+def light(args: argparse.Namespace) -> int:
+    """Write the house anew where its sky changes, and light it."""
     from embodied.house.validation import load_house
     from embodied.light import bake_all, lightings_of, progress_bar
 
@@ -55,8 +72,6 @@ def run(args: argparse.Namespace) -> int:
     changed = with_sky(house, args.time, args.weather, args.lamps, args.landscape, args.season)
     if changed.digest != house.digest:
         changed.save(path)
-    if args.lights < 1:
-        raise ValueError(f"--lights should be 1 or more, got {args.lights}")
     lightings = lightings_of(changed, args.lights)
     with progress_bar() as progress:
         bakes = bake_all(lightings, catalogue, args.cache, args.quality, progress=progress)
@@ -81,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
 def with_sky(
     house: House,
-    time: str | None,
+    time: float | None,
     weather: str | None,
     lamps: str | None,
     landscape: str | None = None,
@@ -90,7 +105,7 @@ def with_sky(
     """`house` at another hour, in other weather or surroundings, with its lamps on or off; None keeps what is."""
     sky = house.sky
     if time is not None:
-        sky = dataclasses.replace(sky, hour=hour_of(time))
+        sky = dataclasses.replace(sky, hour=time)
     if weather is not None:
         sky = dataclasses.replace(sky, weather=weather)
     if landscape is not None:
@@ -103,16 +118,15 @@ def with_sky(
     return dataclasses.replace(house, sky=sky, lights=lights)
 
 
-def hour_of(text: str) -> float:
-    """Hours in [0, 24) of a word or a number.
-
-    Raises:
-      ValueError: neither.
-    """
+def hour(text: str) -> float:
+    """Hours in [0, 24) of a word, a number, or hours and minutes."""
     try:
-        hour = TIMES[text] if text in TIMES else float(text)
+        clock = re.fullmatch(r"(\d{1,2}):([0-5]\d)", text)
+        found = int(clock[1]) + int(clock[2]) / 60 if clock else TIMES[text] if text in TIMES else float(text)
     except ValueError:
-        hour = -1.0
-    if not 0 <= hour < 24:
-        raise ValueError(f"--time should be one of {', '.join(TIMES)} or an hour in [0, 24), got {text!r}")
-    return hour
+        found = -1.0
+    if not 0 <= found < 24:
+        raise argparse.ArgumentTypeError(
+            f"should be one of {', '.join(TIMES)} or an hour from 0 to 24 such as 17:30 or 17.5, got {text[:40]!r}"
+        )
+    return found

@@ -24,8 +24,12 @@ if typing.TYPE_CHECKING:
 
 C = typing.TypeVar("C")
 METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD"}
-MOST = 2**31
+MOST = 10**7
 """Largest count that any option takes."""
+HOUSES = 100_000
+"""Most houses of a data set."""
+REPEATS = 1000
+"""Most repeats of a study."""
 
 
 # Types of arguments -----------------------------------------------------------------------------
@@ -33,9 +37,7 @@ MOST = 2**31
 
 def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[str], int]:
     """Whole numbers from `least` to `most`, both included."""
-    wanted = f"{'an even' if even else 'a whole'} number of at least {least}" + (
-        f" and at most {most}" if most < MOST else ""
-    )
+    wanted = f"{'an even' if even else 'a whole'} number of at least {least}"
 
     def read(text: str) -> int:
         try:
@@ -43,7 +45,8 @@ def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[
         except ValueError:
             value = least - 1
         if not least <= value <= most or (even and value % 2):
-            raise argparse.ArgumentTypeError(f"should be {wanted}, got {text[:40]!r}")
+            upto = f" and at most {most}" if most < MOST or value > most else ""
+            raise argparse.ArgumentTypeError(f"should be {wanted}{upto}, got {text[:40]!r}")
         return value
 
     return read
@@ -123,6 +126,26 @@ def file_to_write(text: str) -> Path:
     if found.is_dir():
         raise argparse.ArgumentTypeError(f"{text} is a folder, a file is wanted; name a file in it")
     _refuse_unwritable(found.parent)
+    return found
+
+
+def file_ending_in(*endings: str) -> Callable[[str], Path]:
+    """A file that can be written, of the kind that is written."""
+
+    def read(text: str) -> Path:
+        found = file_to_write(text)
+        if found.suffix.lower() not in endings:
+            raise argparse.ArgumentTypeError(f"should end in {' or '.join(endings)}, which is written, got {text!r}")
+        return found
+
+    return read
+
+
+def house_folder(text: str) -> Path:
+    """A folder that `embodied house` wrote."""
+    found = any_path(text)
+    if found.is_file():
+        raise argparse.ArgumentTypeError(f"{text} is a file; name the folder that it is in, {found.parent}")
     return found
 
 

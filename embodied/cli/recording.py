@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import bar, note
-from embodied.cli.options import file_to_write, video_side
+from embodied.cli.options import file_ending_in, video_side
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +31,7 @@ def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> No
     group = parser.add_argument_group("recording")
     group.add_argument(
         "--rrd",
-        type=file_to_write,
+        type=file_ending_in(".rrd"),
         metavar="FILE",
         help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
     )
@@ -78,7 +78,10 @@ def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
 def add_video(parser: argparse.ArgumentParser) -> None:
     """The options of `film`."""
     parser.add_argument(
-        "--video", type=file_to_write, metavar="MP4", help="write what the agent sees and what is said as a video"
+        "--video",
+        type=file_ending_in(".mp4"),
+        metavar="MP4",
+        help="write what the agent sees and what is said as a video",
     )
     parser.add_argument(
         "--video-size",

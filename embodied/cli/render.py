@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-from embodied.cli.options import LOOK_HELP, any_path, face, file_to_write, whole
+from embodied.cli.options import LOOK_HELP, face, file_ending_in, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import BACKENDS, LOOKS, QUALITIES, PictureSettings
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    parser.add_argument("folder", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     parser.add_argument("--size", type=face, default=512, help="side of a cube face in pixels (default: %(default)s)")
     parser.add_argument(
         "--quality",
@@ -35,8 +35,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP)
     parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
-    parser.add_argument("--equirect", type=file_to_write, metavar="PNG", help="where to write the picture of --node")
-    parser.add_argument("--view", type=file_to_write, metavar="PNG", help="where to write a view from --node")
+    parser.add_argument(
+        "--equirect", type=file_ending_in(".png"), metavar="PNG", help="where to write the picture of --node"
+    )
+    parser.add_argument("--view", type=file_ending_in(".png"), metavar="PNG", help="where to write a view from --node")
     parser.add_argument("--yaw", type=float, default=0.0, help="degrees of --view, counter-clockwise (default: 0)")
     parser.add_argument(
         "--camera",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, show
-from embodied.cli.options import LOOK_HELP, any_path, face, whole
+from embodied.cli.options import LOOK_HELP, face, house_folder, whole
 from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
@@ -25,7 +25,7 @@ AGENTS = ("shortest", "random", "forward10")
 
 def add(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--house", type=any_path, metavar="DIR", help="folder that `embodied house` wrote")
+    where.add_argument("--house", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
     parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
     parser.add_argument(

@@ -9,18 +9,24 @@ are made. `embodied dataset from-people` makes a data set of it.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import os
+import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.distribution import DISTRIBUTION
+from embodied.errors import UnableError
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
     from embodied.interface import Agent, Place
+    from embodied.serve.game import AgentMaker
     from embodied.serve.study import Study
 
 LOOPBACK = "127.0.0.1"
@@ -54,7 +60,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+
 def run(args: argparse.Namespace) -> int:
+    if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
+        raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
     from embodied.serve.run import open_study, serve
     from embodied.serve.study import load_study
 
@@ -68,8 +79,6 @@ def run(args: argparse.Namespace) -> int:
     origins = (args.address.rstrip("/"),) if args.address else ()
     opened = open_study(args.study, out, draw, agents_of(args.study.parent / study.data), origins)
     if args.summary:
-        import time
-
         from embodied.serve.results import as_text, summary
 
         facts = summary(opened.server.sessions, time.time())
@@ -78,11 +87,9 @@ def run(args: argparse.Namespace) -> int:
     links = opened.links(address, args.invitations or 0)
     write_secret(out / "links.json", json.dumps(links, indent=1))
     if args.host not in (LOOPBACK, "localhost", "::1"):
-        note(f"listening on {args.host}: everybody who reaches this machine can connect; without TLS, answers can be read")
+        note(f"listening on {args.host}: whoever reaches this machine can connect; without TLS, answers can be read")
     few = {k: v if len(v) <= 3 else [*v[:3], f"... {len(v)} in {out / 'links.json'}"] for k, v in links.items() if v}
     show(args, links, "\n".join(f"{name}: {link}" for name, many in few.items() for link in many))
-    import sys
-
     sys.stdout.flush()
     serve(opened, args.host, args.port)
     return 0
@@ -92,16 +99,17 @@ def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> P
     """The panoramas of a house: the data set's, else drawn into the cache."""
     if data.drawn_pictures(name) is not None:
         return data.folder / "houses" / name / "panoramas.pano"
-    from embodied.world import World
+    from embodied.world import open_world
 
-    place = data.place(name)
-    with data.open_world(name, catalogue_of(args), args.cache, quality=study.quality, size=study.size) as world:
-        with World(place.house, world.catalogue, place.graph, args.cache, world.pictures) as cached:
-            note(f"panoramas of {name}: {study.quality}, faces of {study.size} pixels")
-            return cached.render_all(progress=True)
+    place, catalogue = data.place(name), catalogue_of(args)
+    with open_world(
+        place.house, catalogue, args.cache, graph=place.graph, quality=study.quality, size=study.size
+    ) as world:
+        note(f"panoramas of {name}: {study.quality}, faces of {study.size} pixels")
+        return world.render_all(progress=True)
 
 
-def agents_of(folder: Path) -> Mapping[str, object]:
+def agents_of(folder: Path) -> Mapping[str, AgentMaker]:
     """The policies that a study may name: those without learning, and the agent that ships for its kind of task."""
     from embodied.datasets.store import Dataset
     from embodied.serve.game import POLICIES
@@ -109,18 +117,13 @@ def agents_of(folder: Path) -> Mapping[str, object]:
     data = Dataset(folder)
 
     def shipped(places: Mapping[str, Place]) -> Agent:
+        from agents.common.shipped import SHIPPED_AGENT, SHIPPED_VNLA
+        from agents.hanna.agent import load_agent as hanna
         from agents.vision.drawn import pictures_of
         from agents.vision.features import feature_path, load_bank
+        from agents.vnla.agent import load_agent as vnla
 
-        if data.kind == "vnla":
-            from agents.common.shipped import SHIPPED_VNLA
-            from agents.vnla.agent import load_agent
-
-            agent = load_agent(SHIPPED_VNLA)
-        else:
-            from agents.hanna.agent import load_agent
-
-            agent = load_agent()
+        agent = vnla(SHIPPED_VNLA) if data.kind == "vnla" else hanna(SHIPPED_AGENT)
         pictures = {n: pictures_of(data, n, None) for n in places}
         paths = {n: feature_path(data.folder / "features", agent.encoder_digest, n, pictures[n]) for n in places}
         return agent.policy(load_bank(paths, agent.encoder_digest, places, pictures))

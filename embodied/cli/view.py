@@ -107,13 +107,12 @@ def record_again(
     """Record an episode of a run in its house, drawn again as `args.quality`, and with what its agent saw.
 
     Raises:
-      ValueError: the house is not in the data set.
+      DatasetError: it was played in a house that is not in the data set.
     """
     from viz.recording import record_episode
 
     name = episode.task.world
-    if f"{name}/house.json" not in data.index.files:
-        raise ValueError(f"{data.folder} has no house {name!r}; name the data set of the run")
+    data.place_of(episode)
     seen = looked_at(run).by(episode.agent, name)
     with contextlib.ExitStack() as stack:
         eyes = None

@@ -126,6 +126,8 @@ class UnitFacts:
     """SplitPlan to number of tasks."""
 
 
+DRAWING = ("mitsuba", "drjit", "embreex", "xatlas")
+"""Libraries that light and draw houses, which pictures have in their own keys; houses and words do without."""
 Watch = Callable[[Iterable[str], int], Iterable[str]]
 HouseMaker = Callable[[int, str, HouseConfig, Catalogue], tuple[House, NavGraph]]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
@@ -374,7 +376,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
 
 def program() -> str:
     """A digest of the code and the catalogue that make data sets: what one began, only the same one may finish."""
-    return code_digest(__name__)
+    return code_digest(__name__, without=DRAWING)
 
 
 def write_index(config: DatasetConfig, folder: Path) -> Path:

@@ -12,7 +12,7 @@ import shapely
 from assets.cache import digest
 from embodied.datasets.build import VERSION, DatasetConfig
 from embodied.house.house import House
-from embodied.interface import FindObject, FollowRoute, Route, Task
+from embodied.interface import Episode, FindObject, FollowRoute, Place, Route, Task
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError, from_plain, read_json
 
@@ -211,3 +211,22 @@ def _off_the_graph(path: Sequence[int], graph: NavGraph, edges: Edges) -> str | 
 def _edges(graph: NavGraph) -> Edges:
     """Pairs of neighbours, the smaller number first."""
     return {(min(a, b), max(a, b)) for a, b in graph.edges.tolist()}
+
+
+def check_episode(episode: Episode, place: Place) -> None:
+    """Refuse an episode that was played elsewhere.
+
+    Raises:
+      DatasetError: in another house of this name, or along nodes that this one does not have.
+    """
+    name, n = episode.task.id, len(place.graph.ids)
+    if episode.house != place.house.digest[:16]:
+        raise DatasetError(
+            f"the episode of {name!r} was played in another house of the name {episode.task.world!r} (digest "
+            f"{episode.house or 'unknown'}, this one has {place.house.digest[:16]}); give the data set that it was "
+            "played in, or play it again here"
+        )
+    named = {*episode.nodes, *episode.task.goal_nodes}
+    named.update(v for s in episode.steps for v in (s.pose.node, *s.targets, *s.candidate_nodes))
+    if strange := sorted(v for v in named if v >= n):
+        raise DatasetError(f"the episode of {name!r} names the nodes {strange[:5]}, its house has 0 to {n - 1}")

@@ -110,21 +110,13 @@ def export_lerobot(
         draft.mkdir()
         writer = _Writer(draft, camera)
         for episode in episodes:
-            writer.add(episode, data.place(_house_of(data, episode)), _pictures(data, episode.task.world), succeeded)
+            place = data.place_of(episode)
+            writer.add(episode, place, _pictures(data, episode.task.world), succeeded)
         steps = writer.finish(data)
         if folder.exists():
             folder.rmdir()
         draft.rename(folder)
     return steps
-
-
-def _house_of(data: Dataset, episode: Episode) -> str:
-    name = episode.task.world
-    if not any(name in data.names(split) for split in data.splits):
-        raise DatasetError(
-            f"{data.folder} has no house {name!r}, where {episode.task.id!r} was played; give its own --data"
-        )
-    return name
 
 
 def _pictures(data: Dataset, name: str) -> Path:

@@ -21,6 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from assets.cache import atomic_path, write_bytes
+from embodied.datasets.checks import DatasetError
 from embodied.interface import Ask, Episode, FindObject, FollowRoute, Move, Route, Task
 from embodied.records import load_lines, to_json
 
@@ -106,8 +107,16 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
 
     Raises:
       RecordError: a file that does not hold episodes.
+      DatasetError: episodes that were played elsewhere.
+      ValueError: two files that would become one table.
     """
     folder, files = Path(folder), []
+    tables = {Path(p): re.sub(r"\W+", "_", Path(p).stem) for p in episodes}
+    if twice := [str(p) for p, n in tables.items() if list(tables.values()).count(n) > 1]:
+        raise ValueError(f"{' and '.join(twice)} would become one table; give the files different names")
+    for path in tables:  # all of them are good before any is written
+        for _ in _played(data, path):
+            pass
     for split in data.splits:
         names = data.names(split)
         files += [
@@ -126,11 +135,8 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
                     (route_row(r, n) for n in names for r in data.routes(n)),
                 )
             )
-    for path in episodes:
-        name = re.sub(r"\W+", "_", Path(path).stem)
-        files.append(
-            _write(folder / "episodes" / f"{name}.parquet", EPISODES, map(episode_row, load_lines(Path(path), Episode)))
-        )
+    for path, name in tables.items():
+        files.append(_write(folder / "episodes" / f"{name}.parquet", EPISODES, _played(data, path)))
     write_bytes(folder / "README.md", card(data, [f.relative_to(folder) for f in files]).encode())
     return [*files, folder / "README.md"]
 
@@ -206,6 +212,16 @@ def episode_row(episode: Episode) -> dict[str, object]:
         "requests": episode.requests,
         "record": to_json(episode),
     }
+
+
+def _played(data: Dataset, path: Path) -> Iterator[dict[str, object]]:
+    """Rows of the episodes in a file, each of which was played in this data set."""
+    for number, episode in enumerate(load_lines(path, Episode), 1):
+        try:
+            data.place_of(episode)
+        except DatasetError as e:
+            raise DatasetError(f"{path}:{number}: {e}") from e
+        yield episode_row(episode)
 
 
 def _said(action: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -13,6 +13,7 @@ from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import missing_units, units
 from embodied.datasets.checks import (
     DatasetError,
+    check_episode,
     check_place,
     check_routes,
     check_tasks,
@@ -25,7 +26,9 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
-from embodied.interface import Assistant, FindObject, Language, Place, Route, Task
+from embodied.interface import Assistant, Episode, FindObject, Language, Place, Route, Task
+from embodied.language.plain import PlainLanguage
+from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import RecordError, from_plain, read_lines
 from embodied.render.pictures import PictureSettings
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
     from embodied.world import World
 
 T = TypeVar("T")
+SUBGOALS = "subgoals.jsonl"
+"""In a house's folder: sub-goals in people's words (`embodied dataset from-people`)."""
 ANNA_SPLIT = {
     "train": "train_seen",
     "val_seen": "train_unseen",
@@ -91,6 +96,7 @@ class Dataset:
                 "run the command that began it once more, it goes on from there"
             )
         self.index = read_index(self.folder, self.config)
+        self._places: dict[str, StoredPlace] = {}
 
     @property
     def kind(self) -> str:
@@ -115,9 +121,27 @@ class Dataset:
         wanted = self._split(split)
         return tuple(u.name for u in units(self.scale) if u.group in wanted.all_groups)
 
-    @functools.cache  # noqa: B019 - a data set lives as long as its program
     def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
+        if name not in self._places:
+            self._places[name] = self._read_place(name)
+        return self._places[name]
+
+    def place_of(self, episode: Episode) -> StoredPlace:
+        """The house in which an episode was played.
+
+        Raises:
+          DatasetError: it was played elsewhere.
+        """
+        name = episode.task.world
+        if f"{name}/house.json" not in self.index.files:
+            raise DatasetError(
+                f"{self.folder} has no house {name!r}, where {episode.task.id!r} was played; give its own data set"
+            )
+        check_episode(episode, self.place(name))
+        return self.place(name)
+
+    def _read_place(self, name: str) -> StoredPlace:
         home = self.folder / "houses" / name
         for file in ("house.json", "connectivity.json"):
             self._content(name, file)
@@ -204,7 +228,7 @@ class Dataset:
             check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
             tasks += mine
         if self.kind == "vnla" and split != "train":
-            limits = self._vnla_limits()
+            limits = self._vnla_limits
             tasks = [self._with_limit(t, limits) for t in tasks]
         return tuple(tasks)
 
@@ -223,7 +247,7 @@ class Dataset:
 
         Args:
           houses: only its first so many houses; all if None.
-          language: of VNLA's advisor.
+          language: of VNLA's advisor; people's words where the data set holds some, else plain, if None.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
           vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
@@ -233,12 +257,13 @@ class Dataset:
           DatasetError: an unknown split, or files that were lost or changed.
         """
         names = self.names(name)[:houses]
+        said = self.said(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
         make_env = environment_maker(
             self.kind,
             places,
             wording=ANNA_SPLIT.get(name, ""),
-            language=language,
+            language=language or (PeoplesWords(said, PlainLanguage()) if said else None),
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
             describer=self.describer() if self.kind == "hari" else None,
             hari=hari,
@@ -247,6 +272,11 @@ class Dataset:
         )
         tasks = [t for t in self.tasks(name) if t.world in places]
         return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla, hari), make_env)
+
+    def said(self, names: Iterable[str]) -> tuple[Said, ...]:
+        """Sub-goals in the words of people who spoke of these houses."""
+        spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
+        return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
 
     def describer(self) -> Describer:
         """HARI's descriptions; frequent objects are counted over the training houses."""
@@ -266,7 +296,7 @@ class Dataset:
                 return split
         raise DatasetError(f"unknown split {name!r}; {self.folder} has {list(self.splits)}")
 
-    @functools.cache  # noqa: B019 - as above
+    @functools.cached_property
     def _vnla_limits(self) -> dict[tuple[str, str], int]:
         lengths = [
             (*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon)

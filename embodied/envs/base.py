@@ -33,8 +33,9 @@ from embodied.interface import (
     Stop,
     Subtask,
     Task,
+    Viewpoint,
 )
-from embodied.seeds import stream
+from embodied.seeds import checked_seed, stream
 
 T = TypeVar("T")
 
@@ -81,10 +82,10 @@ class HelpEnv:
           TaskError: unknown world, nodes outside the graph, a goal that is not in the house.
         """
         check_task(task, self.worlds)
-        self.task, self.seed, self.world = task, seed, self.worlds[task.world]
+        self.task, self.seed, self.world = task, checked_seed(seed), self.worlds[task.world]
         self.pose = task.start
         self.mode, self.instruction = Mode.MAIN, task.request
-        self.target: Sight | None = None
+        self.target: Viewpoint | None = None
         self.targets = task.goal_nodes
         self.subtask: Subtask | None = None
         self.time = self.time_on_task = self.requests = 0
@@ -140,6 +141,10 @@ class HelpEnv:
         )
         return self._look() if self.ended is None else None
 
+    def cut_short(self) -> None:
+        """End the episode here, as its horizon does; nothing where it has ended."""
+        self.ended = self.ended or "limit"
+
     def facts(self) -> dict[str, float]:
         """Numbers about the episode so far that its record does not hold."""
         return {}
@@ -158,7 +163,13 @@ class HelpEnv:
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
         return Episode(
-            task=self.task, steps=tuple(self._steps), ended=self.ended, seed=self.seed, agent=agent, budget=self.budget
+            task=self.task,
+            steps=tuple(self._steps),
+            ended=self.ended,
+            seed=self.seed,
+            agent=agent,
+            budget=self.budget,
+            house=self.world.house.digest[:16],
         )
 
     # What a rule with help overrides -------------------------------------------------------------
@@ -251,7 +262,7 @@ class HelpEnv:
             tilt=self.pose.tilt,
             candidates=candidates,
             instruction=self.instruction,
-            target=self.target,
+            target=None if self.target is None else Sight(self.target.world, self.target.node, picture=True),
             mode=self.mode,
             can_ask=self._askable(self.situation),
             requests_left=left,
@@ -261,6 +272,7 @@ class HelpEnv:
             goal_descriptions=goals,
             detections=self._detections(),
             advised=self._advised(),
+            moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
         )
         return self.observation
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import Mode, Reply, Sight
+from embodied.interface import Mode, Reply, Viewpoint
 
 
 class HannaEnv(HelpEnv):
@@ -15,9 +15,7 @@ class HannaEnv(HelpEnv):
         self.instruction = required(reply.text, "text in the reply")  # line 11
         self.target = reply.image  # line 12: I^depart
         self.subtask, self.targets = subtask, (subtask.target,)
-        self.pose = required(
-            subtask.start, "start of the route"
-        )  # line 13: step to the start of the route and look along it
+        self.pose = subtask.start or self.pose  # line 13: step to the start of the route and look along it
         self.time_on_task = 0
 
     def _stopped(self) -> None:
@@ -27,6 +25,6 @@ class HannaEnv(HelpEnv):
         self.mode = Mode.MAIN  # line 20
         self.instruction = self.task.request  # line 21
         goal = required(required(self.subtask, "sub-task").goal, "goal of the sub-task")
-        self.target = Sight(self.task.world, goal)  # line 22: I^{g*}, Eq 4.7
+        self.target = Viewpoint(self.task.world, goal)  # line 22: I^{g*}, Eq 4.7
         self.targets, self.subtask = (goal,), None  # the program's teacher (docs/sources.md, S14)
         self.time_on_task = 0

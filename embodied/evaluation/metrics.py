@@ -38,6 +38,11 @@ def success(episode: Episode, graph: NavGraph) -> float:
     return float(navigation_error(episode, graph) <= episode.task.radius + 1e-9)
 
 
+def strict_success(episode: Episode, graph: NavGraph) -> float:
+    """Success of an episode whose agent said that it is done; running out of steps near a goal is none."""
+    return success(episode, graph) if episode.ended == "stop" else 0.0
+
+
 def oracle_success(episode: Episode, graph: NavGraph) -> float:
     """1 if any visited node lies within the radius of a goal."""
     nearest = min(graph.distance[v, g] for v in episode.nodes for g in episode.task.goal_nodes)

@@ -7,7 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import SupportsIndex, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
 from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
-from embodied.seeds import stream
+from embodied.seeds import checked_seed, stream
 
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
@@ -230,7 +230,10 @@ STAGES: Mapping[str, Stage] = {
 
 
 def generate_house(
-    seed: int, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None, stages: Mapping[str, Stage] = STAGES
+    seed: SupportsIndex,
+    config: HouseConfig = DEFAULT,
+    catalogue: Catalogue | None = None,
+    stages: Mapping[str, Stage] = STAGES,
 ) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
@@ -246,7 +249,9 @@ def generate_house(
 
     Raises:
       HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
+      TypeError: a seed that is no whole number.
     """
+    seed = checked_seed(seed)
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
         draft = Draft(seed, config, catalogue, first=first, stages=stages)

@@ -28,6 +28,7 @@ from embodied.gym.eyes import FAR
 from embodied.gym.playground import AREA, pictures_of
 from embodied.gym.spaces import LARGE
 from embodied.render.pictures import PictureSettings
+from embodied.seeds import checked_seed
 from embodied.world import World, open_world
 
 VIEW = (480, 640)
@@ -59,15 +60,21 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """A start and a goal drawn with this environment's generator; options["world"] chooses the house by name."""
-        super().reset(seed=seed)
-        self.driving.reset(self.np_random, (options or {}).get("world"))
+        world = (options or {}).get("world")
+        if world is not None and world not in self.driving.worlds:
+            raise ValueError(f"there is no house {world!r:.80}; choose one of {sorted(self.driving.worlds)[:8]}")
+        super().reset(seed=None if seed is None else checked_seed(seed))
+        self.driving.reset(self.np_random, world)
         return self.driving.look(), {"world": self.driving.world.name, "request": self.driving.request}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         outcome = self.driving.step(action)
         ended = outcome.ended
         terminated = ended in ("reached", "said")
-        return self.driving.look(), outcome.reward, terminated, ended == "limit", dict(outcome.facts)
+        info: dict[str, Any] = dict(outcome.facts)
+        if ended is not None:
+            info["is_success"] = info["success"] > 0
+        return self.driving.look(), outcome.reward, terminated, ended == "limit", info
 
     def render(self) -> np.ndarray | None:
         """(h, w, 3) uint8: what its camera sees, larger."""

@@ -235,8 +235,13 @@ class Driving:
             return {}
         if sees == ("rgb",):
             return {"rgb": np.ascontiguousarray(self.picture(*size))}
-        view = self.world.renderer.through(self.camera(), size)
-        whole = {"rgb": view.rgb, "depth": np.minimum(view.depth, np.float32(FAR)), "ids": view.ids}
+        renderer, camera, whole = self.world.renderer, self.camera(), {}
+        if "rgb" in sees:
+            view = renderer.through(camera, size)
+            whole["rgb"], depth, whole["ids"] = view.rgb, view.depth, view.ids
+        else:
+            depth, whole["ids"] = renderer.depth_and_ids(camera, size)
+        whole["depth"] = np.minimum(depth, np.float32(FAR))
         return {name: np.ascontiguousarray(whole[name]) for name in sees}
 
     def _facts(self, success: float) -> dict[str, float]:

@@ -1,7 +1,12 @@
 """Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, registered by `import embodied`.
 
     env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", sees=("rgb", "depth"))
-    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR", workers=2)
+    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
+    envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=8, data="DIR", vectorization_mode="async",
+                              vector_kwargs={"context": "spawn"})
+
+The first batch takes its steps in one process and shares what it holds (embodied.gym.in_step); the second is
+Gymnasium's AsyncVectorEnv, a process for each environment.
 
 Without `data` a small furnished flat is generated and lit, which takes a minute or two once. What an
 agent sees is chosen by `sees` (embodied.gym.eyes): by default a perspective view and the features
@@ -18,14 +23,14 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageOps
 
 from assets.cache import default_cache
 from embodied.assistants.ask import QUESTIONS
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.make import AS_PUBLISHED, assistant_of
-from embodied.evaluation.metrics import PER_EPISODE
+from embodied.evaluation.metrics import PER_EPISODE, strict_success
 from embodied.gym.eyes import (
     PIXELS,
     AllEyes,
@@ -38,7 +43,6 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.in_parts import InParts
 from embodied.gym.in_step import InStep, refuse_too_many
 from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
@@ -48,14 +52,21 @@ from embodied.house.house import House
 from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import instance_classes
+from embodied.seeds import checked_seed
 from embodied.world import World
 
 STEP_COST = 0.01
 DETECTIONS = 16
 """Most detections that Ask-v0 shows; the best."""
 LAYOUT = SpaceLayout()
+OWN = ("shaping", "strict", "patience", "needs_stop")
+"""Options of HelpGymEnv that `make` and `make_vec` hand on."""
 VIEW = (480, 640)
 """Height and width of the rendered view, pixels."""
+PLAN = (480, 480)
+"""Height and width that the plan is fitted into, pixels: whatever the house, pictures have one size."""
+WORDS = 64
+"""Height of what is said, pixels."""
 VIEW_ANGLE = np.radians(78.0)
 """Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees; people need it."""
 
@@ -65,7 +76,8 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     Reward: 1 on success at the end, minus 0.01 per step and the price of a question (Ask-v0); HARI: minus the cost
     of the step. With `shaping`, minus the change of the distance to the nearest goal in metres / 10 (in HARI, in
-    edges, Eq 4.20), which leaves the best policy as it is.
+    edges, Eq 4.20), which leaves the best policy as it is. The last info of an episode, however it
+    ends, holds success, is_success (for Stable-Baselines3), spl and the other metrics of every task.
 
     An action that the mask forbids leaves everything as it was and is reported in
     info["invalid_action"]; after `patience` of them the episode is truncated. With `strict` it
@@ -87,22 +99,26 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         shaping: bool = False,
         strict: bool = False,
         patience: int = 20,
+        needs_stop: bool = False,
         render_mode: str | None = None,
+        opened: Sequence[World] = (),
     ) -> None:
         """
         Args:
-          tasks: what `reset` draws from; reset(options={"task": i}) chooses one.
+          tasks: what `reset` draws from; reset(options={"task": ID}) chooses one.
           eyes: what is seen of every place, of the target image too.
+          needs_stop: an episode that runs out of steps near its goal is no success.
+          opened: worlds that `close` closes.
 
         Raises:
-          ValueError: no tasks, or an unknown render mode.
+          ValueError: no tasks, an unknown render mode, or patience below 1.
         """
+        check_options(render_mode, patience=patience)
         if not tasks:
             raise ValueError("there are no tasks to play; choose another split or a larger scale")
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
         self._env, self._tasks, self._eyes, self._layout = make_env(), tuple(tasks), eyes, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
+        self._needs_stop, self._opened = needs_stop, tuple(opened)
         self.render_mode = render_mode
         self.action_space: gym.Space[Any] = action_space(layout)
         self.observation_space = observation_space(layout, eyes)
@@ -110,29 +126,65 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """A task drawn with this environment's generator, or options["task"] by number."""
-        super().reset(seed=seed)
+        """A task drawn with this environment's generator, or options["task"]: an id, as in info, or a number.
+
+        Raises:
+          ValueError: there is no such task.
+        """
+        chosen = self.chosen(options)
+        super().reset(seed=None if seed is None else checked_seed(seed))
         drawn = int(self.np_random.integers(len(self._tasks)))
-        chosen = drawn if options is None else int(options.get("task", drawn))
-        self._o = self._env.reset(self._tasks[chosen], seed=int(self.np_random.integers(2**31)))
+        task = self._tasks[drawn if chosen is None else chosen]
+        self._o = self._env.reset(task, seed=int(self.np_random.integers(2**31)))
         self._invalid = 0
-        return self._encoded(self._o), {"task": self._tasks[chosen].id} | self._words()
+        return self._encoded(self._o), {"task": task.id} | self._words()
+
+    def chosen(self, options: Mapping[str, Any] | None) -> int | None:
+        """The number of the task that options["task"] names; None where it names none.
+
+        Raises:
+          ValueError: there is no such task.
+        """
+        named = (options or {}).get("task")
+        if named is None:
+            return None
+        if isinstance(named, str):
+            found = [k for k, t in enumerate(self._tasks) if t.id == named]
+        else:
+            found = [int(named)] if isinstance(named, (int, np.integer)) and 0 <= named < len(self._tasks) else []
+        if not found:
+            raise ValueError(
+                f"there is no task {named!r:.80}; name one by its id, such as {self._tasks[0].id!r}, or by a number "
+                f"from 0 to {len(self._tasks) - 1}"
+            )
+        return found[0]
+
+    def refuse(self, action: Any) -> None:
+        """Raises what `step` would raise for `action`, before anything is done.
+
+        Raises:
+          TypeError: no whole number.
+          ActionError: with `strict`: it cannot be taken now.
+        """
+        try:
+            self._env._check(decode(action, self._layout))
+        except ActionError:
+            if self._strict or self._env.ended is not None:
+                raise
 
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self._potential() if self._shaping else 0.0
         try:
-            o = self._env.step(decode(int(action), self._layout))
+            o = self._env.step(decode(action, self._layout))
         except ActionError as e:
             if self._strict or self._env.ended is not None:
                 raise
             self._invalid += 1
-            return (
-                self._encoded(self._o),
-                -STEP_COST,
-                False,
-                self._invalid >= self._patience,
-                {"invalid_action": str(e)} | self._words(),
-            )
+            info: dict[str, Any] = {"invalid_action": str(e)} | self._words()
+            if over := self._invalid >= self._patience:
+                self._env.cut_short()
+                info |= self._judged()
+            return self._encoded(self._o), -STEP_COST, False, over, info
         ended = self._env.ended
         info = {} if ended is None else self._judged()
         hari = self._env.task.kind == "hari"
@@ -144,11 +196,16 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
-        """(h, w, 3) uint8: the agent's view, the plan with its path, and what was said."""
+        """(544, 1120, 3) uint8: the agent's view, the plan with its path, and what was said."""
         if self.render_mode is None:
             gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
             return None
         return picture(self._env, self._o)
+
+    def close(self) -> None:
+        """Close what draws, and the files, of the worlds that were opened for this; a later use opens them again."""
+        for world in self._opened:
+            world.close()
 
     @property
     def layout(self) -> SpaceLayout:
@@ -211,9 +268,24 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
             return e.task_error(e.pose.node, e.targets[0])
         return min(float(e.world.graph.distance[e.pose.node, g]) for g in e.task.goal_nodes) / 10.0
 
-    def _judged(self) -> dict[str, float]:
-        episode = self._env.episode()
-        return {name.replace(" ", "_"): f(episode, self._env.world.graph) for name, f in PER_EPISODE.items()}
+    def _judged(self) -> dict[str, Any]:
+        episode, graph = self._env.episode(), self._env.world.graph
+        found: dict[str, Any] = {name.replace(" ", "_"): f(episode, graph) for name, f in PER_EPISODE.items()}
+        if self._needs_stop and not strict_success(episode, graph):
+            found |= {"success": 0.0, "spl": 0.0}
+        return found | {"is_success": found["success"] > 0}
+
+
+def check_options(render_mode: str | None, *, patience: int = 1, **others: bool) -> None:
+    """Refuse options of HelpGymEnv before anything is opened.
+
+    Raises:
+      ValueError: says which.
+    """
+    if render_mode not in (None, *HelpGymEnv.metadata["render_modes"]):
+        raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
+    if not isinstance(patience, (int, np.integer)) or patience < 1:
+        raise ValueError(f"patience should be a whole number of at least 1, got {patience!r}")
 
 
 def direction_of(o: Observation, candidate: int) -> str:
@@ -243,9 +315,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
         facing=env.pose.yaw,
         titles=False,
     )
-    scale = VIEW[0] / plan.height
-    plan = plan.convert("RGB").resize((max(1, round(plan.width * scale)), VIEW[0]), Image.Resampling.LANCZOS)
-    sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + 64), "white")
+    plan = ImageOps.pad(plan.convert("RGB"), PLAN[::-1], Image.Resampling.LANCZOS, "white")
+    sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + WORDS), "white")
     sheet.paste(view, (0, 0))
     sheet.paste(plan, (view.width, 0))
     pen = ImageDraw.Draw(sheet)
@@ -280,6 +351,8 @@ class Stage:
     tasks: Sequence[Task]
     eyes: Eyes
     layout: SpaceLayout
+    opened: Sequence[World]
+    """Whoever plays on it closes them."""
 
 
 def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGymEnv:
@@ -287,35 +360,37 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
 
     Args:
       options: fields of StageSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
-        (shaping, strict, patience).
+        (shaping, strict, patience, needs_stop).
     """
-    own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
+    own = {name: options.pop(name) for name in OWN if name in options}
+    check_options(render_mode, **own)
     stage = set_stage(kind, **options)
-    return HelpGymEnv(stage.make_env, stage.tasks, stage.eyes, layout=stage.layout, render_mode=render_mode, **own)
+    return HelpGymEnv(
+        stage.make_env,
+        stage.tasks,
+        stage.eyes,
+        layout=stage.layout,
+        render_mode=render_mode,
+        opened=stage.opened,
+        **own,
+    )
 
 
-def make_vec(
-    kind: str, num_envs: int = 1, *, render_mode: str | None = None, workers: int = 1, **options: Any
-) -> InStep | InParts:
+def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> InStep:
     """So many environments that share one stage: houses, pages and decoded panoramas are held once.
 
-    Each has its own task, target, instruction and generator, whatever the number of processes.
+    Each has its own task, target, instruction and generator.
 
     Args:
-      workers: processes that the slots are split among; each holds a stage of its own (embodied.gym.in_parts).
-      options: as of `make`, and `threads` that look (default: one per core); those for several processes must be
-        picklable.
+      options: as of `make`, and `threads` that look (default: one per core).
 
     Raises:
       ValueError: fewer than one, or more than memory has room for.
     """
-    if num_envs < 1:
-        raise ValueError(f"num_envs should be at least 1, got {num_envs}")
-    if workers != 1:
-        if "threads" in options:
-            raise ValueError("threads is for one process; with workers each has its share of the cores")
-        return InParts(functools.partial(_part, kind, render_mode, options), num_envs, workers)
-    own = {name: options.pop(name) for name in ("shaping", "strict", "patience") if name in options}
+    if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+        raise ValueError(f"num_envs should be a whole number of at least 1, got {num_envs!r}")
+    own = {name: options.pop(name) for name in OWN if name in options}
+    check_options(render_mode, **own)
     threads = options.pop("threads", None)
     stage = set_stage(kind, **options)
 
@@ -323,13 +398,7 @@ def make_vec(
         return HelpGymEnv(stage.make_env, stage.tasks, Closed(), layout=stage.layout, render_mode=render_mode, **own)
 
     refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
-    return InStep(one, num_envs, stage.eyes, threads=threads)
-
-
-def _part(kind: str, render_mode: str | None, options: Mapping[str, Any], num_envs: int, threads: int) -> InStep:
-    part = make_vec(kind, num_envs, render_mode=render_mode, threads=threads, **options)
-    assert isinstance(part, InStep), "one process"
-    return part
+    return InStep(one, int(num_envs), stage.eyes, threads=threads, opened=stage.opened)
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,6 +440,7 @@ def set_stage(kind: str, **settings: Any) -> Stage:
       ValueError: unknown `sees`, pixels where there are none, or wheels for a kind that cannot have them.
     """
     wanted = StageSettings(**settings)
+    checked_seed(wanted.seed)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
     asked: dict[str, Any] = {
         "cache": where,
@@ -386,7 +456,8 @@ def set_stage(kind: str, **settings: Any) -> Stage:
         play = flat_playground(kind, wanted.seed, **asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
-    return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout)
+    opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
+    return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout, opened)
 
 
 def layout_of(kind: str, stack: int = SpaceLayout.stack) -> SpaceLayout:

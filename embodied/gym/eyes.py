@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.errors import UnableError
-from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight
+from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight, Viewpoint, viewpoint
 from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
 from embodied.render.photograph import PhotoCamera, check_camera
 from embodied.world import World
@@ -143,7 +143,7 @@ class PanoramaStore:
 
     def __init__(self, worlds: Mapping[str, World], budget: int = MEMORY) -> None:
         self._worlds, self._budget, self._held = worlds, budget, 0
-        self._kept: OrderedDict[tuple[str, int], Panorama] = OrderedDict()
+        self._kept: OrderedDict[Viewpoint, Panorama] = OrderedDict()
 
     def at(self, sight: Sight) -> Panorama:
         """The panorama of a sight; drawn, or read from the disk, when it is not in memory.
@@ -151,11 +151,11 @@ class PanoramaStore:
         Raises:
           KeyError: a sight of another world.
         """
-        key = sight._world, sight._node
+        key = viewpoint(sight)
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key]
-        panorama = self._worlds[sight._world].panorama(sight._node)
+        panorama = self._worlds[key.world].panorama(key.node)
         self._kept[key] = panorama
         self._held += _bytes(panorama)
         while self._held > self._budget and len(self._kept) > 1:
@@ -199,8 +199,10 @@ class PictureEyes:
         return functools.partial(self._arrays, o, self._store.at(o.sight), target)
 
     def _arrays(self, o: Observation, panorama: Panorama, target: Panorama | None) -> Arrays:
-        place, yaw, pitch = (o.sight._world, o.sight._node), o.turn * STEP, o.tilt * STEP
-        found = {name: framed(panorama, self._view, name, yaw, pitch, place=place) for name in self._channels}
+        at, yaw, pitch = viewpoint(o.sight), o.turn * STEP, o.tilt * STEP
+        found = {
+            name: framed(panorama, self._view, name, yaw, pitch, place=(at.world, at.node)) for name in self._channels
+        }
         if "rgb" in self._channels:
             found["target_rgb"] = self._target(o.target, target)
         return found
@@ -209,7 +211,8 @@ class PictureEyes:
         if sight is None or panorama is None:
             return np.zeros((self.TARGET, 2 * self.TARGET, 3), np.uint8)
         camera = _camera(self._view.camera, self._view.device)
-        return camera.photographed(panorama.equirect(self.TARGET), None, sight._world, sight._node)
+        at = viewpoint(sight)
+        return camera.photographed(panorama.equirect(self.TARGET), None, at.world, at.node)
 
 
 class FeatureEyes:

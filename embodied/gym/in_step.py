@@ -3,7 +3,8 @@
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
 Play itself is Python and takes its turn; what is seen is resampled by threads that share the decoded panoramas and
-write straight into the batch. Several processes: embodied.gym.in_parts.
+write straight into the batch. For several processes, use Gymnasium's AsyncVectorEnv
+(vectorization_mode="async").
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from embodied.gym.eyes import Arrays, Eyes
+from embodied.seeds import checked_seed
 
 if TYPE_CHECKING:
     from embodied.gym.env import HelpGymEnv
+    from embodied.world import World
 
 COPIES = 2
 """Of an observation that a batch holds per slot: what was handed out last, and what is being filled."""
@@ -35,12 +38,19 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
     """
 
     def __init__(
-        self, make_one: Callable[[], HelpGymEnv], num_envs: int, eyes: Eyes, *, threads: int | None = None
+        self,
+        make_one: Callable[[], HelpGymEnv],
+        num_envs: int,
+        eyes: Eyes,
+        *,
+        threads: int | None = None,
+        opened: Sequence[World] = (),
     ) -> None:
         """Args:
         make_one: makes the environment of a slot, with `embodied.gym.eyes.Closed`.
         eyes: what the slots see; shared.
         threads: that look; one per core by default.
+        opened: worlds that `close` closes.
 
         Raises:
           ValueError: fewer than one thread.
@@ -61,12 +71,7 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self._over = np.zeros(num_envs, bool)
         self._threads = min(threads or len(os.sched_getaffinity(0)), num_envs)
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
-        self._into: Arrays | None = None
-
-    def write_into(self, arrays: Arrays) -> None:
-        """From now on what is seen and told is written into these, and they are handed out, instead of new ones."""
-        self._into = arrays
-        self._told = {name: arrays[name] for name in self._told}
+        self._opened = tuple(opened)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -74,7 +79,10 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
         """All slots, or those of options["reset_mask"]."""
         seeds, options = seeds_of(seed, self.num_envs), dict(options or {})
         info: dict[str, Any] = {}
-        for k in map(int, np.flatnonzero(mask_of(options, self.num_envs))):
+        slots = [int(k) for k in np.flatnonzero(mask_of(options, self.num_envs))]
+        for k in slots:
+            self.envs[k].chosen(options)  # or nothing happens at all
+        for k in slots:
             o, one = self.envs[k].reset(seed=seeds[k], options=options or None)
             self._over[k] = False
             self._note(k, o)
@@ -82,17 +90,36 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
         return self._shown(), info
 
     def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One step of every slot.
+
+        A wrong number of actions, or one that cannot be taken, is refused before any slot moves. An exception inside a
+        slot is raised when the others have taken their steps; that slot is reset by the next step.
+        """
+        if len(actions) != self.num_envs:
+            raise ValueError(f"{len(actions)} actions for {self.num_envs} environments; give one for each")
+        for k, (env, action) in enumerate(zip(self.envs, actions, strict=True)):
+            if not self._over[k]:
+                env.refuse(action)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), bool)
         info: dict[str, Any] = {}
+        errors: list[Exception] = []
         for k, (env, action) in enumerate(zip(self.envs, actions, strict=True)):
-            if self._over[k]:
-                o, one = env.reset()
-            else:
-                o, rewards[k], terminated[k], truncated[k], one = env.step(action)
+            was_over, self._over[k] = self._over[k], True  # until it is through: an interrupted slot begins anew
+            try:
+                if was_over:
+                    o, one = env.reset()
+                else:
+                    o, rewards[k], terminated[k], truncated[k], one = env.step(action)
+            except Exception as e:
+                e.add_note(f"in slot {k} of {self.num_envs}, which the next step resets")
+                errors.append(e)
+                continue
+            self._over[k] = terminated[k] or truncated[k]
             self._note(k, o)
             info = self._add_info(info, one, k)
-        self._over = terminated | truncated
+        if errors:
+            raise errors[0]
         return self._shown(), rewards, terminated, truncated, info
 
     def render(self) -> tuple[Any, ...] | None:
@@ -112,15 +139,14 @@ class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
             self._pool.shutdown()
         for env in self.envs:
             env.close()
+        for world in self._opened:
+            world.close()
 
     def _note(self, k: int, told: dict[str, Any]) -> None:
         for name, value in told.items():
             self._told[name][k] = value
 
     def _shown(self) -> Arrays:
-        if self._into is not None:
-            self._look(self._into)
-            return self._into
         found = _arrays_of(self._seen, self.num_envs)
         self._look(found)
         return {**found, **{name: array.copy() for name, array in self._told.items()}}
@@ -150,11 +176,11 @@ def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int
     Raises:
       ValueError: another number of seeds.
     """
-    if seed is None or isinstance(seed, int):
-        return [None if seed is None else seed + i for i in range(num_envs)]
+    if not isinstance(seed, (list, tuple, np.ndarray)):
+        return [None if seed is None else checked_seed(seed) + i for i in range(num_envs)]
     if len(seed) != num_envs:
         raise ValueError(f"{len(seed)} seeds for {num_envs} environments; give one or as many")
-    return list(seed)
+    return [None if s is None else checked_seed(s) for s in seed]
 
 
 def mask_of(options: dict[str, Any], num_envs: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, SeenPlace, Sight
+from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, SeenPlace, Sight, viewpoint
 
 HALF_WIDTH, HALF_HEIGHT = math.radians(37.6), math.radians(30)
 """Half the field of one of the 36 views: 60 degrees high, 4 : 3."""
@@ -42,12 +42,11 @@ class SightRows:
         Raises:
           KeyError: a place of another world.
         """
-        first, end = self.spans.get(sight._world, (0, 0))
-        if not 0 <= sight._node < end - first:
-            raise KeyError(
-                f"no features of node {sight._node} of world {sight._world!r}; make them with `embodied features`"
-            )
-        return first + sight._node
+        at = viewpoint(sight)
+        first, end = self.spans.get(at.world, (0, 0))
+        if not 0 <= at.node < end - first:
+            raise KeyError(f"no features of node {at.node} of world {at.world!r}; make them with `embodied features`")
+        return first + at.node
 
     def filled(self, worlds: Mapping[str, np.ndarray]) -> np.ndarray:
         """(count, 36, D) float32 of all worlds below each other."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import functools
+import operator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,8 @@ ACTION_WORDS = ("go", "stop")
 """Names of HARI's features of kind 'action'."""
 OWN_WORDS = 4096
 """Numbers for object classes of people's own."""
+LONG, MANY = 100.0, 10.0
+"""Steps and requests that are 1 in 'clock'."""
 LARGE = 1e6
 """Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
 
@@ -68,7 +71,7 @@ def observation_space(layout: SpaceLayout, eyes: Eyes) -> spaces.Dict:
         "action_mask": spaces.MultiBinary(layout.actions),
         "pose": spaces.MultiDiscrete([TURNS, 3]),
         "mode": spaces.Discrete(2),
-        "clock": spaces.Box(0.0, LARGE, (3,), np.float32),
+        "clock": spaces.Box(-1.0, LARGE, (3,), np.float32),
     }
     if layout.detections:
         whole["detections"] = spaces.Box(-1.0, LARGE, (layout.detections, 4), np.float32)
@@ -83,9 +86,9 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
-    one (0 is padding); 'clock' is time, time on task and requests left (1e6 when
-    there is no budget); 'detections' sin and cos of bearing, metres and score;
-    'advised' the number of an action plus one, 0 for none. Words of descriptions are numbered by `word_number`.
+    one (0 is padding); 'clock' is time and time on task in hundreds of steps, and requests left in tens (-1 when
+    there is no budget); 'detections' sin and cos of bearing, metres and score; 'advised' the number of an action
+    plus one, 0 for none. Words of descriptions are numbered by `word_number`.
 
     Raises:
       ValueError: more candidates than the layout has room for.
@@ -101,7 +104,7 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
         wave(angle, out=candidates[:n, k])
     views = np.zeros(layout.candidates, dtype=np.int64)
     views[:n] = c.view + 1
-    left = LARGE if o.requests_left is None else o.requests_left
+    left = -1.0 if o.requests_left is None else o.requests_left / MANY
     whole: dict[str, Any] = {
         **eyes.look(o)(),
         "has_target": np.int64(o.target is not None),
@@ -111,7 +114,7 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
         "action_mask": action_mask(o, layout),
         "pose": np.array([o.turn, o.tilt + 1], dtype=np.int64),
         "mode": np.int64(o.mode is Mode.SUB),
-        "clock": np.array([o.time, o.time_on_task, left], dtype=np.float32),
+        "clock": np.array([o.time / LONG, o.time_on_task / LONG, left], dtype=np.float32),
     }
     if layout.detections:
         rows = np.zeros((layout.detections, 4), dtype=np.float32)
@@ -161,17 +164,22 @@ def decode(action: int, layout: SpaceLayout) -> Action:
 
     Raises:
       ActionError: no such number.
+      TypeError: no whole number.
     """
+    try:
+        action = operator.index(action)
+    except TypeError:
+        raise TypeError(f"an action is a whole number, got {action!r:.60} ({type(action).__name__})") from None
     if not 0 <= action < layout.actions:
         raise ActionError(
             f"action {action} does not exist; use 0 to {layout.actions - 1}: "
             f"{layout.candidates} candidates, stop, and the {len(layout.intentions)} ways to ask"
         )
     if action < layout.candidates:
-        return Move(int(action))
+        return Move(action)
     if action == layout.candidates:
         return Stop()
-    return Ask(layout.intentions[int(action) - layout.candidates - 1])
+    return Ask(layout.intentions[action - layout.candidates - 1])
 
 
 def number(action: Action, layout: SpaceLayout) -> int:
@@ -204,7 +212,7 @@ class Numbers(gym.ObservationWrapper):
             words,
             np.ravel(observation["candidates"]),
             [observation["has_target"], observation["mode"]],
-            np.minimum(observation["clock"], 100.0) / 100.0,
+            observation["clock"],
             observation["action_mask"],
             *(np.mean(observation[name], axis=0) for name in ("features", "oracle") if name in observation),
         )

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-import json
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path, digest, write_bytes
+from assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.atlas import Atlas
 from embodied.light.backend import LightError, device, warn
@@ -97,7 +97,7 @@ def open_bake(folder: Path, house: House) -> Bake:
     """
     folder = Path(folder)
     try:
-        manifest = json.loads((folder / "manifest.json").read_text())
+        manifest = read_json(folder / "manifest.json")
         files = dict(manifest["files"])
     except (OSError, ValueError, KeyError, TypeError) as e:
         raise StaleBake(f"{folder} holds no finished bake ({e}); run `embodied light` to make or finish it") from e
@@ -239,7 +239,7 @@ def _drop_damaged(folder: Path) -> None:
     """Delete the manifest and every file that is not as it says, so that they are made anew."""
     path = folder / "manifest.json"
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        for name, mark in json.loads(path.read_text())["files"].items():
+        for name, mark in read_json(path)["files"].items():
             if Path(name).name == name and _mark(folder / name) != mark:  # nothing outside
                 (folder / name).unlink(missing_ok=True)
     path.unlink(missing_ok=True)

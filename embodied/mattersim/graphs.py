@@ -7,12 +7,14 @@ first row is the `ix` of the format, which counts excluded viewpoints too.
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from embodied.navigation.graph import viewpoints_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
     """Read the connectivity files of some scans; kept, since a hundred simulators may want the same.
 
     Raises:
-      ValueError: a file is missing, as there, or is none of the format.
+      ValueError: a file is missing, as there, or none of the format: says which viewpoint.
     """
     items = [(scan, item) for scan in scans for item in _read(Path(folder) / f"{scan}_connectivity.json")]
     sizes = {scan: sum(s == scan for s, _ in items) for scan in scans}
@@ -124,18 +126,11 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
     )
 
 
-def _read(path: Path) -> list[dict]:
+def _read(path: Path) -> list[dict[str, Any]]:
     try:
-        text = path.read_text(encoding="utf-8")
+        return viewpoints_of(path)
     except OSError as e:
         raise ValueError(f"MatterSim: Could not open navigation graph file: {path}, is path valid?") from e
-    try:
-        items = json.loads(text)
-        if all(len(i["pose"]) == 16 and len(i["unobstructed"]) == len(items) and "included" in i for i in items):
-            return items
-    except (ValueError, KeyError, TypeError) as e:
-        raise ValueError(f"{path} is not a connectivity file ({e!r}); write one with `embodied export`") from e
-    raise ValueError(f"{path}: every viewpoint needs 16 numbers of pose and {len(items)} of 'unobstructed'")
 
 
 def _padded(rows: Sequence[Sequence[int]]) -> np.ndarray:

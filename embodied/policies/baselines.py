@@ -6,6 +6,7 @@ others see Observations only.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -25,7 +26,6 @@ from embodied.interface import (
     Observations,
     Policy,
     PrivilegedPolicy,
-    Sight,
     Situation,
     Situations,
     Stop,
@@ -137,8 +137,10 @@ def _with_requests(
 class _Trail:
     """What an Explorer remembers of one episode."""
 
-    visited: dict[Sight, int] = field(default_factory=dict)
-    asked: set[tuple[Sight, Sight | None]] = field(default_factory=set)
+    visited: Counter[int] = field(default_factory=Counter)
+    """Steps that began at each node."""
+    asked: set[int] = field(default_factory=set)
+    """Nodes where it asked."""
 
 
 class PerfectInterpreter:
@@ -161,17 +163,17 @@ class PerfectInterpreter:
         return actions, trails
 
     def _one(self, o: Observation, s: Situation, trail: _Trail, rng: np.random.Generator) -> Action:
-        trail.visited[o.sight] = trail.visited.get(o.sight, 0) + 1
+        here = s.pose.node
+        trail.visited[here] += 1
         if o.mode is Mode.SUB:
             return _teacher_move(s)
         distance = s.world.graph.distance
         if min(distance[s.pose.node, g] for g in s.task.goal_nodes) <= s.task.radius:
             return Stop()
-        here = (o.sight, None)
         if Intention.HELP in o.can_ask and here not in trail.asked:
             trail.asked.add(here)
             return Ask()
-        visits = np.array([trail.visited.get(Sight(s.task.world, v), 0) for v in s.candidate_nodes])
+        visits = np.array([trail.visited[v] for v in s.candidate_nodes])
         fewest = np.flatnonzero(visits == visits.min())
         return Move(int(rng.choice(fewest)))
 

@@ -72,8 +72,8 @@ class ListeningInterpreter(PerfectInterpreter):
         return actions, (plans, inner)
 
     def _on_route(self, o: Observation, s: Situation, plan: Plan) -> tuple[Action, Plan]:
-        """It also departs where the target image shows what it sees."""
-        if o.target == o.sight:
+        """It also departs where the target image was taken."""
+        if s.pose.node in s.targets:
             return Stop(), NOTHING
         return heard_step(self._worlds[s.task.world], o, s, plan)
 

@@ -6,6 +6,7 @@ behind walls, things outside the field of view) is left out of the list of geoms
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol, Self
@@ -37,6 +38,8 @@ multiplies the cost of every small triangle, and smoother. A GPU multi-samples i
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
+NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value]
+"""Flags of a scene that paint every geom in its number's colour."""
 
 
 class Painter(Protocol):
@@ -60,10 +63,11 @@ class Overlay(Protocol):
 class Renderer:
     """Draws one house. Owns textures and display lists on the graphics side until `close`.
 
-    All renderers of a process share its one OpenGL context (embodied.gl) and must be used from the
-    thread that made them.
+    All renderers of a process share its one OpenGL context (embodied.gl), in which threads take turns; one renderer
+    is used by one thread at a time.
     """
 
+    @gl.drawing()
     def __init__(
         self,
         house: House,
@@ -97,7 +101,6 @@ class Renderer:
         model = self.scene.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
-        gl.make_current()
         self._software = gl.info().software
         model.vis.quality.offsamples = 0 if self._software else MULTISAMPLES
         self._buffer = self._drawn_size((size, size))
@@ -134,6 +137,7 @@ class Renderer:
         """
         return self.through(camera_at(position, yaw, pitch, vfov), size, cull=cull)
 
+    @gl.drawing()
     def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
         """The picture of (height, width) that `camera` takes; `cull` as in `view`."""
         drawn = self._choose(camera, size, cull)
@@ -141,11 +145,18 @@ class Renderer:
         depth, ids = self._depth_and_ids(size, drawn)
         return View(rgb, depth, ids)
 
+    @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
         self._choose(camera, size, True)
         return self._rgb(camera, size)
 
+    @gl.drawing()
+    def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
+        return self._depth_and_ids(size, self._choose(camera, size, True))
+
+    @gl.drawing()
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
@@ -157,12 +168,12 @@ class Renderer:
             depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
         return Panorama(rgb, depth, ids)
 
+    @gl.drawing()
     def seen(self, position: Sequence[float] | np.ndarray, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
         depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
         for k, camera in enumerate(face_cameras(position)):
-            drawn = self._choose(camera, (size, size), True)
-            depth[k], ids[k] = self._depth_and_ids((size, size), drawn)
+            depth[k], ids[k] = self.depth_and_ids(camera, (size, size))
         return depth, ids
 
     def close(self) -> None:
@@ -171,8 +182,8 @@ class Renderer:
             self._painter.close()
             self._painter = None
         if self._mjr is not None:
-            gl.make_current()
-            self._mjr.free()
+            with gl.drawing():
+                self._mjr.free()
             self._mjr = None
             give_memory_back()
 
@@ -186,7 +197,6 @@ class Renderer:
         """Prepare OpenGL and the list of geoms to draw; returns their indices, in drawing order."""
         if self._mjr is None:
             raise RuntimeError("the renderer is closed; make a new one")
-        gl.make_current()
         mujoco.mjr_restoreBuffer(self._mjr)
         if any(n > b for n, b in zip(self._drawn_size(size), self._buffer, strict=True)):
             height, width = self._drawn_size(size)
@@ -217,13 +227,17 @@ class Renderer:
         rooms = visibility.visible_rooms(self.house, self._portals, camera.position, towards)
         if rooms is None:
             return framed & self._is_visual
-        mask, eye = np.zeros_like(framed), np.array(camera.position[:2])
-        for room, sectors in rooms.items():
-            g = self._geoms_of_room.get(room, np.zeros(0, int))
-            g = g[framed[g]]
-            spheres = self._data.geom_xpos[g, :2], self.scene.model.geom_rbound[g]
-            mask[g] |= visibility.within(sectors, eye, *spheres)
-        return mask
+        there = [
+            (s, g) for r, sectors in rooms.items() if (g := self._geoms_of_room.get(r)) is not None for s in sectors
+        ]
+        if not there:
+            return np.zeros_like(framed)
+        geoms = np.concatenate([g for _, g in there])
+        sectors = np.repeat([s for s, _ in there], [len(g) for _, g in there], axis=0)
+        spans = visibility.spans_of(np.array(camera.position), self._middles, self._reaches)
+        mask = np.zeros_like(framed)
+        mask[geoms[spans.within(sectors, geoms)]] = True
+        return mask & framed
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""
@@ -241,6 +255,8 @@ class Renderer:
         rect, rgb = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        if (height % 3, width % 3, 2 * height, 2 * width) == (0, 0, 3 * size[0], 3 * size[1]):
+            return two_thirds(rgb)
         if (height, width) != tuple(size):
             rgb = cv2.resize(rgb, (size[1], size[0]), interpolation=cv2.INTER_AREA)
         return rgb[::-1]
@@ -248,20 +264,19 @@ class Renderer:
     def _depth_and_ids(self, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A second pass that paints every geom in its number's colour."""
         flags = self._drawn.flags
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
+        flags[NUMBERS] = 1
         rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
         reversed_z = np.empty(size, np.float32)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(numbers, reversed_z, rect, self._mjr)
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
+        flags[NUMBERS] = 0
         owner_of_number = np.zeros(len(drawn) + 1, np.int32)
         owner_of_number[1:] = self.scene.owner_of_geom[drawn]
-        packed = np.zeros((*size, 4), np.uint8)
-        packed[..., :3] = numbers
-        ids = owner_of_number[packed.view("<u4")[..., 0]]
-        depth = depth_of_reversed_z(reversed_z)
+        packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[::-1, :, 0] & 0xFFFFFF
+        ids = owner_of_number.take(packed)
+        depth = depth_of_reversed_z(reversed_z[::-1])
         depth[ids == 0] = np.inf  # a painted sky is no thing
-        return depth[::-1], ids[::-1]
+        return depth, ids
 
 
 def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
@@ -276,8 +291,27 @@ def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> 
 
     Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
     """
-    depth = near * far / (near + z.astype(np.float64) * (far - near))
-    return np.where(z > 0, depth, np.inf).astype(np.float32)
+    depth = near * far / (near + z * np.float32(far - near))
+    depth[z <= 0] = np.inf
+    return depth
+
+
+def two_thirds(picture: np.ndarray) -> np.ndarray:
+    """(2 h, 2 w, 3) uint8 from (3 h, 3 w, 3), bottom row first: the mean over each pixel's area, top row first."""
+    rgba = cv2.remap(
+        cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA), *_thirds(*picture.shape[:2]), interpolation=cv2.INTER_LINEAR
+    )
+    return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
+
+
+@functools.lru_cache(maxsize=8)
+def _thirds(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """The maps of cv2.remap for `two_thirds`: a mean of three pixels' one and a half is one sample between two."""
+    columns, rows = (
+        n // 2 * 3 + np.where(n % 2, 5 / 3, 1 / 3) for n in map(np.arange, (width // 3 * 2, height // 3 * 2))
+    )
+    x, y = np.broadcast_arrays(columns[None], rows[::-1, None])
+    return x.astype(np.float32), y.astype(np.float32)
 
 
 def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:

@@ -182,7 +182,7 @@ def emissive_model(house: House, catalogue: Catalogue, lit: LitPages) -> mujoco.
 def _add_coats(spec: mujoco.MjSpec, lit: LitPages) -> None:
     """Meshes that shine get a material like their page's, as rough as they are."""
     geoms = [g for g in spec.geoms if g.material.startswith("page_")]
-    meshes = [m for m in lit.meshes if len(m.faces)]
+    meshes = [lit.meshes[int(g.meshname.partition("_")[0])] for g in geoms]
     known: dict[tuple[str, float], str] = {}
     for geom, mesh in zip(geoms, meshes, strict=True):
         geom.rgba = [0, 0, 0, geom.rgba[3]]  # a geom's own colour would hide its material's

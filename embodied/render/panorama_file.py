@@ -8,7 +8,7 @@ length, its SHA-256 and the magic again. Per node three pictures with the six fa
   depth  16-bit PNG of whole millimetres (error at most 0.5 mm up to 65.5 m, 0 where nothing is)
   ids    16-bit PNG, exact
 
-Chosen among JPEG, WebP and AVIF by `embodied bench codecs`: docs/pictures.md.
+Chosen among JPEG, WebP and AVIF: docs/pictures.md.
 
 Every picture carries a CRC-32 that is checked when it is read.
 """
@@ -21,6 +21,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Self
 
@@ -28,6 +29,7 @@ import cv2
 import numpy as np
 
 from assets.cache import atomic_path
+from assets.json_file import RecordError, from_plain, parse
 from embodied.render.panorama import Panorama
 
 MAGIC = b"EMBPANO1"
@@ -43,6 +45,22 @@ CHANNELS = ("rgb", "depth", "ids")
 
 class PanoramaFileError(ValueError):
     """A panorama file that is damaged, cut short or of another kind."""
+
+
+@dataclass(frozen=True)
+class PanoramaIndex:
+    """What stands at the end of a file."""
+
+    meta: dict[str, object]
+    size: int
+    """Side of a face, pixels."""
+    lossless: bool
+    nodes: tuple[dict[str, tuple[int, int, int]], ...]
+    """By channel: where its picture begins, its length and its CRC-32."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.size <= 16384 or any(set(node) != set(CHANNELS) for node in self.nodes):
+            raise ValueError(f"it should hold {CHANNELS} of every node, of 1 to 16384 pixels")
 
 
 class PanoramaFile:
@@ -65,15 +83,15 @@ class PanoramaFile:
     @property
     def meta(self) -> Mapping[str, object]:
         """What the file was made from and with."""
-        return self.index["meta"]
+        return self.index.meta
 
     @property
     def size(self) -> int:
         """Side of a face, pixels."""
-        return self.index["size"]
+        return self.index.size
 
     def __len__(self) -> int:
-        return len(self.index["nodes"])
+        return len(self.index.nodes)
 
     def read(self, node: int) -> Panorama:
         """The whole panorama of one node."""
@@ -114,15 +132,16 @@ class PanoramaFile:
                 f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again"
             )
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
-        if picture is None:
+        if picture is None or picture.shape[:2] != (self.size, 6 * self.size):
             raise PanoramaFileError(
-                f"{self.path}: the {channel} of node {node} is no picture; delete the file, it is made again"
+                f"{self.path}: the {channel} of node {node} is no picture of its size; "
+                "delete the file, it is made again"
             )
         return picture
 
     def _data(self, node: int, channel: str) -> bytes | None:
         """The picture as a file, or None where it is damaged."""
-        offset, length, crc = self.index["nodes"][node][channel]
+        offset, length, crc = self.index.nodes[node][channel]
         data = os.pread(self._file.fileno(), length, offset)  # whoever shares the file shares its position
         return data if len(data) == length and zlib.crc32(data) == crc else None
 
@@ -186,7 +205,7 @@ def _apart(strip: np.ndarray) -> np.ndarray:
     return np.stack(np.split(strip, 6, axis=1))
 
 
-def _read_index(f: BinaryIO, path: Path) -> dict:
+def _read_index(f: BinaryIO, path: Path) -> PanoramaIndex:
     end = f.seek(0, 2)
     f.seek(0)
     broken = f"{path} is no complete panorama file ({end} bytes); delete it, it is made again"
@@ -200,4 +219,10 @@ def _read_index(f: BinaryIO, path: Path) -> dict:
     index = f.read(length)
     if hashlib.sha256(index).digest() != checksum:
         raise PanoramaFileError(f"{path}: the index is damaged; delete the file, it is made again")
-    return json.loads(index)
+    try:
+        found = from_plain(PanoramaIndex, parse(index, "an index"), "the index")
+        if not all(0 <= at <= at + n <= end for node in found.nodes for at, n, _ in node.values()):
+            raise RecordError("pictures outside the file")
+        return found
+    except RecordError as e:
+        raise PanoramaFileError(f"{path}: {e}; delete the file, it is made again") from e

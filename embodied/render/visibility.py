@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from embodied.house.house import House
 from embodied.house.shapes import inward, room_at
 
 OUTDOORS = ""
-FULL = (-math.pi, math.pi)
 NEAR = 0.25
 """Closer than this to an opening, in metres, one sees all around through it."""
 MARGIN = 1e-3
@@ -25,9 +25,24 @@ MARGIN = 1e-3
 DEEPEST = 16
 """Openings looked through one behind another before the search calls everything behind visible."""
 
+FRAME = 0.02
+"""Added above and below an opening, metres."""
 Point = tuple[float, float]
-Sector = tuple[float, float]
-"""Directions from low to high, radians counter-clockwise; high - low is at most 2 pi."""
+Eye = tuple[float, float, float]
+
+
+class Sector(NamedTuple):
+    """Directions from a point."""
+
+    low: float
+    high: float
+    """Radians counter-clockwise; high - low is at most 2 pi."""
+    bottom: float = -math.inf
+    top: float = math.inf
+    """Metres up per metre ahead."""
+
+
+FULL = Sector(-math.pi, math.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +58,9 @@ class Passage:
     normal: Point
     """Unit, out of the room `leaves`."""
     width: float
-    """Metres."""
+    bottom: float
+    top: float
+    """Metres; the heights in the world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +80,10 @@ def portals_of(house: House) -> Portals:
         a, b, width = (float(ax), float(ay)), (float(bx), float(by)), math.hypot(bx - ax, by - ay)
         x, y = (float(v) for v in inward(house, o))
         first, second = o.rooms[0], o.rooms[1] or OUTDOORS
-        of_room[first].append(Passage(o.id, first, second, a, b, (-x, -y), width))
-        of_room[second].append(Passage(o.id, second, first, a, b, (x, y), width))
+        floor = house.storey_of(house.room_by_id[first]).elevation
+        tall = floor + o.sill - FRAME, floor + o.head + FRAME
+        of_room[first].append(Passage(o.id, first, second, a, b, (-x, -y), width, *tall))
+        of_room[second].append(Passage(o.id, second, first, a, b, (x, y), width, *tall))
     stairs: dict[str, list[str]] = {r.id: [] for r in house.rooms}
     for s in house.stairs:
         stairs[s.rooms[0]].append(s.rooms[1])
@@ -87,14 +106,16 @@ def visible_rooms(
     if start is None:
         return None
     seen: dict[str, list[Sector]] = {}
-    complete = _look(portals, (float(position[0]), float(position[1])), start, sector, (), seen)
+    x, y, z = position
+    complete = _look(portals, (float(x), float(y), float(z)), start, sector, (), seen)
     return seen if complete else None
 
 
 def _look(
-    portals: Portals, eye: Point, room: str, sector: Sector, path: tuple[str, ...], seen: dict[str, list[Sector]]
+    portals: Portals, eye: Eye, room: str, sector: Sector, path: tuple[str, ...], seen: dict[str, list[Sector]]
 ) -> bool:
-    if any(s[0] <= sector[0] and sector[1] <= s[1] for s in seen.get(room, ())):
+    low, high, bottom, top = sector
+    if any(s[0] <= low and high <= s[1] and s[2] <= bottom and top <= s[3] for s in seen.get(room, ())):
         return True
     seen.setdefault(room, []).append(sector)
     if len(path) > DEEPEST:
@@ -109,14 +130,15 @@ def _look(
     return all(_look(portals, eye, other, FULL, path, seen) for other in portals.stairs.get(room, ()))
 
 
-def _through(eye: Point, portal: Passage, sector: Sector) -> list[Sector]:
+def _through(eye: Eye, portal: Passage, sector: Sector) -> list[Sector]:
     """The parts of `sector` that go out through `portal`; in plain numbers, which for so few are ten times as fast."""
     ax, ay = portal.a[0] - eye[0], portal.a[1] - eye[1]
     bx, by = portal.b[0] - eye[0], portal.b[1] - eye[1]
     away = ax * portal.normal[0] + ay * portal.normal[1]
     ux, uy = (bx - ax) / portal.width, (by - ay) / portal.width
     reach = min(max(-(ax * ux + ay * uy), 0.0), portal.width)
-    if math.hypot(ax + reach * ux, ay + reach * uy) < NEAR:
+    nearest, farthest = math.hypot(ax + reach * ux, ay + reach * uy), math.hypot(ax, ay)
+    if nearest < NEAR:
         return [sector]
     if away < 0:
         return []
@@ -124,7 +146,10 @@ def _through(eye: Point, portal: Passage, sector: Sector) -> list[Sector]:
     low, width = first, (second - first) % TWO_PI
     if width > math.pi:
         low, width = second, TWO_PI - width
-    return overlap(sector, (low, low + width))
+    farthest = max(farthest, math.hypot(bx, by))
+    below, above = portal.bottom - eye[2], portal.top - eye[2]
+    bottom, top = below / (nearest if below < 0 else farthest), above / (nearest if above > 0 else farthest)
+    return overlap(sector, Sector(low, low + width, bottom, top))
 
 
 def sector_of(forward: np.ndarray, right: np.ndarray, up: np.ndarray, wide: float, tall: float) -> Sector:
@@ -139,33 +164,58 @@ def sector_of(forward: np.ndarray, right: np.ndarray, up: np.ndarray, wide: floa
     corners = [forward + i * wide * right + j * tall * up for i in (-1, 1) for j in (-1, 1)]
     middle = math.atan2(forward[1], forward[0])
     off = [(math.atan2(c[1], c[0]) - middle + math.pi) % TWO_PI - math.pi for c in corners]
-    return (middle + min(off) - MARGIN, middle + max(off) + MARGIN)
+    return Sector(middle + min(off) - MARGIN, middle + max(off) + MARGIN)
 
 
 def overlap(one: Sector, other: Sector) -> list[Sector]:
     """What two sectors share, as none, one or two sectors."""
+    bottom, top = max(one.bottom, other.bottom), min(one.top, other.top)
     shared = []
     for turn in (-TWO_PI, 0.0, TWO_PI):
-        low, high = max(one[0], other[0] + turn), min(one[1], other[1] + turn)
-        if high > low:
-            shared.append((low, high))
+        low, high = max(one.low, other.low + turn), min(one.high, other.high + turn)
+        if high > low and top > bottom:
+            shared.append(Sector(low, high, bottom, top))
     return shared
 
 
-def within(sectors: list[Sector], eye: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """(n,) bool: which spheres reach into one of the sectors around `eye`.
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """The directions in which boxes along the world's axes lie from a point. (n,) arrays."""
+
+    middle: np.ndarray
+    half: np.ndarray
+    """Radians: the compass directions middle - half to middle + half."""
+    bottom: np.ndarray
+    top: np.ndarray
+    """Metres up per metre ahead."""
+
+    def within(self, sectors: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """(k,) bool: which of the `chosen` (k,) boxes reach into their `sectors` (k, 4)."""
+        low, high, lowest, highest = sectors.T
+        off = np.abs((self.middle[chosen] - (low + high) / 2 + np.pi) % TWO_PI - np.pi)
+        beside = off <= (high - low) / 2 + self.half[chosen] + MARGIN
+        return beside & (self.top[chosen] >= lowest) & (self.bottom[chosen] <= highest)
+
+
+def spans_of(eye: np.ndarray, middles: np.ndarray, reaches: np.ndarray) -> Spans:
+    """Where boxes lie.
 
     Args:
-      eye: (2,) metres.
-      centres: (n, 2) metres.
-      radii: (n,) metres.
+      eye: (3,) metres.
+      middles, reaches: (n, 3) metres, of the boxes and half their sizes.
     """
-    apart = centres - eye
-    distance = np.hypot(apart[:, 0], apart[:, 1])
-    angle = np.arctan2(apart[:, 1], apart[:, 0])
-    spread = np.arcsin(np.clip(radii / np.maximum(distance, 1e-9), 0, 1))
-    inside = distance <= radii
-    for low, high in sectors:
-        off = np.abs((angle - (low + high) / 2 + np.pi) % TWO_PI - np.pi)
-        inside |= off <= (high - low) / 2 + spread
-    return inside
+    (x, y, z), (rx, ry, rz) = (middles - eye).T, reaches.T
+    middle = np.arctan2(y, x)
+    corners = [np.arctan2(y + j * ry, x + i * rx) - middle for i in (-1, 1) for j in (-1, 1)]
+    off = (np.array(corners) + np.pi) % TWO_PI - np.pi
+    low, high = off.min(0), off.max(0)
+    around = (np.abs(x) <= rx) & (np.abs(y) <= ry)
+    near = np.maximum(np.hypot(np.maximum(np.abs(x) - rx, 0), np.maximum(np.abs(y) - ry, 0)), 1e-9)
+    far = np.maximum(np.hypot(np.abs(x) + rx, np.abs(y) + ry), 1e-9)
+    below, above = z - rz, z + rz
+    return Spans(
+        middle + (low + high) / 2,
+        np.where(around, np.pi, (high - low) / 2),
+        below / np.where(below < 0, near, far),
+        above / np.where(above > 0, near, far),
+    )

@@ -16,6 +16,7 @@ from scipy import ndimage
 
 from assets.cache import atomic_path, digest
 from assets.closure import code_digest
+from assets.json_file import parse_file
 from assets.records import Asset, MeshPart
 from embodied.geometry import r2
 from embodied.house.house import House, Room
@@ -69,7 +70,7 @@ def kept_boxes(
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
     path = Path(cache) / "collision" / f"{digest(boxes_code(), surfaces, asset.size, size, *meshes)[:32]}.json"
     try:
-        rows = np.array(json.loads(path.read_text()), float).reshape(-1, 7)
+        rows = np.array(parse_file(path), float).reshape(-1, 7)
         if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
             return tuple(CollisionBox(tuple(r[:3]), tuple(r[3:6]), r[6]) for r in rows.tolist())
     except (OSError, ValueError, TypeError):

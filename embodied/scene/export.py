@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
+import mujoco
 import numpy as np
 import PIL.Image
+import shapely
 import trimesh
 
 from assets.cache import write_bytes
 from assets.records import Finish
 from embodied.house.house import House
+from embodied.house.shapes import footprint
 from embodied.scene.house_meshes import Part, house_parts
 from embodied.scene.lit_pages import LitPages
-from embodied.scene.model import build_spec, compile_spec, load_texture
+from embodied.scene.model import UNDERFOOT, build_spec, compile_spec, load_texture
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
+EYE = 1.5
+"""Height of cameras above the floor, metres."""
 MESHES, TEXTURES = "meshes", "textures"
 """Folders beside house.xml."""
 
@@ -30,7 +36,10 @@ MESHES, TEXTURES = "meshes", "textures"
 def export_mjcf(
     house: House, catalogue: Catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None
 ) -> Path:
-    """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer as it is.
+    """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer and in dm_control as it is.
+
+    Names have dots where owners have slashes, which dm_control keeps for itself. Every room has a camera of its name,
+    at eye height where most floor is free.
 
     Args:
       free: placements that physics may move, see embodied.scene.model.loose.
@@ -41,6 +50,9 @@ def export_mjcf(
     """
     folder = Path(folder)
     spec = build_spec(house, catalogue, free=free, lit=lit)
+    _add_cameras(spec, house)
+    for element in (*spec.geoms, *spec.bodies, *spec.joints, *spec.cameras):
+        element.name = element.name.replace("/", ".")
     compile_spec(spec)
     (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
     for name in (MESHES, TEXTURES):
@@ -56,8 +68,26 @@ def export_mjcf(
             texture.data = b""
             texture.file = f"{texture.name}.png"
     spec.modelfiledir, spec.meshdir, spec.texturedir = str(folder), MESHES, TEXTURES
-    write_bytes(folder / "house.xml", spec.to_xml().encode())
+    # MuJoCo writes this one as a word, which dm_control takes for a number.
+    xml = re.sub(r'(<headlight[^>]* active=)"(true|false)"', lambda m: f'{m[1]}"{int(m[2] == "true")}"', spec.to_xml())
+    write_bytes(folder / "house.xml", xml.encode())
     return folder / "house.xml"
+
+
+def _add_cameras(spec: mujoco.MjSpec, house: House) -> None:
+    for room in house.rooms:
+        things = [footprint(p) for p in house.placements if p.room == room.id and p.size[2] > UNDERFOOT]
+        floor = shapely.Polygon(room.polygon)
+        free = floor.difference(shapely.union_all(things))
+        x, y = shapely.maximum_inscribed_circle(free if free.area > 0 else floor).coords[0]
+        away = np.array(shapely.Polygon(room.polygon).exterior.coords) - (x, y)
+        yaw = math.atan2(*away[np.argmax(np.linalg.norm(away, axis=1))][::-1])
+        axes = np.array([[math.sin(yaw), 0, -math.cos(yaw)], [-math.cos(yaw), 0, -math.sin(yaw)], [0, 1, 0]])
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, axes.reshape(-1))
+        spec.worldbody.add_camera(
+            name=room.id, pos=[x, y, house.storey_of(room).elevation + EYE], quat=quat.tolist(), fovy=75
+        )
 
 
 def _png(image: np.ndarray) -> bytes:

@@ -9,7 +9,7 @@ import ctypes
 import functools
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ from embodied.house.house import House, Placement
 from embodied.scene import backdrop, collision
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.landscapes import scenery_of
-from embodied.scene.lit_pages import LitPages
+from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.shell import shell_parts
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ TEXTURE_SIZE = 512
 """Largest side of a texture in pixels; larger ones are shrunk when loaded."""
 DECODERS = 4
 """Threads that decode textures."""
+PIECES = 24
+"""Directions by which the outdoors of a lit house are cut up."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
@@ -390,10 +392,9 @@ def _add_pages(spec: mujoco.MjSpec, lit: LitPages, hollow: Collection[str]) -> N
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"page_{i}"
     count: dict[str, int] = {}
     for i, m in enumerate(lit.meshes):
-        if len(m.faces):
+        for vertices, uv, faces in _pieces(m, spec.stat.center[:2]):
             k = count[m.owner] = count.get(m.owner, -1) + 1
-            name = f"{i:04d}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
-            vertices, uv, faces = m.vertices, m.uv, m.faces
+            name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
             if m.owner in hollow:
                 faces = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
                 vertices, uv = np.concatenate([vertices, vertices]), np.concatenate([uv, uv])
@@ -409,6 +410,19 @@ def _add_pages(spec: mujoco.MjSpec, lit: LitPages, hollow: Collection[str]) -> N
                 conaffinity=0,
                 mass=0,
             )
+
+
+def _pieces(mesh: LitMesh, centre: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Vertices, uv and faces of a mesh; what stands around the house comes in pieces, of which a window shows few."""
+    if mesh.kind != "outdoor":
+        if len(mesh.faces):
+            yield mesh.vertices, mesh.uv, mesh.faces
+        return
+    x, y = (mesh.vertices[mesh.faces].mean(1)[:, :2] - centre).T
+    piece = np.floor((np.arctan2(y, x) / (2 * np.pi) + 0.5) * PIECES)
+    for k in np.unique(piece):
+        used, faces = np.unique(mesh.faces[piece == k], return_inverse=True)
+        yield mesh.vertices[used], mesh.uv[used], faces.reshape(-1, 3)
 
 
 def _add_collisions(
@@ -429,8 +443,7 @@ def _add_collisions(
         if p.id in bodies:
             _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(catalogue.assets[p.asset]))
         else:
-            frame = spec.worldbody.add_frame(pos=p.position, quat=yaw_quat(p.yaw))
-            _add_boxes(spec.worldbody, p.id, boxes, frame=frame)
+            _add_boxes(spec.worldbody, p.id, boxes, position=p.position, yaw=p.yaw)
 
 
 def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
@@ -439,10 +452,8 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
     for part in parts:
         if part.kind == "opening" and part.owner.endswith(LEAVES):
             first = count[part.owner] = count.get(part.owner, -1) + 1
-            frame = spec.worldbody.add_frame(pos=part.position, quat=yaw_quat(part.yaw))
-            _add_boxes(
-                spec.worldbody, part.owner, [collision.bounding_box(part.mesh.vertices)], frame=frame, first=first
-            )
+            box = collision.bounding_box(part.mesh.vertices)
+            _add_boxes(spec.worldbody, part.owner, [box], position=part.position, yaw=part.yaw, first=first)
 
 
 def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.CollisionBox, ...]:
@@ -462,23 +473,25 @@ def _add_boxes(
     boxes: Sequence[collision.CollisionBox],
     *,
     density: float = 1000.0,
-    frame: mujoco.MjsFrame | None = None,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    yaw: float = 0.0,
     first: int = 0,
 ) -> None:
+    """Boxes of a frame at `position`, turned by `yaw`."""
+    c, s = math.cos(yaw), math.sin(yaw)
     for k, box in enumerate(boxes, first):
-        geom = body.add_geom(
+        x, y, z = box.centre
+        body.add_geom(
             name=f"{owner}#box{k}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=box.centre,
-            quat=yaw_quat(box.yaw),
+            pos=[position[0] + c * x - s * y, position[1] + s * x + c * y, position[2] + z],
+            quat=yaw_quat(yaw + box.yaw),
             size=box.half,
             group=COLLISION,
             rgba=[0.6, 0.7, 0.9, 0.4],
             density=density,
             friction=[0.9, 0.005, 0.0001],
         )
-        if frame is not None:
-            geom.set_frame(frame)
 
 
 def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:

@@ -166,7 +166,9 @@ class Server:
             except Exception as e:  # of anybody's policy or assistant: the episode ends, the study goes on
                 log.exception("the machine of game %s failed", game.id)
                 if not game.over and not self.failed:
-                    await self.happen(Event("broken", time.time(), body={"game": game.id, "why": f"machine: {e!r:.200}"}))
+                    await self.happen(
+                        Event("broken", time.time(), body={"game": game.id, "why": f"machine: {e!r:.200}"})
+                    )
             for person in people:
                 await self.show(person)
 
@@ -191,7 +193,8 @@ class Server:
             with suppress(RuntimeError, WebSocketDisconnect):
                 await socket.send_text(json.dumps({"screen": "refused", "text": str(e)}))
                 await socket.close(4400)
-        except (WebSocketDisconnect, TimeoutError, KeyError):  # KeyError: a binary message
+        except (WebSocketDisconnect, TimeoutError, RuntimeError, KeyError):
+            # it has gone, also while something was sent; KeyError: a binary message
             pass
         finally:
             self._open -= 1
@@ -220,7 +223,9 @@ class Server:
         person.connected = 1
         if older is not None:
             with suppress(RuntimeError, WebSocketDisconnect):
-                await older.send_text(json.dumps({"screen": "refused", "text": "This study is open in another window."}))
+                await older.send_text(
+                    json.dumps({"screen": "refused", "text": "This study is open in another window."})
+                )
                 await older.close(4409)
         await socket.send_text(json.dumps({"token": token}))
         await self.settle(person)
@@ -252,15 +257,17 @@ class Server:
             while not bucket.take():  # slowed down, not refused: nothing is lost
                 await asyncio.sleep(1 / RATE)
             answer: dict[str, Any] = {"ack": message.get("id")}
+            concerned: Iterable[Person] = ()
             try:
-                await self.receive(person, message)
+                concerned = await self.receive(person, message)
             except (ActionError, ValueError, KeyError, TypeError) as e:
                 answer["error"] = str(e)[:200]
                 await self.show(person)  # the browser may show what is no longer so
             await socket.send_text(json.dumps(answer))
+            await self.settle(*concerned)
 
-    async def receive(self, person: Person, message: dict[str, Any]) -> None:
-        """Do what a browser says; returns when it is on disk.
+    async def receive(self, person: Person, message: dict[str, Any]) -> Iterable[Person]:
+        """Do what a browser says, until it is on disk; returns who is concerned.
 
         Raises:
           ActionError, ValueError, KeyError, TypeError: not possible now, or no such message.
@@ -268,30 +275,28 @@ class Server:
         name, do, now = str(message["id"])[:40], message["do"], time.time()
         if name in person.messages:  # sent again, because its acknowledgement was lost
             await self.store.flush()
-            return
+            return ()
         if do == "house":
             await self._send_house(person)
-        elif do == "ready":
+            return ()
+        if do == "ready":
             person.ready = True
-            await self.settle(person)
         elif do == "consent":
             await self.happen(Event("consented", now, person.id, name))
             person.ready = True
-            await self.settle(person)
         elif do == "leave":
             await self.happen(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
             await self.late()
-            await self.show(person)
         elif do == "judge":
             body = {"stars": message.get("stars"), "text": message.get("text", ""), "seconds": message.get("seconds")}
             if message["unit"] != "/".join(person.viewing or ()):
                 raise ActionError("this was judged already")
             await self.happen(Event("judged", now, person.id, name, body))
-            await self.settle(person)
         else:
-            await self._play(person, do, message, Event(str(do), now, person.id, name))
+            return await self._play(person, do, message, Event(str(do), now, person.id, name))
+        return (person,)
 
-    async def _play(self, person: Person, do: object, message: dict[str, Any], event: Event) -> None:
+    async def _play(self, person: Person, do: object, message: dict[str, Any], event: Event) -> Iterable[Person]:
         game = self.sessions.games[str(person.game)] if person.game else None
         if game is None or game.id != message["game"] or game.turn != message["turn"]:
             raise ActionError("this has changed in the meantime")
@@ -304,16 +309,16 @@ class Server:
         elif do == "asked":
             event.body["question"] = self._question(game, words(message["text"]))
         elif do == "answered":
-            picture = message.get("picture")
+            part, picture = game.table.part, message.get("picture")
             if picture is not None:
-                if not game.table.part.send_pictures:
+                if not part.send_pictures:
                     raise ActionError("no pictures are sent here")
                 if picture not in range(len(game.situation.world.graph.positions)):
                     raise ActionError("there is no such viewpoint")
-            reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said))
+            reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said), part.way)
             event.body["reply"] = parse(to_json(reply))
         await self.happen(event)
-        await self.settle(*(self.sessions.people[p] for p in game.people.values()))
+        return [self.sessions.people[p] for p in game.people.values()]
 
     def _question(self, game: Game, text: str) -> str:
         part = game.table.part
@@ -332,7 +337,7 @@ class Server:
             self._plans[name] = plan_of(self._houses[name], self.pictures)
         socket = self._sockets.get(person.id)
         if socket is not None:
-            await socket.send_text(json.dumps({"house": self._plans[name]}))
+            await socket.send_text(json.dumps({"plan": self._plans[name]}))
 
     async def _admin(self, socket: WebSocket, word: str) -> None:
         if not hmac.compare_digest(word.encode(), self.token("results").encode()):

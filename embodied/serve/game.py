@@ -123,8 +123,8 @@ class Game:
         if self.practice:
             self.relay = Relay()
             self.env: HelpEnv = TalkEnv(self.table.places, self.relay, PanoramicMoves())
-            self.agent = None if "agent" in self.people else Follower()
-            self.assistant = None if "assistant" in self.people else PathSpeaker()
+            self.agent: Agent | None = None if "agent" in self.people else Follower()
+            self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
         else:
             self.env, self.relay = self.table.make_env()
             self.agent, self.assistant = self.table.agent, self.table.assistant
@@ -153,7 +153,10 @@ class Game:
     @property
     def episode(self) -> Episode:
         """The finished episode, with the seconds of its steps."""
-        names = [self.people.get("agent", self.table.part.agent), self.people.get("assistant", self.table.part.assistant)]
+        names = [
+            self.people.get("agent", self.table.part.agent),
+            self.people.get("assistant", self.table.part.assistant),
+        ]
         return dataclasses.replace(self.env.episode(" with ".join(names)), steps=tuple(self._steps))
 
     @property
@@ -179,7 +182,7 @@ class Game:
             self.relay.reply = reply
             question, self.question = self.question, None
             self._step(Ask(question=question), self._asked_at)
-            picture = None if reply.image is None else reply.image._node
+            picture = None if reply.image is None else reply.image.node
             seconds = event.time - self._asked_at
             self.said.append({"who": "assistant", "text": reply.text or "", "picture": picture, "seconds": seconds})
         else:

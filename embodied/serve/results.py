@@ -104,7 +104,7 @@ def agreement(ratings: Iterable[tuple[str, float]]) -> float | None:
 
 def summary(sessions: Sessions, now: float) -> dict[str, Any]:
     """The figures of a study so far."""
-    people = [p for p in sessions.people.values()]
+    people = list(sessions.people.values())
     ends = Counter(p.ended for p in people)
     active = sum(p.connected > 0 and p.ended is None for p in people)
     away = sum(p.connected == 0 and p.ended is None for p in people)
@@ -143,15 +143,11 @@ def part_summary(sessions: Sessions, name: str) -> dict[str, Any]:
             "minutes per episode": mean([(g.last_change - g.begun) / 60 for g in whole]),
         }
     told = [e for e in sessions.judgements if e.body["part"] == name]
-    stars = [(e.body["unit"], e.body["stars"]) for e in told if e.body.get("stars")]
-    return {
-        "name": name,
-        "wanted": len(sessions.episodes(part)) * part.answers,
-        "done": len(told),
-        "stars, mean": mean([s for _, s in stars]),
-        "agreement (alpha)": agreement(stars),
-        "words per description": mean([len(e.body["text"].split()) for e in told if e.body.get("text")]),
-    }
+    facts = {"name": name, "wanted": len(sessions.episodes(part)) * part.answers, "done": len(told)}
+    if part.kind == "describe":
+        return {**facts, "words per description": mean([len(e.body["text"].split()) for e in told])}
+    stars = [(e.body["unit"], e.body["stars"]) for e in told]
+    return {**facts, "stars, mean": mean([s for _, s in stars]), "agreement (alpha)": agreement(stars)}
 
 
 def ratio(a: int, b: int) -> float | None:

@@ -53,7 +53,11 @@ class Opened:
 
 
 def open_study(
-    path: Path, folder: Path, draw: PanoramaDrawer, agents: Mapping[str, AgentMaker] = POLICIES, origins: Iterable[str] = ()
+    path: Path,
+    folder: Path,
+    draw: PanoramaDrawer,
+    agents: Mapping[str, AgentMaker] = POLICIES,
+    origins: Iterable[str] = (),
 ) -> Opened:
     """Open a study and read what people did before.
 
@@ -71,10 +75,10 @@ def open_study(
     folder.mkdir(parents=True, exist_ok=True)
     tables = {p.name: set_table(p, data, agents) for p in study.parts if p.kind == "play"}
     viewed = {p.name: tuple(load_lines(data_path / p.episodes, Episode)) for p in study.parts if p.episodes}
-    worlds = {w: None for t in tables.values() for w in t.places} | {e.task.world: None for v in viewed.values() for e in v}
-    for world in worlds:
+    worlds = {w for t in tables.values() for w in t.places} | {e.task.world for v in viewed.values() for e in v}
+    for world in sorted(worlds):
         data.place(world)  # refuses houses that the data set has not
-    files = {w: PanoramaFile(draw(data, w)) for w in worlds}
+    files = {w: PanoramaFile(draw(data, w)) for w in sorted(worlds)}
     store = Store(folder / "people.db")
     secret = store.about("secret", secrets.token_hex(32))
     digest = hashlib.sha256((to_json(study) + data.digest).encode()).hexdigest()

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step
+from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.sessions import STARS, Person, Sessions
 from embodied.serve.study import Part
+from embodied.serve.talk import way_to_goal
 
 Screen = dict[str, Any]
 
@@ -61,10 +62,8 @@ def coming(sessions: Sessions, person: Person) -> Screen:
 def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     """What both roles see."""
     world = game.task.world
-    said = [
-        {"who": s["who"], "text": s["text"], "pano": None if s["picture"] is None else pictures.name(world, s["picture"])}
-        for s in game.said
-    ]
+    shown = lambda node: None if node is None else pictures.name(world, node)
+    said = [{"who": s["who"], "text": s["text"], "pano": shown(s["picture"])} for s in game.said]
     return {
         "screen": role,
         "game": game.id,
@@ -81,11 +80,17 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     }
 
 
+def _picture_of(sight: Sight, pictures: Pictures) -> str:
+    """The name under which the browser gets what a sight shows."""
+    at = viewpoint(sight)
+    return pictures.name(at.world, at.node)
+
+
 def agent_of(game: Game, pictures: Pictures) -> Screen:
     """What the agent sees, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
-    target = seen.target and pictures.name(seen.target._world, seen.target._node)
+    target = None if seen.target is None else _picture_of(seen.target, pictures)
     return {
         "moves": moves_of(seen, game.situation, pictures),
         "words": list(seen.candidates.words),
@@ -103,12 +108,13 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
 
 def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> list[Screen]:
     """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
-    c = seen.candidates
+    c, at = seen.candidates, situation.world.graph.positions
     return [
         {
             "candidate": i,
             "yaw": round(float(situation.pose.yaw + c.bearing[i]), 4),
             "pitch": round(float(c.slope[i]), 4),
+            "distance": round(float(np.linalg.norm(at[node] - at[situation.pose.node])), 2),
             "pano": pictures.name(situation.task.world, node),
         }
         for i, node in enumerate(situation.candidate_nodes)
@@ -119,16 +125,13 @@ def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> lis
 def assistant_of(game: Game, pictures: Pictures) -> Screen:
     """What the assistant sees."""
     part, s = game.table.part, game.situation
-    goals = s.task.goal_nodes
-    graph = s.world.graph
-    goal = min(goals, key=lambda g: (graph.distance[s.pose.node, g], g))
     show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
     return {
         "house": s.task.world,
         "node": s.pose.node,
         "trail": list(s.trail),
-        "goals": list(goals) if show_goal else [],
-        "way": list(graph.path(s.pose.node, goal)) if show_way else [],
+        "goals": list(s.task.goal_nodes) if show_goal else [],
+        "way": list(way_to_goal(s, part.way)) if show_way else [],
         "sendPictures": part.send_pictures,
     }
 

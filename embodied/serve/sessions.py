@@ -281,8 +281,9 @@ class Sessions:
 
     def _waiting(self, part: Part, role: str) -> list[Person]:
         """Those who wait for somebody in `role`, the longest first."""
-        here = [(p.waiting[1], p) for p in self.people.values() if p.waiting and p.waiting[0] == part.name and p.connected]
-        return [p for _, p in sorted(here, key=lambda x: x[0]) if p.roles[part.name] != role]
+        here = [(p.waiting, p) for p in self.people.values() if p.waiting and p.connected]
+        here = [(w, p) for w, p in here if w[0] == part.name and p.roles[part.name] != role]
+        return [p for _, p in sorted(here, key=lambda x: x[0])]
 
     def _begin(self, part: Part, people: Mapping[str, Person], unit: str | None, now: float) -> Event:
         for person in people.values():

@@ -53,6 +53,8 @@ class Part:
     """Most questions in an episode; None leaves it to the task."""
     show_way: bool = True
     """The assistant sees the shortest way on the plan."""
+    way: int = 0
+    """Only so many steps of it, which answers then speak of; 0 is all."""
     show_goal: bool = True
     """The assistant sees the goal on the plan."""
     send_pictures: bool = True

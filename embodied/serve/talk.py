@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from embodied.action_spaces import Moves
-from embodied.envs.base import HelpEnv
+from embodied.envs.base import HelpEnv, required
 from embodied.interface import (
     Action,
     Actions,
@@ -18,14 +19,17 @@ from embodied.interface import (
     Observations,
     Place,
     Reply,
-    Sight,
     Situation,
     Situations,
     Subtask,
+    Viewpoint,
 )
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import nearest
 from embodied.policies.baselines import Shortest
+
+SAID = "said "
+"""How the ids of sub-tasks begin that people put into words."""
 
 
 class Relay:
@@ -85,23 +89,26 @@ class TalkEnv(HelpEnv):
         return self._prices.get(action.question or "", 0.0) if isinstance(action, Ask) else 0.0
 
 
-def spoken_reply(situation: Situation, text: str, picture: int | None, number: int) -> Reply:
-    """What a person's words mean to an environment: the way to what they show, or else to the nearest goal.
+def spoken_reply(situation: Situation, text: str, picture: int | None, number: int, way: int = 0) -> Reply:
+    """What a person's words mean to an environment: the way to what they show, or else the one they were shown.
 
     Args:
       picture: the node whose view they show, if any.
       number: of the question in its episode.
+      way: as in `way_to_goal`.
     """
-    world, pose, goals = situation.world, situation.pose, situation.task.goal_nodes
-    target = nearest(world.graph, pose.node, goals) if picture is None else picture
-    subtask = Subtask(
-        f"said {number}",
-        target,
-        start=pose,
-        goal=nearest(world.graph, target, goals),
-        path=tuple(world.graph.path(pose.node, target)),
-    )
-    return Reply(text, None if picture is None else Sight(situation.task.world, picture), subtask=subtask)
+    graph, pose = situation.world.graph, situation.pose
+    path = way_to_goal(situation, way) if picture is None else graph.path(pose.node, picture)
+    goal = nearest(graph, path[-1], situation.task.goal_nodes)
+    subtask = Subtask(f"{SAID}{number}", path[-1], start=pose, goal=goal, path=path)
+    return Reply(text, None if picture is None else Viewpoint(situation.task.world, picture), subtask=subtask)
+
+
+def way_to_goal(situation: Situation, steps: int = 0) -> tuple[int, ...]:
+    """The shortest way to the nearest goal, only its first `steps` edges unless that is 0. Nodes."""
+    graph, node = situation.world.graph, situation.pose.node
+    way = graph.path(node, nearest(graph, node, situation.task.goal_nodes))
+    return way[: steps + 1] if steps else way
 
 
 class PathSpeaker:
@@ -117,7 +124,8 @@ class PathSpeaker:
         world, pose = situation.world, situation.pose
         path = world.graph.path(pose.node, nearest(world.graph, pose.node, situation.task.goal_nodes))
         text = "You are there." if len(path) == 1 else self._language.route(world, path, pose.yaw, rng=rng)
-        return spoken_reply(situation, text, None, situation.requests)
+        reply = spoken_reply(situation, text, None, 0)
+        return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 
 
 class Follower:
@@ -148,4 +156,3 @@ def loaded(name: str) -> Any:
         return getattr(importlib.import_module(module), attribute)()
     except (ImportError, AttributeError, TypeError) as e:
         raise ValueError(f"{name!r} should name a module and a class without arguments, 'module:Class' ({e})") from e
-

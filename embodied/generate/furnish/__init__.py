@@ -1,8 +1,9 @@
 """Furnishing: a House with rooms and openings becomes one with objects and lights.
 
 Room by room: groups of furniture claim their place in order of importance (rooms.py, the table of
-what each kind of room gets), then what hangs on ceilings and walls (ceilings.py, hanging.py,
-pictures.py), then small things on surfaces (smalls.py), then what the household leaves about (traces.py), then lights.
+what each kind of room gets), then what a user's own classes add (own.py), then what hangs on ceilings and walls
+(ceilings.py, hanging.py, pictures.py), then small things on surfaces (smalls.py), then what the household leaves about
+(traces.py), then lights.
 docs/houses.md tells more.
 """
 
@@ -16,6 +17,7 @@ from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.hanging import hang_all
 from embodied.generate.furnish.lights import lights
+from embodied.generate.furnish.own import place_own
 from embodied.generate.furnish.rooms import furnish_room, missing
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import room_space
@@ -45,6 +47,9 @@ def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
     rooms: list[Context] = []
     for room in draft.rooms:
         ctx = _arranged(draft, room, stock, kinds, household, seed)
+        drawn, ctx.rng = ctx.rng, stream(seed, "furnish", room.id, "own")  # others draw what they drew without
+        place_own(ctx)
+        ctx.rng = drawn
         hang_all(ctx)
         clutter(ctx)
         rooms.append(ctx)

@@ -90,6 +90,20 @@ def _ceiling_lamp(ctx: Context) -> Asset | None:
     return ctx.pick("ceiling light", most=(0.9, 0.9, height - 2.0), avoid=()) or ctx.pick("ceiling lamp", avoid=())
 
 
+def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float) -> bool:
+    """Hang a thing that is no lamp from the ceiling over (x, y), if it fits there; `elevation` is its drop."""
+    w, d, h = asset.size
+    top = ctx.space.bottom + ctx.space.height - asset.elevation
+    filled = box(x, y, w, d, 0.0, top - h, top)
+    if any(overlap(filled, k) for k in ctx.space.keepouts) or not ctx.space.fits(filled, passage=True):
+        return False
+    ctx.space.add([filled])
+    ctx.things.append(
+        Thing(asset, x, y, top - h, 0.0, asset.size, looks(ctx, asset), group="ceiling", role=asset.object_class)
+    )
+    return True
+
+
 def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | None) -> bool:
     """Hang `lamp` from the ceiling over (x, y); `underside` is the z its lowest point should have."""
     w, d, h = lamp.size

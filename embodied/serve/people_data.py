@@ -1,0 +1,169 @@
+"""A data set with people's words: what they answered and described, beside or instead of what the data set says.
+
+Learners read it like any other. HANNA's assistants and ILIAD's describers speak the routes that people worded; VNLA's
+advisor says a sub-goal as a person did where somebody meant the same actions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from assets.cache import write_bytes
+from embodied.assistants.advisor import HELP_STEPS
+from embodied.assistants.route_system import WORDINGS
+from embodied.datasets.build import UnitFacts, share, write_index
+from embodied.datasets.checks import DatasetError
+from embodied.datasets.store import SUBGOALS, Dataset
+from embodied.evaluation.metrics import sdtw, without_repeats
+from embodied.interface import STEP, Episode, Pose, Route
+from embodied.language.plain import PlainLanguage
+from embodied.language.said import Said
+from embodied.records import load_json, load_lines, save_lines
+from embodied.seeds import stream
+from embodied.serve.results import JUDGEMENTS, Judgement
+from embodied.serve.talk import SAID
+from embodied.tasks.vln import vln_task
+from embodied.teachers.vnla import VnlaTeacher
+
+
+@dataclass(frozen=True)
+class Worded:
+    """Words of a person for a way."""
+
+    world: str
+    path: tuple[int, ...]
+    turn: int
+    """How whoever walks it stands at first, in steps of 30 degrees."""
+    text: str
+
+
+def worded_by_people(folder: Path) -> list[Worded]:
+    """What people answered and described, from the folder of a study; the same words for the same way count once."""
+    found = [
+        w for path in sorted(folder.glob("episodes*.jsonl")) for e in load_lines(path, Episode) for w in answers(e)
+    ]
+    judged = folder / JUDGEMENTS
+    for told in load_lines(judged, Judgement) if judged.exists() else ():
+        path = without_repeats(told.episode.nodes)
+        if told.stars is None and len(path) > 1:
+            found.append(Worded(told.episode.task.world, path, told.episode.task.start.turn, told.text))
+    return list(dict.fromkeys(found))
+
+
+def answers(episode: Episode) -> Iterator[Worded]:
+    """The answers of people in an episode, with the way that was meant; machines' have no such sub-task."""
+    for step in episode.steps:
+        reply, meant = step.reply, step.reply and step.reply.subtask
+        if reply and reply.text and meant and meant.id.startswith(SAID) and len(meant.path) > 1:
+            yield Worded(episode.task.world, meant.path, step.pose.turn, reply.text)
+
+
+def rated_by_people(folder: Path, source: Dataset) -> list[tuple[float, int]]:
+    """(SDTW of an episode against the shortest way, the stars somebody gave it), of the folder of a study."""
+    judged, found = folder / JUDGEMENTS, []
+    for told in load_lines(judged, Judgement) if judged.exists() else ():
+        if told.stars is not None:
+            task, graph = told.episode.task, source.place(told.episode.task.world).graph
+            goal = min(task.goal_nodes, key=lambda g: (graph.distance[task.start.node, g], g))
+            way = graph.path(task.start.node, goal)
+            found.append((sdtw(without_repeats(told.episode.nodes), way, graph, max(task.radius, 1e-6)), told.stars))
+    return found
+
+
+def write_people_dataset(source: Dataset, words: Sequence[Worded], out: Path, *, only: bool = False) -> Dataset:
+    """Write the data set `source` with people's words into the new folder `out`.
+
+    In houses to train in, people's words are those of training, and a plain wording of the same way is what is held
+    out; in the others, people's words are what agents are judged by.
+
+    Args:
+      only: leave out all other routes.
+
+    Raises:
+      DatasetError: no words, words of other houses, or a kind that nothing is made for.
+    """
+    names = {n for s in source.splits for n in source.names(s)}
+    if strange := sorted({w.world for w in words} - names):
+        raise DatasetError(
+            f"people spoke of {strange[:3]}, which {source.folder} has not; name the data set of the study"
+        )
+    if source.kind not in ("hanna", "vln", "vnla"):
+        raise DatasetError(
+            f"{source.folder} is of kind {source.kind!r}; words of people are of use in hanna, vln and vnla"
+        )
+    if not words:
+        raise DatasetError("nobody has said or described anything yet")
+    if out.exists() and any(out.iterdir()):
+        raise DatasetError(f"{out} is not empty; choose another folder")
+    of_house = defaultdict(list)
+    for w in words:
+        of_house[w.world].append(w)
+    for name in sorted(names):
+        _write_house(source, name, of_house[name], out / "houses" / name, only)
+    if (source.folder / "features").exists():
+        shutil.copytree(
+            source.folder / "features", out / "features", copy_function=lambda a, b: share(Path(a), Path(b))
+        )
+    write_bytes(out / "config.json", (source.folder / "config.json").read_bytes())
+    write_index(source.config, out)
+    return Dataset(out)
+
+
+def _write_house(source: Dataset, name: str, words: Sequence[Worded], home: Path, only: bool) -> None:
+    old = source.folder / "houses" / name
+    home.mkdir(parents=True)
+    for path in sorted(old.iterdir()):
+        if path.suffix in (".json", ".jsonl"):
+            shutil.copyfile(path, home / path.name)
+    share(old / "panoramas.pano", home / "panoramas.pano")
+    facts = load_json(home / "unit.json", UnitFacts)
+    if source.kind == "vnla":
+        said = list(_subgoals(source, words))
+        if said:
+            save_lines(home / SUBGOALS, said)
+        return
+    split, *_, held_out = WORDINGS[{"extra": "train", "ood": "test"}.get(facts.group, facts.group)]
+    mine = list(_routes(source, name, words, split, held_out))
+    kept = [] if only else list(source.routes(name))
+    save_lines(home / "routes.jsonl", [*kept, *mine])
+    tasks = dict(facts.tasks)
+    if source.kind == "vln":
+        for part in tasks:
+            heard = held_out if part != "train" and facts.group == "train" else split
+            file = home / f"tasks_{part}.jsonl"
+            old_tasks = [] if only else file.read_text(encoding="utf-8").splitlines()
+            new = [vln_task(name, r) for r in mine if r.split == heard]
+            save_lines(file, new)
+            text = "".join(line + "\n" for line in old_tasks) + file.read_text(encoding="utf-8")
+            write_bytes(file, text.encode())
+            tasks[part] = len(old_tasks) + len(new)
+    facts = dataclasses.replace(facts, routes=len(kept) + len(mine), tasks=tasks)
+    body = {**dataclasses.asdict(facts), "config": source.config.facts()}
+    write_bytes(home / "unit.json", (json.dumps(body, sort_keys=True, indent=1) + "\n").encode())
+
+
+def _routes(source: Dataset, name: str, words: Sequence[Worded], split: str, held_out: str) -> Iterator[Route]:
+    """People's routes and, where another wording of every path is held out, the plain one of each path."""
+    place, plain, seen = source.place(name), PlainLanguage(), Counter[tuple[int, ...]]()
+    for k, w in enumerate(words):
+        yield Route(f"{name}_people_{k}", w.path, w.turn, 0, w.text, split)
+        seen[w.path] += 1
+        if held_out != split and seen[w.path] == 1:
+            rng = stream(0, "plain", name, k)
+            text = plain.route(place, w.path, w.turn * STEP, rng=rng)
+            yield Route(f"{name}_people_{k}_plain", w.path, w.turn, 0, text, held_out)
+
+
+def _subgoals(source: Dataset, words: Sequence[Worded]) -> Iterator[Said]:
+    """Ways of at most HELP_STEPS actions, as the advisor words them, with what people said."""
+    teacher = VnlaTeacher()
+    for w in words:
+        actions, end = teacher.words(source.place(w.world), Pose(w.path[0], w.turn), (w.path[-1],), HELP_STEPS)
+        if end.node == w.path[-1]:
+            yield Said(tuple(a for a in actions if a != "stop"), w.text)

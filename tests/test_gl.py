@@ -1,0 +1,164 @@
+"""OpenGL: opened only by who draws, shared by threads, closed without a word."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import resource
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from embodied import gl
+from embodied.navigation.graph import graph_of
+from embodied.render.classic import Renderer
+from embodied.render.pictures import PictureSettings
+from embodied.scene.model import compile_scene
+from embodied.world import World
+
+pytestmark = pytest.mark.gl
+EYE = (3.0, 2.0, 1.5)
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+def world_of(house, tmp_path, **more) -> World:
+    graph = graph_of(np.array([EYE]), np.empty((0, 2), int), ("a",), ("living_room_1",))
+    pictures = PictureSettings(size=32)
+    return World(house, HandCatalogue(), graph, tmp_path, pictures, file=tmp_path / "a.pano", **more)
+
+
+def sum_of(world: World) -> int:
+    return int(world.panorama(0).rgb.astype(np.int64).sum())
+
+
+def test_stored_pictures_are_read_without_opengl_and_in_forked_workers(house, tmp_path, monkeypatch):
+    with world_of(house, tmp_path) as world:
+        world.render_all()
+        drawn, device = sum_of(world), world.fingerprint["renderer"]
+    refused = lambda *a: pytest.fail("OpenGL was opened")
+    monkeypatch.setattr(gl, "drawing", refused)
+    monkeypatch.setattr(gl, "make_current", refused)
+    monkeypatch.setattr(gl, "info", refused)
+    with world_of(house, tmp_path, may_differ=("renderer", "code")) as world:
+        assert sum_of(world) == drawn and world.fingerprint["renderer"] == device
+        assert world.render_all() == tmp_path / "a.pano"
+        context = multiprocessing.get_context("fork")
+        queue = context.Queue()
+        worker = context.Process(target=lambda: queue.put(sum_of(world)))
+        worker.start()
+        assert queue.get(timeout=30) == drawn
+        worker.join(timeout=30)
+
+
+def test_stored_pictures_that_are_damaged_are_drawn_again_under_the_name_of_who_draws(house, tmp_path):
+    with world_of(house, tmp_path) as world:
+        path, drawn = world.render_all(), sum_of(world)
+    data = bytearray(path.read_bytes())
+    data[20] ^= 255
+    path.write_bytes(data)
+    with world_of(house, tmp_path, may_differ=("renderer",)) as world:
+        world.render_all()
+        assert sum_of(world) == drawn and world.fingerprint["renderer"] == str(gl.info())
+
+
+def test_threads_take_turns(house):
+    with Renderer(house, HandCatalogue(), size=32) as renderer:
+        expected = renderer.panorama(EYE).rgb
+        found, failed = [], []
+
+        def draw(own: bool) -> None:
+            try:
+                mine = Renderer(house, HandCatalogue(), size=32) if own else renderer
+                found.append(mine.panorama(EYE).rgb)
+                if own:
+                    mine.close()
+            except Exception as e:
+                failed.append(e)
+
+        for threads in (
+            [threading.Thread(target=draw, args=(False,))],
+            [threading.Thread(target=draw, args=(True,))] * 1,
+        ):
+            for t in threads:
+                t.start()
+                t.join()
+        together = [threading.Thread(target=draw, args=(True,)) for _ in range(3)]
+        for t in together:
+            t.start()
+        for t in together:
+            t.join()
+        assert not failed and len(found) == 5
+        assert all((f == expected).all() for f in found)
+        assert (renderer.panorama(EYE).rgb == expected).all(), "the first thread draws on"
+
+
+def ended(code: str, **environment: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, **environment},
+    )
+
+
+def test_nothing_is_printed_at_exit_where_dm_control_is_imported_after_the_first_picture():
+    done = ended("from embodied import gl; gl.info(); import embodied.envs.driven")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.parametrize("device", ["-1", "first", ""])
+def test_a_device_that_is_no_number_is_refused(monkeypatch, device):
+    monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", device)
+    with pytest.raises(gl.GLError, match="MUJOCO_EGL_DEVICE_ID is"):
+        gl.choose()
+
+
+def test_a_device_that_is_not_there_is_one_sentence_with_its_remedy():
+    code = "from embodied import gl\ntry: gl.info()\nexcept gl.GLError as e: print(e)"
+    done = ended(code, MUJOCO_GL="egl", MUJOCO_EGL_DEVICE_ID="99")
+    assert "Unset MUJOCO_EGL_DEVICE_ID" in done.stdout and not done.stderr
+
+
+def test_a_broken_library_gives_the_remedy(monkeypatch, tmp_path):
+    broken = tmp_path / "libEGL.so"
+    broken.write_bytes(b"not a library")
+    monkeypatch.delenv("MUJOCO_GL")
+    monkeypatch.setattr(gl.ctypes.util, "find_library", lambda name: str(broken) if name == "EGL" else None)
+    gl._first_available.cache_clear()
+    try:
+        with pytest.raises(gl.GLError, match="apt-get install"):
+            gl.choose()
+    finally:
+        gl._first_available.cache_clear()
+
+
+@pytest.mark.slow
+def test_opening_and_closing_two_hundred_times_leaves_nothing_behind(house, tmp_path):
+    scene = compile_scene(house, HandCatalogue(), collisions=False)
+    with world_of(house, tmp_path) as world:
+        world.render_all()
+
+    def once() -> None:
+        with world_of(house, tmp_path, may_differ=("renderer",)) as world:
+            world.panorama(0)
+        with Renderer(house, HandCatalogue(), size=32, scene=scene) as renderer:
+            renderer.view(EYE, 0.0, size=(16, 16))
+
+    for _ in range(20):
+        once()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, len(os.listdir("/proc/self/fd")), gl._owner().context
+    for _ in range(180):
+        once()
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, len(os.listdir("/proc/self/fd")), gl._owner().context
+    assert after[1:] == before[1:] and after[0] - before[0] < 30_000, "kilobytes; a leak of 200 kB each would show"

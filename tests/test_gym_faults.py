@@ -1,0 +1,258 @@
+"""Environments under mistakes: nothing half-steps, nothing leaks, what is asked for is there or refused in words."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import subprocess
+import sys
+import weakref
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from conftest import two_rooms
+from hand_data import build
+from hand_worlds import grid_world
+from handmade import HandCatalogue, furnished
+from test_gym import make
+from test_gym_pixels import NODES, ROOMS, tasks_in
+
+import embodied.gym.env
+from embodied.datasets.store import Dataset
+from embodied.envs.base import ActionError, HelpEnv
+from embodied.gym.env import HelpGymEnv
+from embodied.gym.eyes import Closed, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.in_step import InStep
+from embodied.gym.spaces import SpaceLayout, number
+from embodied.navigation.graph import graph_of
+from embodied.teachers.shortest import shortest_action
+from embodied.world import open_world
+
+STOP = SpaceLayout().candidates
+
+
+@pytest.fixture(scope="module")
+def tmp(tmp_path_factory) -> str:
+    return str(tmp_path_factory.mktemp("cache"))
+
+
+def batch(tmp, n=3, **options) -> InStep:
+    return embodied.gym.env.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
+
+
+def times(envs) -> list[int]:
+    return [env._env.time for env in envs.envs]
+
+
+@pytest.mark.parametrize(
+    ("actions", "error", "message"),
+    [
+        ([0, 0], ValueError, "2 actions for 3 environments"),
+        ([0, 0, 0, 0], ValueError, "4 actions for 3 environments"),
+        ([0, 0, "left"], TypeError, "an action is a whole number, got 'left'"),
+        ([0, 0, 1.0], TypeError, "an action is a whole number, got 1.0"),
+        ([0, 0, STOP - 1], ActionError, "does not exist"),
+    ],
+)
+def test_a_batch_moves_no_slot_where_one_action_cannot_be_taken(tmp, actions, error, message):
+    envs = batch(tmp, strict=True)
+    envs.reset(seed=0)
+    envs.step(np.array([0, 0, 0]))
+    before = times(envs)
+    with pytest.raises(error, match=message):
+        envs.step(actions)
+    assert times(envs) == before
+    envs.step([0, 0, 0])
+    assert times(envs) == [t + 1 for t in before]
+
+
+@pytest.mark.parametrize("kind", [RuntimeError, KeyboardInterrupt])
+def test_a_slot_that_fails_begins_anew_and_the_others_go_on(tmp, kind, monkeypatch):
+    envs = batch(tmp)
+    envs.reset(seed=0)
+    envs.step(np.zeros(3, int))
+
+    def fail(action):
+        raise kind("the roof fell in")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(envs.envs[1], "step", fail)
+        with pytest.raises(kind):
+            envs.step(np.zeros(3, int))
+    after = times(envs)
+    assert after[0] == 2 and after[1] == 1 and after[2] == (2 if kind is RuntimeError else 1)
+    envs.step(np.zeros(3, int))
+    assert times(envs) == [3, 0, after[2] + 1]
+
+
+def test_a_task_is_chosen_by_the_id_that_info_tells_or_by_number(tmp):
+    env = make("find", tmp)
+    _, info = env.reset(seed=3)
+    number = [t.id for t in env._tasks].index(info["task"])
+    for name in (info["task"], number, np.int64(number)):
+        assert env.reset(options={"task": name})[1] == info
+    for wrong in (-1, len(env._tasks), 10**9, "nowhere", 1.0, [0]):
+        with pytest.raises(ValueError, match=r"there is no task .*name one by its id, such as 'grid/find.* 0 to \d+"):
+            env.reset(options={"task": wrong})
+    vector = batch(tmp)
+    vector.reset(seed=1)
+    assert list(vector.reset(options={"task": info["task"]})[1]["task"]) == [info["task"]] * 3
+
+
+def test_seeds_are_integers_of_any_kind_and_nothing_else(tmp):
+    env, vector = make("find", tmp), batch(tmp)
+    same = [env.reset(seed=s)[1]["task"] for s in (3, np.int64(3), np.uint8(3))]
+    assert len(set(same)) == 1 and list(vector.reset(seed=np.int64(3))[1]["task"])[0] == same[0]
+    for wrong in ("3", 3.0):
+        for reset in (env.reset, vector.reset):
+            with pytest.raises(TypeError, match="a seed should be an integer, got"):
+                reset(seed=wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"patience": -1}, {"patience": 0}, {"patience": 2.5}, {"render_mode": "human"}])
+def test_options_are_refused_before_anything_is_opened(wrong, tmp_path):
+    for maker in (embodied.gym.env.make, embodied.gym.env.make_vec):
+        with pytest.raises(ValueError, match=f"{next(iter(wrong))} should be"):
+            maker("find", data="no/such/folder", cache=str(tmp_path), **wrong)
+
+
+@pytest.mark.parametrize("kind", ["find", "hari"])
+def test_every_last_info_has_success_is_success_and_spl(kind, tmp):
+    env = make(kind, tmp, patience=1)
+    observation, info = env.reset(seed=0)
+    bad = int(np.flatnonzero(observation["action_mask"] == 0)[0])
+    *_, truncated, given_up = env.step(bad)
+    assert truncated and "success" not in info
+    with pytest.raises(ActionError, match="the episode is over"):
+        env.step(STOP)
+    env.reset(seed=0)
+    while True:
+        *_, terminated, truncated, stopped = env.step(STOP)
+        if terminated or truncated:
+            break
+    for last in (given_up, stopped):
+        assert {"success", "spl", "navigation_error"} <= set(last)
+        assert isinstance(last["is_success"], bool) and last["is_success"] == (last["success"] == 1)
+
+
+def test_strict_success_needs_a_stop(tmp):
+    found = {}
+    for needs_stop in (False, True):
+        env = make("find", tmp, patience=1, needs_stop=needs_stop)
+        for last_word in ("nothing", "stop"):
+            observation, _ = env.reset(seed=0)
+            inner = env._env
+            while inner.pose.node not in inner.task.goal_nodes:
+                s = inner.situation
+                action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+                observation, *_ = env.step(number(action, SpaceLayout()))
+            forbidden = int(np.flatnonzero(observation["action_mask"] == 0)[0])
+            info = env.step(STOP if last_word == "stop" else forbidden)[-1]
+            found[needs_stop, last_word] = info["success"], info["is_success"], info["spl"]
+    assert found[True, "nothing"] == (0.0, False, 0.0)
+    assert found[True, "stop"] == found[False, "stop"] == found[False, "nothing"] == (1.0, True, 1.0)
+
+
+def test_the_clock_is_of_the_size_of_other_numbers(tmp):
+    for kind in ("find", "vnla"):
+        observation, _ = make(kind, tmp).reset(seed=0)
+        assert np.abs(observation["clock"]).max() <= 2 and (kind == "vnla" or observation["clock"][2] == -1)
+
+
+def test_pictures_of_all_houses_have_one_even_size(tmp):
+    sizes = set()
+    for shape in ((4, 1.5), (6, 2.5)):
+        world = grid_world(*shape)
+        env = embodied.gym.env.make("find", cache=tmp, worlds={"grid": world}, sees="oracle", render_mode="rgb_array")
+        env.reset(seed=0)
+        sizes.add(env.render().shape)
+    assert sizes == {(544, 1120, 3)}
+
+
+@pytest.mark.slow
+def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
+    build(tmp_path / "data", tmp_path / "cache", "vnla")
+    for _ in range(3):
+        split = Dataset(tmp_path / "data").split("val_seen")
+        env = HelpGymEnv(split.make_env, split.tasks, Closed())
+        env.reset(seed=0)
+        places = [weakref.ref(place) for place in split.worlds.values()]
+        assert all(place() is not None for place in places)
+        del split, env
+        gc.collect()
+        assert [place() for place in places] == [None] * len(places)
+
+
+def pixels(cache: Path) -> HelpGymEnv:
+    """An environment that sees the panoramas of a small house, which `drawn` has drawn."""
+    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
+    world = open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48)
+    eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, opened=[world])
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory) -> Path:
+    cache = tmp_path_factory.mktemp("drawn")
+    with contextlib.closing(pixels(cache)) as env:
+        env._opened[0].render_all()
+    return cache
+
+
+@pytest.mark.gl
+def test_two_hundred_environments_that_see_leave_neither_memory_nor_files(drawn):
+    process, grown, houses = psutil.Process(), [], []
+    for k in range(200):
+        with contextlib.closing(pixels(drawn)) as env:
+            assert env.reset(seed=k)[0]["rgb"].any()
+            houses.append(weakref.ref(env._opened[0]))
+        del env
+        if k % 50 == 49:
+            gc.collect()
+            assert not any(house() for house in houses)
+            grown.append((process.memory_info().rss, process.num_fds(), process.num_threads()))
+    assert grown[3][0] - grown[0][0] < 10e6 and grown[3][1:] == grown[0][1:]
+
+
+WORKERS = """
+import functools, sys
+from pathlib import Path
+import gymnasium as gym, numpy as np
+from embodied import gl
+from test_gym_faults import pixels
+
+if __name__ == "__main__":
+    context, cache = sys.argv[1], Path(sys.argv[2])
+    make = functools.partial(pixels, cache)
+    many = gym.vector.AsyncVectorEnv([make] * 2, context=context)
+    seen, _ = many.reset(seed=3)
+    assert gl._owner().context is None, "the parent has opened OpenGL"
+    one = gym.vector.SyncVectorEnv([make] * 2)
+    told, _ = one.reset(seed=3)
+    for k in range(6):
+        assert seen["rgb"].any() and all((seen[n] == told[n]).all() for n in told), k
+        moves = np.where(told["action_mask"][:, k % 3], k % 3, 16)
+        seen, told = many.step(moves)[0], one.step(moves)[0]
+    many.close(), one.close()
+    print("same")
+"""
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+@pytest.mark.parametrize("context", ["fork", "spawn"])
+def test_gymnasiums_processes_show_the_pictures_that_one_process_shows(context, drawn, tmp_path):
+    script = tmp_path / "workers.py"
+    script.write_text(WORKERS)
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    done = subprocess.run(
+        [sys.executable, script, context, str(drawn)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": paths},
+    )
+    assert done.stdout.strip() == "same", done.stderr[-3000:]

@@ -1,0 +1,403 @@
+"""People in every role: what a study is, who gets which task, what people are shown, and what is left of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hand_serve import HEAD, TOGETHER, make_data, write_study
+
+from agents.bandit.ratings import Rater, fitted
+from agents.vnla.run import vocabulary_of
+from embodied.envs.base import ActionError
+from embodied.interface import Ask, Episode
+from embodied.language.plain import PlainLanguage
+from embodied.language.said import PeoplesWords
+from embodied.records import load_lines, parse, to_json
+from embodied.serve.game import set_table
+from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
+from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
+from embodied.serve.screens import screen_of
+from embodied.serve.sessions import Sessions
+from embodied.serve.store import Event
+from embodied.serve.study import Part, Question, StudyError, load_study
+from embodied.serve.talk import spoken_reply
+from embodied.teachers.vnla import VnlaTeacher
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory, shared_cache):
+    return make_data(tmp_path_factory.mktemp("study"), shared_cache)
+
+
+class Names:
+    """Panoramas that are only named."""
+
+    def name(self, world, node):
+        return f"{world}-{node}"
+
+
+class Script:
+    """Sessions without a server: events are applied at once, and kept as a log."""
+
+    def __init__(self, data, parts, **changes):
+        study = load_study(write_study(data.folder.parent, parts))
+        self.study = dataclasses.replace(study, **changes)
+        self.tables = {p.name: set_table(p, data) for p in study.parts if p.kind == "play"}
+        self.sessions, self.log, self.time = Sessions(self.study, self.tables, {}), [], 1000.0
+
+    def do(self, kind, person=None, /, **body):
+        self.time += 1
+        self.take(Event(kind, self.time, person, f"m{len(self.log)}" if person else None, body))
+
+    def take(self, event):
+        self.sessions.apply(event)
+        self.log.append(event)
+
+    def join(self, *names):
+        for name in names:
+            self.do("joined", None, person=name, key=f"key of {name}")
+            self.do("consented", name)
+            self.sessions.people[name].connected = 1
+
+    def ready(self, *names):
+        """They press 'go on'; what can begin begins."""
+        for name in names:
+            person = self.sessions.people[name]
+            person.ready = True
+            while events := self.sessions.next(person, self.time):
+                for event in events:
+                    self.take(event)
+
+    def game(self, name):
+        return self.sessions.games[self.sessions.people[name].game]
+
+    def play(self, name, kind, **body):
+        self.do(kind, name, game=self.sessions.people[name].game, **body)
+
+    def answer(self, name, text, picture=None):
+        reply = spoken_reply(self.game(name).situation, text, picture, 1)
+        self.play(name, "answered", reply=parse(to_json(reply)))
+
+    def screen(self, name):
+        return screen_of(self.sessions, self.sessions.people[name], Names(), "CODE")
+
+    def episode(self, agent, assistant):
+        """A short one."""
+        self.play(agent, "asked", question="Where?")
+        self.answer(assistant, "over there")
+        self.play(agent, "stopped")
+
+
+def test_a_mistake_in_a_study_is_told_with_its_place(tmp_path):
+    for parts, said in (
+        ('[[parts]]\nname = "a"\nagnet = "person"\n', "agnet"),
+        ('[[parts]]\nname = "a"\nagent = "random"\nassistant = "none"\n', "nobody would take part"),
+        ('[[parts]]\nname = "a"\nkind = "rate"\nof = "b"\n', "'b'"),
+        (TOGETHER + TOGETHER, "name of its own"),
+        ("parts = 3\n", "parts"),
+    ):
+        with pytest.raises(StudyError, match=said):
+            load_study(write_study(tmp_path, parts))
+
+
+def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(data, tmp_path):
+    play = Script(data, TOGETHER)
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+    assert play.screen("ann")["screen"] == "agent" and play.screen("bob")["screen"] == "assistant"
+    play.play("ann", "asked", question="Which door?")
+    play.answer("bob", "the left one", picture=9)
+    play.play("ann", "moved", candidate=0)
+    play.play("ann", "stopped")
+    Writer(tmp_path, play.sessions)
+    (episode,) = load_lines(tmp_path / "episodes_val_seen_together.jsonl", Episode)
+    ask, move, stop = episode.steps
+    assert isinstance(ask.action, Ask) and ask.action.question == "Which door?"
+    assert ask.reply.text == "the left one" and ask.reply.image.node == 9 == ask.reply.subtask.target
+    assert move.instruction == "the left one" and ask.pose == ask.next_pose
+    assert ask.seconds < move.seconds < stop.seconds and episode.agent == "ann with bob"
+
+
+def test_the_state_after_a_restart_is_that_before(data):
+    play = Script(data, TOGETHER + '[[parts]]\nname = "stars"\nkind = "rate"\nof = "together"\n')
+    play.join("ann", "bob", "eve", "dan")
+    play.ready("ann", "bob", "eve")
+    play.episode("ann", "bob")
+    play.ready("bob")
+    play.play("eve", "moved", candidate=0)
+    play.play("eve", "asked", question="And now?")
+    again = Script(data, (data.folder.parent / "study.toml").read_text().removeprefix(HEAD))
+    for event in play.log:
+        again.sessions.apply(Event(**json.loads(json.dumps(dataclasses.asdict(event)))))
+    for person in again.sessions.people.values():
+        person.connected = 1
+    for name in ("eve", "bob"):
+        assert again.screen(name) == play.screen(name)
+    assert summary(again.sessions, 0.0)["parts"] == summary(play.sessions, 0.0)["parts"]
+
+
+def test_every_task_gets_as_many_answers_as_wanted_and_nobody_plays_one_twice(data):
+    play = Script(data, TOGETHER + "answers = 2\n")
+    names = [f"p{i}" for i in range(8)]
+    play.join(*names)
+    for _ in range(6):
+        play.ready(*names)
+        for name in names:
+            if (game := play.sessions.people[name].game) and play.sessions.games[game].people["agent"] == name:
+                play.episode(name, play.game(name).people["assistant"])
+    games = play.sessions.games.values()
+    count = {t: sum(g.task.id == t for g in games) for t in play.tables["together"].tasks}
+    assert set(count.values()) == {2} and len(count) == 3
+    had = [(p, g.task.id) for g in games for p in g.people.values()]
+    assert len(had) == len(set(had))
+    assert all(p.ended in ("done", "nothing") for p in play.sessions.people.values())
+
+
+def test_judges_see_what_others_played_and_never_their_own(data, tmp_path):
+    play = Script(data, TOGETHER + '[[parts]]\nname = "stars"\nkind = "rate"\nof = "together"\nanswers = 2\n')
+    play.join("ann", "bob", "eve")
+    play.ready("ann", "bob")
+    play.episode("ann", "bob")
+    play.sessions.people["eve"].without.add("together")
+    play.ready("eve")
+    assert play.screen("eve")["screen"] == "judge" and play.sessions.people["ann"].viewing is None
+    frames = play.screen("eve")["frames"]
+    assert "Question: Where?\nAnswer: over there" in [f["text"] for f in frames] and frames[-1]["text"] == "The end."
+    with pytest.raises(ActionError, match="stars"):
+        play.do("judged", "eve", stars=6, text="")
+    play.do("judged", "eve", stars=4, text="well <b>done</b>", seconds=3.21)
+    Writer(tmp_path, play.sessions)
+    (told,) = load_lines(tmp_path / JUDGEMENTS, Judgement)
+    assert (told.stars, told.text, told.judge, told.seconds) == (4, "well <b>done</b>", "eve", 3.21)
+    assert told.episode.steps[0].reply.text == "over there"
+
+
+def test_the_agents_screen_does_not_depend_on_the_goal(data):
+    """No leak: two tasks alike but for their goal give equal screens under equal actions."""
+    screens = []
+    for away in (0, 1):
+        play = Script(data, TOGETHER)
+        table = play.tables["together"]
+        first, other = list(table.tasks.values())[:2]
+        task = dataclasses.replace(first, goal=other.goal, goal_nodes=other.goal_nodes) if away else first
+        table.tasks[first.id] = task
+        play.join("ann", "bob")
+        play.ready("ann", "bob")
+        play.play("ann", "moved", candidate=0)
+        screens.append({k: v for k, v in play.screen("ann").items() if k != "game"})
+    assert screens[0] == screens[1]
+
+
+def test_when_a_partner_goes_the_task_returns_and_the_other_goes_on(data):
+    play = Script(data, TOGETHER)
+    play.join("ann", "bob", "eve")
+    play.ready("ann", "bob")
+    task = play.game("ann").task.id
+    bob = play.sessions.people["bob"]
+    bob.connected, bob.away_since = 0, play.time
+    assert play.sessions.late(play.time + play.study.absent_seconds - 1) == []
+    (event,) = play.sessions.late(play.time + play.study.absent_seconds + 1)
+    play.take(event)
+    assert play.screen("ann")["last"] == "broken" and play.sessions.people["ann"].game is None
+    play.ready("eve", "ann")
+    facts = part_summary(play.sessions, "together")
+    assert facts["broken off"] == 1 and facts["running"] == 1
+    assert play.sessions.wanted(play.study.parts[0]) in {task, *play.tables["together"].tasks}
+    assert sum(play.sessions._counts["together"].values()) == 1
+
+
+def test_who_waits_too_long_is_thanked_and_gets_a_code(data):
+    play = Script(data, TOGETHER)
+    play.join("ann")
+    play.ready("ann")
+    assert play.screen("ann")["screen"] == "wait"
+    play.time += play.study.wait_seconds + 1
+    play.ready("ann")
+    assert play.screen("ann")["screen"] == "done"
+
+
+def test_practice_comes_first_and_does_not_count(data):
+    play = Script(data, TOGETHER, practice=True)
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+    for name in ("ann", "bob"):
+        assert play.screen(name)["practice"] and play.game(name).task.id not in play.tables["together"].tasks
+    helper = play.game("bob")
+    kind, body = helper.think()
+    assert kind == "asked"
+    play.do(kind, None, game=helper.id, **body)
+    play.answer("bob", "go on")
+    for _ in range(60):
+        if helper.over:
+            break
+        if helper.question is not None:
+            play.answer("bob", "go on")
+        else:
+            kind, body = helper.think()
+            play.do(kind, None, game=helper.id, **body)
+    assert play.screen("bob")["last"] == "found"
+    play.play("ann", "stopped")
+    play.ready("ann", "bob")
+    assert not play.screen("ann")["practice"] and play.screen("ann")["game"] == play.screen("bob")["game"]
+    assert part_summary(play.sessions, "together")["done"] == 0
+
+
+def test_a_person_is_helped_by_the_data_sets_own_assistant_under_its_own_rule(data):
+    play = Script(data, '[[parts]]\nname = "anna"\nassistant = "simulated"\ntasks = 9\nper_person = 9\n')
+    play.join("ann")
+    for _ in range(9):
+        play.ready("ann")
+        game = play.game("ann")
+        if play.screen("ann")["canAsk"]:
+            break
+        play.play("ann", "stopped")
+    play.play("ann", "asked", question="Help!")
+    kind, body = game.think()
+    play.do(kind, None, game=game.id, **body)
+    route = game.env.last_step.reply.subtask
+    assert game.situation.pose == route.start and play.screen("ann")["subtask"]
+
+
+class Helpful:
+    """An assistant as somebody else would write one."""
+
+    def intentions(self, situation):
+        from embodied.interface import Intention
+
+        return (Intention.HELP,)
+
+    def answer_text(self, situation, question, *, rng):
+        return spoken_reply(situation, f"you asked {question!r}", None, 1)
+
+
+def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
+    play = Script(data, '[[parts]]\nname = "own"\nassistant = "test_serve:Helpful"\n')
+    play.join("ann")
+    play.ready("ann")
+    play.play("ann", "asked", question="Where is it?")
+    game = play.game("ann")
+    kind, body = game.think()
+    play.do(kind, None, game=game.id, **body)
+    assert play.screen("ann")["said"][-1]["text"] == "you asked 'Where is it?'"
+    with pytest.raises(ValueError, match="module:Class"):
+        set_table(Part("p", assistant="nowhere:Nobody"), data)
+
+
+def test_a_machine_goes_on_after_a_restart_where_it_was(data):
+    parts = '[[parts]]\nname = "help"\nagent = "random"\nbudget = 0\n'
+    plays = [Script(data, parts), Script(data, parts)]
+    plays[0].join("bob")
+    plays[0].ready("bob")
+    game = plays[0].game("bob")
+    for _ in range(4):
+        kind, body = game.think()
+        plays[0].do(kind, None, game=game.id, **body)
+        if game.over:
+            break
+    else:
+        for event in plays[0].log:
+            plays[1].sessions.apply(event)
+        assert plays[1].sessions.games[game.id].think() == game.think()
+
+
+def test_typed_questions_have_prices_that_are_written_down(data):
+    part = Part("p", questions=(Question("Which room?", 2.0),), free_question=False, tasks=1)
+    env, relay = set_table(part, data).make_env()
+    task = next(iter(set_table(part, data).tasks.values()))
+    env.reset(task)
+    relay.reply = spoken_reply(env.situation, "the kitchen", None, 1)
+    env.step(Ask(question="Which room?"))
+    assert env.last_step.cost == 2.0 and env.time == 0
+
+
+def test_alpha_is_krippendorffs():
+    """His example of four observers and twelve units; interval data, 0.849."""
+    rows = ("1233 2141 2...", "1233 2241 25.3", ".333 2342 251.", "1233 2441 251.")
+    units = [(str(i), float(c)) for row in rows for i, c in enumerate(row.replace(" ", "")) if c != "."]
+    assert agreement(units) == pytest.approx(0.849, abs=5e-4)
+    rng = np.random.default_rng(0)
+    assert abs(agreement([(str(i % 400), float(rng.integers(5))) for i in range(1600)])) < 0.08
+    assert agreement([("a", 1.0), ("b", 2.0)]) is None
+
+
+# What learners make of it ------------------------------------------------------------------------
+
+
+def played(data, folder, text, *, far):
+    """Two people played: somebody was told `text` at the start of the first task; the folder of their study."""
+    play = Script(data, TOGETHER + f"way = {0 if far else 1}\n")
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+    play.play("ann", "asked", question="Where?")
+    game = play.game("ann")
+    reply = spoken_reply(game.situation, text, None, 1, game.table.part.way)
+    play.play("bob", "answered", reply=parse(to_json(reply)))
+    play.play("ann", "stopped")
+    folder.mkdir()
+    Writer(folder, play.sessions)
+    return game.task, reply.subtask.path
+
+
+@pytest.mark.parametrize("only", [False, True])
+def test_what_people_answered_is_what_hannas_assistants_say_in_training(data, tmp_path, only):
+    task, path = played(data, tmp_path / "people", "past the <b>sofa</b>", far=True)
+    made = write_people_dataset(data, worded_by_people(tmp_path / "people"), tmp_path / "made", only=only)
+    mine = [r for r in made.routes(task.world) if "people" in r.id]
+    assert [(r.path, r.split) for r in mine] == [(path, "train_seen"), (path, "train_unseen")]
+    assert len(made.routes(task.world)) == 2 or not only
+    train, seen = made.split("train"), made.split("val_seen")
+    env = train.make_env()
+    env.reset(task)
+    env.step(Ask())
+    heard = env.last_step.reply
+    assert heard.text == "past the <b>sofa</b>" or not only
+    env = seen.make_env()
+    env.reset(task)
+    env.step(Ask())
+    assert "sofa" not in env.last_step.reply.text, "what agents learned from is not what they are judged by"
+    assert (
+        write_people_dataset(data, worded_by_people(tmp_path / "people"), tmp_path / "2", only=only).digest
+        == made.digest
+    )
+
+
+def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path, shared_cache):
+    data = make_data(tmp_path, shared_cache, "vnla")
+    task, path = played(data, tmp_path / "people", "over there", far=False)
+    words = worded_by_people(tmp_path / "people")
+    made = write_people_dataset(data, words, tmp_path / "made")
+    (said,) = made.said([task.world])
+    actions, end = VnlaTeacher().words(data.place(task.world), task.start, (path[-1],), 99)
+    assert (*said.words, "stop") == actions and end.node == path[-1]
+    voice = PeoplesWords([said], PlainLanguage())
+    assert voice.subgoal(said.words) == "over there" and voice.subgoal(("left", *said.words)) != "over there"
+    assert "there" in vocabulary_of(made).words
+
+
+def test_descriptions_become_routes_and_stars_a_rater(data, tmp_path):
+    parts = "".join(f'[[parts]]\nname = "{k}"\nkind = "{k}"\nof = "together"\n' for k in ("rate", "describe"))
+    play = Script(data, TOGETHER + parts)
+    play.join("ann", "bob", "eve")
+    play.ready("ann", "bob")
+    play.play("ann", "moved", candidate=0)
+    walked = play.game("ann").env.pose.node
+    play.play("ann", "stopped")
+    play.sessions.people["eve"].without.add("together")
+    play.ready("eve")
+    play.do("judged", "eve", stars=2, text="")
+    play.ready("eve")
+    play.do("judged", "eve", text="one step on")
+    Writer(tmp_path, play.sessions)
+    (word,) = worded_by_people(tmp_path)
+    assert word.text == "one step on" and word.path[-1] == walked and len(word.path) == 2
+    assert [stars for _, stars in rated_by_people(tmp_path, data)] == [2]
+
+
+def test_the_rater_that_people_resemble_is_found_again():
+    rater, rng = Rater(4, 0.3, 2.0), np.random.default_rng(3)
+    scores = rng.uniform(0, 1, 4000)
+    found = fitted(scores, [rater.rate(s, rng=rng) for s in scores], 4)
+    assert found.granularity == 4 and abs(found.skew - 2.0) < 0.3 and 0.2 < found.variance < 0.6

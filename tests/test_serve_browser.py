@@ -1,0 +1,233 @@
+"""The page in a real browser: two people play an episode, whatever happens to the network, the page and the server."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+from hand_serve import Served, gradient, make_data, write_study
+
+from embodied.envs.base import HelpEnv
+from embodied.evaluation.rollout import play
+from embodied.interface import Episode
+from embodied.policies.baselines import Forward10
+from embodied.records import load_lines, save_lines
+from embodied.serve.results import Judgement
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here; `make browser` installs Debian's"),
+]
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+PARTS = """
+[[parts]]
+name = "together"
+tasks = 1
+per_person = 1
+answers = 99
+advice = "Work together."
+"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, shared_cache):
+    folder = tmp_path_factory.mktemp("browsed")
+    data = make_data(folder, shared_cache)
+    served = Served(write_study(folder, PARTS))
+    served.data, served.tasks = data, data.tasks("val_seen")
+    yield served
+    served.stop()
+
+
+class Someone:
+    """A person with a browser of their own."""
+
+    def __init__(self, browser, server, **options):
+        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}, **options})
+        self.page, self.problems = self.context.new_page(), []
+        self.page.set_default_timeout(20_000)
+        self.page.on("pageerror", lambda e: self.problems.append(str(e)))
+        self.page.on("dialog", lambda d: d.accept())
+        self.page.goto(server.links["join"][0])
+        self.press("I have read this and take part")
+
+    def press(self, name):
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def sees(self, text):
+        playwright.expect(self.page.get_by_text(text).first).to_be_visible(timeout=20_000)
+
+    def write(self, label, text, button):
+        self.page.get_by_label(label).fill(text)
+        self.press(button)
+
+    def close(self):
+        assert self.problems == []
+        self.context.close()
+
+
+@pytest.fixture
+def two(browser, server):
+    agent, helper = Someone(browser, server), None
+    agent.sees("Waiting for a partner")
+    helper = Someone(browser, server)
+    agent.sees("Your task")
+    helper.sees("Watch the agent")
+    yield agent, helper
+    for one in (agent, helper):
+        one.close()
+
+
+def test_two_browsers_play_to_the_end_through_a_reload_and_a_dead_server(two, server):
+    agent, helper = two
+    agent.page.locator(".panorama").focus()
+    before = agent.page.get_by_text("steps left").inner_text()
+    mark = agent.page.locator(".mark").first
+    mark.focus()
+    mark.press("Enter")  # by keyboard alone
+    agent.sees("Your task")
+    playwright.expect(agent.page.get_by_text("steps left")).not_to_have_text(before)
+    agent.write("Ask in your own words", "Which door?", "Ask")
+    helper.sees("Which door?")
+    helper.page.get_by_label("Your answer").fill("The left one, ")
+    helper.page.reload()
+    playwright.expect(helper.page.get_by_label("Your answer")).to_have_value("The left one, ")
+    helper.page.get_by_label("Your answer").press_sequentially("please")
+    helper.page.locator(".plan .node").nth(5).click()
+    helper.sees("The view you look at goes with your answer")
+    server.kill()
+    helper.press("Send answer")  # into the void; it is sent again
+    helper.sees("nothing that you sent is lost")
+    server.start()
+    agent.sees("The left one, please")
+    agent.page.reload()
+    agent.sees("The left one, please")
+    agent.press("I am there: stop here")
+    for one in two:
+        one.sees("Ready for the next one?")
+    episode = list(load_lines(server.people / "episodes_val_seen_together.jsonl", Episode))[-1]
+    replies = [s.reply for s in episode.steps if s.reply]
+    assert [r.text for r in replies] == ["The left one, please"] and replies[0].image.node == 5
+
+
+def test_what_people_write_never_becomes_markup(two, server):
+    agent, helper = two
+    evil = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>'
+    agent.write("Ask in your own words", evil, "Ask")
+    helper.sees(evil)
+    helper.write("Your answer", evil, "Send answer")
+    agent.sees("You were told")
+    agent.page.wait_for_timeout(200)
+    for one in two:
+        assert one.page.evaluate("window.hacked") is None
+        assert one.page.locator("img[src=x], main script").count() == 0
+
+
+def test_on_a_slow_phone_everything_fits_and_works(browser, server):
+    slow = {"offline": False, "latency": 300, "downloadThroughput": 60_000, "uploadThroughput": 30_000}
+    phones = [Someone(browser, server, viewport={"width": 390, "height": 844}, has_touch=True) for _ in range(2)]
+    agent, helper = phones
+    for phone in phones:
+        phone.context.new_cdp_session(phone.page).send("Network.emulateNetworkConditions", slow)
+        phone.sees("Stop taking part")
+    agent.sees("Your task")
+    assert agent.page.evaluate("document.documentElement.scrollWidth") <= 390
+    agent.write("Ask in your own words", "Where?", "Ask")
+    helper.sees("The agent asks you something.")
+    assert helper.page.evaluate("document.documentElement.scrollWidth") <= 390
+    helper.write("Your answer", "There.", "Send answer")
+    agent.sees("There.")
+    small = "[...document.querySelectorAll('main button.primary')].filter(b => b.getBoundingClientRect().height < 40)"
+    assert agent.page.evaluate(small + ".length") == 0
+    agent.press("I am there: stop here")
+    agent.sees("Ready for the next one?")
+    for phone in phones:
+        phone.close()
+
+
+def test_a_judge_watches_to_the_end_then_gives_stars_and_words(browser, server):
+    folder, tasks = server.study.parent, server.tasks[:1]
+    worlds = {tasks[0].world: server.data.place(tasks[0].world)}
+    save_lines(folder / "episodes.jsonl", play(lambda: HelpEnv(worlds), Forward10(), tasks, seed=0))
+    judged = "".join(
+        f'[[parts]]\nname = "{kind}"\nkind = "{kind}"\nepisodes = "episodes.jsonl"\n' for kind in ("rate", "describe")
+    )
+    other = Served(write_study(folder, judged, name="judged"))
+    judge, seen = Someone(browser, other), browser.new_page()
+    judge.sees("How well did the agent do")
+    send = judge.page.get_by_role("button", name="Send", exact=True)
+    judge.page.get_by_label("4 of 5 stars").check()
+    assert send.is_disabled(), "the end was not seen yet"
+    judge.page.get_by_label("Step").press("End")
+    send.click()
+    judge.press("Go on")
+    judge.sees("What should one say")
+    judge.page.get_by_label("Step").press("End")
+    judge.page.get_by_label("Your description").fill("Go on and on.")
+    send.click()
+    judge.press("Go on")
+    judge.sees("You have finished")
+    assert re.fullmatch("[0-9A-F]{8}", judge.page.locator(".code").inner_text())
+    seen.goto(other.links["results"][0])
+    playwright.expect(seen.get_by_text("stars, mean")).to_be_visible()
+    seen.close()
+    judge.close()
+    other.stop()
+    told = list(load_lines(other.people / "judgements.jsonl", Judgement))
+    assert [(t.stars, t.text) for t in told] == [(4, ""), (None, "Go on and on.")]
+
+
+NO_WEBGL = """{ const get = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, how) {
+    return kind === "webgl2" ? null : get.call(this, kind, how);
+  }; }"""
+
+
+@pytest.mark.parametrize("without_webgl", [False, True])
+def test_the_page_shows_what_the_panorama_shows(two, server, without_webgl):
+    """Against Panorama.view_rgb: nothing is mirrored, turned or stretched, with WebGL and without."""
+    agent, _ = two
+    if without_webgl:
+        agent.context.add_init_script(NO_WEBGL)
+        agent.page.reload()
+        agent.sees("Your task")
+    agent.page.evaluate(
+        "document.querySelectorAll('.marks, .corner, .banner').forEach(e => { e.style.display = 'none' })"
+    )
+    view = agent.page.locator(".panorama")
+    view.focus()
+    for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp"):
+        view.press(key)
+    agent.page.wait_for_function("!document.querySelector('.panorama[aria-busy]')")
+    agent.page.wait_for_timeout(400)
+    shown = cv2.imdecode(np.frombuffer(view.screenshot(), np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+    start = next(t.start for t in server.tasks if t.id == server.begun()[-1]["task"])
+    height, width = shown.shape[:2]
+    vfov = 2 * math.atan(math.tan(math.radians(40)) * height / max(width, height))
+    yaw, pitch = start.yaw + math.radians(30), -0.12 + math.radians(45)
+    true = gradient(start.node).view_rgb(yaw, pitch, vfov, (height, width))
+    error = np.abs(shown.astype(int) - true)[20:-20, 20:-20]
+    assert np.median(error) < 6 and np.mean(error > 40) < 0.03

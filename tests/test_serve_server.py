@@ -1,0 +1,225 @@
+"""The server as a process: nothing that was acknowledged is lost, and nobody reaches what is not theirs."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import socket
+import ssl
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_serve import TOGETHER, Human, Served, make_data, pair, write_study
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from embodied.bench.serve import load
+from embodied.interface import Episode
+from embodied.records import load_lines
+
+ROOT = Path(__file__).resolve().parent.parent
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, shared_cache):
+    folder = tmp_path_factory.mktemp("served")
+    make_data(folder, shared_cache)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def server(folder):
+    served = Served(write_study(folder, TOGETHER + "answers = 9\n"))
+    yield served
+    served.stop()
+
+
+def get(address: str) -> tuple[int, dict, bytes]:
+    try:
+        with urllib.request.urlopen(address, timeout=10) as answer:
+            return answer.status, dict(answer.headers), answer.read()
+    except urllib.error.HTTPError as e:
+        return e.code, dict(e.headers), e.read()
+
+
+def test_a_server_killed_in_the_middle_loses_no_answer_that_was_acknowledged(folder):
+    server = Served(write_study(folder, name="killed"))
+    agent, helper = pair(server)
+    agent.until("agent")
+    for k in range(2):
+        agent.until("agent", lambda s: s["yours"])
+        agent.play("asked", text=f"question {k}?")
+        helper.until("assistant", lambda s: s["yours"])
+        assert "error" not in helper.play("answered", text=f"answer {k}")
+        server.kill()
+        server.start()
+        agent.enter()
+        helper.enter()
+        assert [s["text"] for s in agent.screen["said"]][-2:] == [f"question {k}?", f"answer {k}"]
+        agent.play("moved", candidate=agent.screen["moves"][0]["candidate"])
+        agent.until("agent", lambda s: s["turn"] % 3 == 0)
+        helper.until("assistant", lambda s: s["turn"] % 3 == 0)
+    agent.play("stopped")
+    server.kill()
+    server.start()  # the episode is in the log, whatever was written beside it
+    (episode,) = load_lines(server.people / "episodes_val_seen_together.jsonl", Episode)
+    server.stop()
+    assert [s.reply.text for s in episode.steps if s.reply] == ["answer 0", "answer 1"]
+    assert len(episode.steps) == 5
+
+
+def test_a_message_that_is_sent_again_counts_once(server):
+    agent, _ = pair(server)
+    agent.until("agent")
+    old = dict(agent.screen)
+    move = {"game": old["game"], "turn": old["turn"], "candidate": old["moves"][0]["candidate"], "id": "same"}
+    assert "error" not in agent.say("moved", **move)
+    assert "error" not in agent.say("moved", **move)
+    assert agent.screen["turn"] == old["turn"] + 1
+    assert "meantime" in agent.say("moved", **{**move, "id": "other"})["error"]
+
+
+def test_a_browser_that_comes_back_finds_its_screen(server):
+    agent, helper = pair(server)
+    agent.until("agent")
+    agent.play("moved", candidate=agent.screen["moves"][0]["candidate"])
+    before = agent.until("agent", lambda s: s["turn"] == 1)
+    agent.close()
+    helper.until("assistant", lambda s: not s["partnerThere"])
+    agent.enter()
+    assert agent.screen == before
+    helper.until("assistant", lambda s: s["partnerThere"])
+
+
+def test_nobody_acts_for_another_or_out_of_turn(server):
+    agent, helper = pair(server)
+    stranger = Human(server)
+    agent.until("agent")
+    theirs = {"game": agent.screen["game"], "turn": agent.screen["turn"]}
+    assert "error" in stranger.say("moved", candidate=0, **theirs)
+    helper.until("assistant")
+    assert "error" in helper.say("moved", candidate=0, **theirs)
+    assert "error" in helper.say("answered", text="nobody asked", **theirs)
+    assert "error" in agent.say("house"), "the plan is the assistant's"
+    assert "error" not in helper.say("house") and helper.plan["rooms"]
+    for nonsense in ("happen", "_joined", "broken", "began", None, 7):
+        assert "error" in agent.say(nonsense, **theirs)
+
+
+def test_strangers_pages_and_words_are_refused(server):
+    address = f"ws://127.0.0.1:{server.port}/ws"
+    for origin in ("https://evil.example", None):
+        with pytest.raises(InvalidStatus):
+            connect(address, origin=origin)
+    for hello in ({"token": "guessed"}, {"join": "guessed"}, {"admin": "guessed"}, {"admin": server.word}, {}, []):
+        with connect(address, origin=server.address) as socket:
+            socket.send(json.dumps(hello))
+            assert json.loads(socket.recv(10))["screen"] == "refused"
+
+
+def test_five_megabytes_and_other_rubbish_close_only_their_own_connection(server):
+    agent, helper = pair(server)
+    agent.until("agent")
+    for rubbish in ("x" * 5_000_000, "[" * 5000, "not json", b"\xff\x00"):
+        other = Human(server)
+        with pytest.raises((ConnectionClosed, TimeoutError)):
+            other.socket.send(rubbish)
+            while True:
+                other.socket.recv(timeout=10)
+    assert "characters" in agent.play("asked", text="y" * 2001)["error"]
+    assert "error" not in agent.play("asked", text="still here?")
+
+
+def test_a_single_use_link_admits_one(folder):
+    server = Served(write_study(folder, name="invited"), "--invitations", "2")
+    words = [link.split("=")[1] for link in server.links["invitations"]]
+    assert len(words) == 2 and not server.links["join"]
+    first = Human(server, join=words[0])
+    assert first.screen["screen"] == "consent"
+    assert Human(server, join=words[0]).screen["screen"] == "refused"
+    first.enter()
+    assert first.screen["screen"] == "consent", "whoever took it up may come back"
+    server.kill()
+    server.start()
+    assert Human(server, join=words[0]).screen["screen"] == "refused"
+    assert Human(server, join=words[1]).screen["screen"] == "consent"
+    server.stop()
+
+
+def test_only_the_pages_and_pictures_of_the_study_can_be_reached(server):
+    status, headers, body = get(server.address + "/")
+    assert status == 200 and b"<script" in body and "default-src 'none'" in headers["content-security-policy"]
+    assert get(server.address + "/static/app.js")[0] == 200
+    for path in (
+        "/static/../study.toml",
+        "/static/..%2f..%2fapp.py",
+        "/people.db",
+        "/static/index.html%00.js",
+        "/pano/",
+    ):
+        assert get(server.address + path)[0] == 404, path
+    agent, _ = pair(server)
+    name = agent.until("agent")["pano"]
+    for size in ("small", "large"):
+        status, headers, body = get(f"{server.address}/pano/{name}/{size}.jpg")
+        assert status == 200 and body[:2] == b"\xff\xd8" and "immutable" in headers["cache-control"]
+    for wrong in (f"/pano/{name}/huge.jpg", f"/pano/{'0' * 24}/small.jpg", "/pano/..%2fx/small.jpg"):
+        assert get(server.address + wrong)[0] == 404
+
+
+def test_eight_people_at_once_are_answered_at_once(folder):
+    """`embodied bench serve` measures 50; here only that nothing is refused, and that nobody waits for a second."""
+    server = Served(write_study(folder, TOGETHER.replace("= 3", "= 1000") + "answers = 1000\n", name="load"))
+    times = asyncio.run(load(server.address, server.word, 8, 6.0))
+    server.stop()
+    assert len(times.steps) > 20 and len(times.pictures) > 10 and times.refused == 0
+    assert np.percentile(times.steps, 95) < 1.0
+
+
+def test_the_results_page_counts_people_and_episodes(server):
+    with connect(f"ws://127.0.0.1:{server.port}/ws", origin=server.address) as socket:
+        socket.send(json.dumps({"admin": server.links["results"][0].split("=")[1]}))
+        facts = json.loads(socket.recv(10))
+    assert facts["screen"] == "results" and facts["people"]["joined"] >= 2 and facts["parts"][0]["name"] == "together"
+
+
+@pytest.mark.skipif(not shutil.which("caddy"), reason="Debian's caddy is not installed")
+def test_the_caddyfile_of_the_tutorial_serves_a_study_behind_tls(folder, tmp_path):
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+    address = f"https://localhost:{port}"
+    server = Served(write_study(folder, name="proxied"), "--address", address)
+    text = (ROOT / "examples" / "Caddyfile").read_text()
+    text = text.replace("study.example.org {", f"localhost:{port} {{\n\ttls internal").replace("8080", str(server.port))
+    text = "{\n\tadmin off\n\tskip_install_trust\n\tauto_https disable_redirects\n}\n" + text
+    (tmp_path / "Caddyfile").write_text(text)
+    env = {"HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}
+    command = ["caddy", "run", "--config", str(tmp_path / "Caddyfile"), "--adapter", "caddyfile"]
+    caddy = subprocess.Popen(command, env=env, stderr=subprocess.PIPE)
+    try:
+        lax = ssl.create_default_context()
+        lax.check_hostname, lax.verify_mode = False, ssl.CERT_NONE  # its certificate is its own here
+        for _ in range(100):
+            try:
+                with urllib.request.urlopen(address + "/health", context=lax, timeout=5) as answer:
+                    assert answer.read() == b"ok"
+                break
+            except (OSError, urllib.error.URLError):
+                assert caddy.poll() is None, caddy.stderr.read().decode()
+                time.sleep(0.1)
+        with connect(address.replace("https", "wss") + "/ws", origin=address, ssl=lax) as ws:
+            ws.send(json.dumps({"join": server.word}))
+            assert "token" in json.loads(ws.recv(10))
+        with pytest.raises(InvalidStatus):
+            connect(address.replace("https", "wss") + "/ws", origin="https://evil.example", ssl=lax)
+    finally:
+        caddy.terminate()
+        server.stop()

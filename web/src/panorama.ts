@@ -1,0 +1,180 @@
+// A panorama to look round in, with ways to go as buttons in it.
+
+import { h } from "./dom";
+import { painter, type Painter } from "./paint";
+import type { Way } from "./types";
+
+const DEGREES = 180 / Math.PI;
+
+/** The address of a panorama. */
+export const address = (pano: string, size: "small" | "large"): string => `/pano/${pano}/${size}.jpg`;
+
+const pictures = new Map<string, Promise<HTMLImageElement>>();
+
+/** A picture, fetched once. */
+function picture(url: string): Promise<HTMLImageElement> {
+  let found = pictures.get(url);
+  if (!found) {
+    const image = new Image();
+    image.src = url;
+    found = image.decode().then(() => image);
+    found.catch(() => pictures.delete(url));
+    pictures.set(url, found);
+    if (pictures.size > 60) pictures.delete(pictures.keys().next().value!);
+  }
+  return found;
+}
+
+/** Fetches the small pictures that may be wanted next. */
+export function prefetch(panos: string[]): void {
+  for (const pano of panos) void picture(address(pano, "small")).catch(() => undefined);
+}
+
+const wrap = (a: number): number => Math.atan2(Math.sin(a), Math.cos(a));
+
+/** Where something is, in words, by its direction to the left of the gaze (radians). */
+export function side(bearing: number): string {
+  const d = Math.round(wrap(bearing) * DEGREES);
+  if (Math.abs(d) < 20) return "straight ahead";
+  if (Math.abs(d) > 160) return "behind you";
+  return `${Math.abs(d)}° to the ${d > 0 ? "left" : "right"}`;
+}
+
+export class Panorama {
+  readonly root: HTMLElement;
+  yaw = 0;
+  pitch = 0;
+  private shown = "";
+  private readonly canvas = h("canvas", { "aria-hidden": "true" });
+  private readonly paint: Painter = painter(this.canvas);
+  private readonly marks = h("div", { class: "marks" });
+  private ways: { way: Way; mark: HTMLButtonElement }[] = [];
+  private fov = 80 / DEGREES;
+  private frame = 0;
+
+  /** `turned` is called whenever somebody looks elsewhere. */
+  constructor(private readonly turned: () => void = () => undefined) {
+    this.root = h(
+      "div",
+      { class: "panorama", tabindex: 0, role: "application", "aria-label": "Panorama. Arrow keys turn, Enter goes on." },
+      this.canvas,
+      this.marks,
+    );
+    this.root.addEventListener("keydown", (e) => this.key(e));
+    this.drag();
+    new ResizeObserver(() => this.draw()).observe(this.root);
+  }
+
+  /** Shows a panorama, coarse at once and fine when it has come. */
+  async show(pano: string): Promise<void> {
+    if (this.shown === pano) return;
+    this.shown = pano;
+    this.root.setAttribute("aria-busy", "true");
+    for (const size of ["small", "large"] as const) {
+      try {
+        const image = await picture(address(pano, size));
+        if (this.shown !== pano) return;
+        this.paint.take(image);
+        this.draw();
+      } catch {
+        if (size === "large" && this.shown === pano) this.shown = ""; // so that the next update tries again
+      }
+    }
+    this.root.removeAttribute("aria-busy");
+  }
+
+  /** Looks along a direction, radians. */
+  look(yaw: number, pitch = 0): void {
+    this.yaw = wrap(yaw);
+    this.pitch = Math.max(-1.3, Math.min(1.3, pitch));
+    this.draw();
+  }
+
+  /** Shows ways to go as buttons in the picture. */
+  offer(ways: Way[], go: (way: Way) => void): void {
+    this.marks.replaceChildren();
+    this.ways = ways.map((way) => {
+      const mark = h("button", { type: "button", class: "mark", click: () => go(way) });
+      mark.addEventListener("focus", () => mark.matches(":focus-visible") && this.look(way.yaw, -0.1));
+      mark.append(h("span", { "aria-hidden": "true" }));
+      this.marks.append(mark);
+      return { way, mark };
+    });
+    this.go = go;
+    this.draw();
+  }
+
+  private go: (way: Way) => void = () => undefined;
+
+  private draw(): void {
+    const { clientWidth: w, clientHeight: tall } = this.root;
+    if (!w || !tall) return;
+    const eye = Math.max(w, tall) / 2 / Math.tan(this.fov / 2);
+    cancelAnimationFrame(this.frame);
+    this.frame = requestAnimationFrame(() => this.paint.draw(this.yaw, this.pitch, w / 2 / eye, tall / 2 / eye));
+    for (const { way, mark } of this.ways) {
+      const pitch = Math.max(-0.5, way.pitch - Math.atan(1.1 / Math.max(way.distance, 0.5)));
+      const [a, cp, sp] = [wrap(way.yaw - this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
+      const [x, y, z] = [-Math.sin(a) * Math.cos(pitch), Math.sin(pitch), Math.cos(a) * Math.cos(pitch)];
+      const [up, deep] = [y * cp - z * sp, y * sp + z * cp];
+      const visible = deep > 0.15;
+      mark.classList.toggle("behind", !visible);
+      mark.setAttribute("aria-label", `Go ${side(way.yaw - this.yaw)}`);
+      const scale = Math.max(0.55, Math.min(1.15, 2.6 / (way.distance + 0.6)));
+      mark.style.transform = visible
+        ? `translate(${w / 2 + (eye * x) / deep}px, ${tall / 2 - (eye * up) / deep}px) scale(${scale})`
+        : "translate(-200px, -200px)";
+    }
+    this.turned();
+  }
+
+  private key(e: KeyboardEvent): void {
+    const step = 15 / DEGREES;
+    const turn: Record<string, [number, number]> = {
+      ArrowLeft: [step, 0],
+      ArrowRight: [-step, 0],
+      ArrowUp: [0, step],
+      ArrowDown: [0, -step],
+    };
+    if (turn[e.key]) this.look(this.yaw + turn[e.key]![0], this.pitch + turn[e.key]![1]);
+    else if ((e.key === "Enter" || e.key === " ") && e.target === this.root) {
+      const ahead = [...this.ways].sort((a, b) => this.off(a.way) - this.off(b.way))[0];
+      if (ahead && this.off(ahead.way) < 40 / DEGREES) this.go(ahead.way);
+    } else return;
+    e.preventDefault();
+  }
+
+  private off(way: Way): number {
+    return Math.abs(wrap(way.yaw - this.yaw));
+  }
+
+  private drag(): void {
+    let from: [number, number, number, number] | null = null;
+    this.root.addEventListener("pointerdown", (e) => {
+      if ((e.target as Element).closest("button")) return;
+      from = [e.clientX, e.clientY, this.yaw, this.pitch];
+      this.root.setPointerCapture(e.pointerId);
+      this.root.classList.add("dragged");
+    });
+    this.root.addEventListener("pointermove", (e) => {
+      if (!from) return;
+      const scale = this.fov / Math.max(this.root.clientWidth, this.root.clientHeight);
+      this.look(from[2] + (e.clientX - from[0]) * scale, from[3] + (e.clientY - from[1]) * scale);
+    });
+    const end = (): void => {
+      from = null;
+      this.root.classList.remove("dragged");
+    };
+    this.root.addEventListener("pointerup", end);
+    this.root.addEventListener("pointercancel", end);
+    this.root.addEventListener(
+      "wheel",
+      (e) => {
+        e.preventDefault();
+        this.fov = Math.max(0.6, Math.min(1.9, this.fov * (e.deltaY > 0 ? 1.08 : 0.93)));
+        this.draw();
+      },
+      { passive: false },
+    );
+  }
+}

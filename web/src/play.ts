@@ -1,0 +1,317 @@
+// Playing an episode: as the agent, and as the assistant.
+
+import { button, h, s, say } from "./dom";
+import type { Connection } from "./socket";
+import { address, Panorama, prefetch } from "./panorama";
+import { Plan } from "./plan";
+import type { AgentScreen, AssistantScreen, House, Said, Way } from "./types";
+
+const LONGEST = 2000;
+const LEVEL = -0.12; // a little below the horizon, where the ways are
+
+/** What stays on the page while an episode goes on. */
+export interface View<S> {
+  root: HTMLElement;
+  update(screen: S): void;
+}
+
+/** A field for words that survives a reload, with a button that sends them. */
+class Words {
+  readonly root: HTMLElement;
+  private readonly field: HTMLTextAreaElement;
+  private readonly sender: HTMLButtonElement;
+  private readonly key: string;
+
+  constructor(label: string, action: string, name: string, send: (text: string) => void) {
+    this.key = `embodied.draft.${name}`;
+    this.field = h("textarea", { id: name, rows: 2, maxlength: LONGEST, enterkeyhint: "send", autocomplete: "off" });
+    this.field.value = sessionStorage.getItem(this.key) ?? "";
+    this.field.addEventListener("input", () => sessionStorage.setItem(this.key, this.field.value));
+    this.field.addEventListener("keydown", (e) => {
+      if (e.key === "Enter" && !e.shiftKey && !e.isComposing) {
+        e.preventDefault();
+        this.sender.click();
+      }
+    });
+    this.sender = button(action, () => {
+      const text = this.field.value.trim();
+      if (!text) return this.field.focus();
+      this.field.value = "";
+      sessionStorage.removeItem(this.key);
+      send(text);
+    }, "primary");
+    this.root = h("div", { class: "words" }, h("label", { for: name }, label), this.field, this.sender);
+  }
+
+  set enabled(can: boolean) {
+    this.field.disabled = this.sender.disabled = !can;
+  }
+
+  focus(): void {
+    if (matchMedia("(hover: hover)").matches) this.field.focus({ preventScroll: true });
+  }
+}
+
+/** What was said so far. */
+function conversation(said: Said[], you: string, names: Record<string, string>, look?: (pano: string) => void): HTMLElement[] {
+  return said.map((x) =>
+    h(
+      "li",
+      { class: x.who === you ? "mine" : "theirs" },
+      h("span", { class: "who" }, x.who === you ? "You" : names[x.who]),
+      h("p", {}, x.text),
+      x.pano && thumbnail(x.pano, look),
+    ),
+  );
+}
+
+/** A small picture of a panorama; a click shows it whole. */
+function thumbnail(pano: string, look?: (pano: string) => void): HTMLElement {
+  const image = h("img", { src: address(pano, "small"), alt: "View that was sent", loading: "lazy" });
+  if (!look) return h("span", { class: "thumb" }, image);
+  return h("button", { type: "button", class: "thumb", click: () => look(pano), "aria-label": "Look at this view" }, image);
+}
+
+function card(title: string, ...children: (Node | string | null | false)[]): HTMLElement {
+  return h("section", { class: "card" }, h("h2", {}, title), ...children);
+}
+
+/** Directions of the ways round the agent, as a small compass. */
+function compass(ways: Way[], view: Panorama): SVGElement {
+  const turn = (a: number): string => `rotate(${(-(a - view.yaw) * 180) / Math.PI})`;
+  return s(
+    "svg",
+    { class: "compass", viewBox: "-50 -50 100 100", "aria-hidden": "true" },
+    s("circle", { r: 46, class: "rim" }),
+    s("path", { d: "M0 0 L-27 -35 A44 44 0 0 1 27 -35 Z", class: "gaze" }),
+    ...ways.map((w) => s("circle", { cy: -34, r: 7, class: "dot", transform: turn(w.yaw) })),
+  );
+}
+
+export class AgentView implements View<AgentScreen> {
+  readonly root: HTMLElement;
+  private state!: AgentScreen;
+  private node = "";
+  private going = false;
+  private elsewhere: string | null = null;
+  private readonly view = new Panorama(() => this.turned());
+  private readonly corner = h("div", { class: "corner" });
+  private readonly banner = h("div", { class: "banner", role: "status" });
+  private readonly talk = h("ol", { class: "talk", "aria-live": "polite", "aria-label": "Conversation" });
+  private readonly request = h("p", { class: "request" });
+  private readonly told = h("div", {});
+  private readonly asking = h("div", { class: "asking" });
+  private readonly ending = h("div", { class: "ending" });
+  private readonly words = new Words("Ask in your own words", "Ask", "ask", (text) => this.ask(text));
+
+  constructor(private readonly connection: Connection) {
+    this.root = h(
+      "div",
+      { class: "play" },
+      h("div", { class: "stage" }, this.view.root, this.banner, this.corner),
+      h(
+        "div",
+        { class: "side" },
+        card("Your task", this.request, this.told),
+        card("Help", this.talk, this.asking),
+        this.ending,
+      ),
+    );
+  }
+
+  update(screen: AgentScreen): void {
+    const jumped = !this.going || (screen.subtask && screen.subtask !== this.state?.subtask);
+    if (this.node !== screen.pano) {
+      if (jumped) this.view.look(screen.yaw, LEVEL);
+      this.elsewhere = null;
+    } else if (screen.words.length) this.view.look(screen.yaw, screen.pitch);
+    this.node = screen.pano;
+    this.state = screen;
+    this.going = false;
+    this.request.textContent = screen.request;
+    const sub = screen.subtask || (screen.instruction !== screen.request && screen.said.length > 0);
+    this.told.replaceChildren(
+      ...(sub ? [h("p", { class: "told" }, h("span", { class: "who" }, "You were told"), screen.instruction)] : []),
+      ...(screen.target ? [h("p", { class: "told" }, h("span", { class: "who" }, "Look for this view"), thumbnail(screen.target, (p) => this.visit(p)))] : []),
+    );
+    this.talk.replaceChildren(...conversation(screen.said, "agent", { assistant: "Assistant" }, (p) => this.visit(p)));
+    this.talk.lastElementChild?.scrollIntoView({ block: "nearest" });
+    const waiting = screen.question !== null;
+    this.banner.textContent = waiting
+      ? screen.partnerThere
+        ? "Your question was sent. Wait for the answer; you can look around meanwhile."
+        : "Your partner lost the connection. Please wait a moment."
+      : screen.practice
+        ? "Practice: this does not count yet."
+        : "";
+    this.questions(screen);
+    this.moves(screen, waiting);
+    const left = screen.horizon - screen.time;
+    const stop = button(screen.subtask ? "I have followed this advice" : "I am there: stop here", () => this.stop(), "primary stop");
+    stop.disabled = waiting;
+    this.ending.replaceChildren(stop, h("p", { class: "hint" }, `${left} ${left === 1 ? "step" : "steps"} left.`));
+    void this.view.show(this.elsewhere ?? screen.pano);
+    prefetch(screen.moves.map((m) => m.pano));
+  }
+
+  private questions(screen: AgentScreen): void {
+    const left = screen.left === null ? "" : `${screen.left} ${screen.left === 1 ? "question" : "questions"} left. `;
+    const can = screen.canAsk;
+    this.words.enabled = can;
+    const typed = screen.questions.map((q) =>
+      button(q.price ? `${q.text} (costs ${q.price})` : q.text, () => this.ask(q.text), "question", { disabled: !can }),
+    );
+    const none = !can && screen.question === null && "Nobody can be asked here. ";
+    const hint = h("p", { class: "hint" }, none || null, left);
+    if (!this.words.root.isConnected || !screen.free || typed.length)
+      this.asking.replaceChildren(...typed, ...(screen.free ? [this.words.root] : []), hint);
+    else this.asking.lastElementChild!.replaceWith(hint);
+  }
+
+  private moves(screen: AgentScreen, waiting: boolean): void {
+    const ways = waiting || this.elsewhere ? [] : screen.moves;
+    if (screen.words.length) {
+      const buttons = ways.map((m) => button(screen.words[m.candidate]!, () => this.go(m)));
+      this.corner.replaceChildren(h("div", { class: "keys", role: "group", "aria-label": "Moves" }, ...buttons));
+      return;
+    }
+    this.view.offer(ways, (way) => this.go(way));
+  }
+
+  private turned(): void {
+    if (!this.state || this.state.words.length) return;
+    const back = this.elsewhere && button("Back to where you are", () => this.visit(null), "primary");
+    this.corner.replaceChildren(back || compass(this.state.question === null ? this.state.moves : [], this.view));
+  }
+
+  private visit(pano: string | null): void {
+    this.elsewhere = pano;
+    this.update(this.state);
+    this.turned();
+  }
+
+  private act(what: "moved" | "stopped" | "asked", more: object = {}): void {
+    this.connection.send({ do: what, game: this.state.game, turn: this.state.turn, ...more });
+  }
+
+  private go(way: Way): void {
+    if (this.going) return;
+    this.going = true;
+    setTimeout(() => (this.going = false), 1500);
+    if (!this.state.words.length) this.view.look(way.yaw, LEVEL);
+    void this.view.show(way.pano);
+    this.act("moved", { candidate: way.candidate });
+  }
+
+  private stop(): void {
+    if (this.state.subtask || confirm("Stop here and end this episode?")) this.act("stopped");
+  }
+
+  private ask(text: string): void {
+    this.act("asked", { text });
+    say("Your question was sent.");
+  }
+}
+
+export class AssistantView implements View<AssistantScreen> {
+  readonly root: HTMLElement;
+  private state!: AssistantScreen;
+  private plan: Plan | null = null;
+  private house: House | null = null;
+  private node = -1;
+  private looking = -1;
+  private answered = true;
+  private readonly view = new Panorama();
+  private readonly banner = h("div", { class: "banner", role: "status" });
+  private readonly corner = h("div", { class: "corner" });
+  private readonly map = h("div", { class: "map" }, h("p", { class: "hint" }, "Loading the plan …"));
+  private readonly talk = h("ol", { class: "talk", "aria-live": "polite", "aria-label": "Conversation" });
+  private readonly request = h("p", { class: "request" });
+  private readonly attach = h("div", { class: "attach" });
+  private readonly words = new Words("Your answer", "Send answer", "answer", (text) => this.answer(text));
+
+  constructor(private readonly connection: Connection) {
+    this.root = h(
+      "div",
+      { class: "play assist" },
+      h("div", { class: "stage" }, this.view.root, this.banner, this.corner),
+      h(
+        "div",
+        { class: "side" },
+        card("The agent was asked to", this.request),
+        card("Plan", this.map, legend()),
+        card("Conversation", this.talk, this.words.root, this.attach),
+      ),
+    );
+    connection.send({ do: "house" });
+  }
+
+  /** The plan has come. */
+  setHouse(house: House): void {
+    this.house = house;
+    this.plan = new Plan(house, (n) => this.visit(n));
+    this.map.replaceChildren(this.plan.root);
+    if (this.state) this.update(this.state);
+  }
+
+  update(screen: AssistantScreen): void {
+    if (this.node !== screen.node || this.state?.yaw !== screen.yaw) {
+      if (this.looking === this.node || this.looking < 0) this.looking = screen.node;
+      if (this.looking === screen.node) this.view.look(screen.yaw, screen.pitch);
+    }
+    this.node = screen.node;
+    this.state = screen;
+    this.request.textContent = screen.request;
+    this.talk.replaceChildren(
+      ...conversation(screen.said, "assistant", { agent: "Agent" }, (p) => this.visit(this.house?.panos.indexOf(p) ?? -1)),
+    );
+    this.talk.lastElementChild?.scrollIntoView({ block: "nearest" });
+    const asked = screen.question !== null;
+    this.words.enabled = asked;
+    if (asked && this.answered) this.words.focus();
+    this.answered = !asked;
+    this.banner.textContent = !screen.partnerThere
+      ? "Your partner lost the connection. Please wait a moment."
+      : asked
+        ? "The agent asks you something."
+        : screen.practice
+          ? "Practice: watch the agent. It will ask you."
+          : "Watch the agent. It will ask you when it needs help.";
+    this.banner.classList.toggle("urgent", asked);
+    this.draw();
+  }
+
+  private draw(): void {
+    const away = this.looking !== this.node;
+    const pano = away && this.house ? this.house.panos[this.looking]! : this.state.pano;
+    void this.view.show(pano);
+    this.plan?.update(this.state, this.looking);
+    this.corner.replaceChildren(...(away ? [button("Back to the agent", () => this.visit(this.node), "primary")] : []));
+    this.attach.replaceChildren(
+      ...(!this.state.sendPictures
+        ? []
+        : away
+          ? [h("p", { class: "hint" }, "The view you look at goes with your answer. ", thumbnail(pano))]
+          : [h("p", { class: "hint" }, "To send a view with your answer, choose a viewpoint on the plan.")]),
+    );
+  }
+
+  private visit(node: number): void {
+    if (node < 0) return;
+    this.looking = node;
+    if (node === this.node) this.view.look(this.state.yaw, this.state.pitch);
+    this.draw();
+  }
+
+  private answer(text: string): void {
+    const picture = this.state.sendPictures && this.looking !== this.node ? this.looking : null;
+    this.connection.send({ do: "answered", game: this.state.game, turn: this.state.turn, text, picture });
+    say("Your answer was sent.");
+    this.visit(this.node);
+  }
+}
+
+function legend(): HTMLElement {
+  const entry = (kind: string, text: string): HTMLElement => h("li", {}, h("i", { class: kind, "aria-hidden": "true" }), text);
+  return h("ul", { class: "legend" }, entry("agent", "agent"), entry("goal", "goal"), entry("way", "shortest way"), entry("trail", "walked"));
+}
