@@ -19,12 +19,14 @@ from agents.language_models.assistant import ModelAssistant
 from agents.language_models.cache import AnswerCache
 from agents.language_models.client import Client, ServerSettings
 from agents.language_models.small import NAME, command
-from embodied.envs.make import ask_environment_maker, look_of
+from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.evaluation.metrics import usage
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Intention
+from embodied.language import PlainLanguage
 from embodied.records import to_json
 from embodied.tasks.ask import ask_pool, ask_tasks
+from embodied.tasks.find import find_pool, find_task
 
 pytestmark = pytest.mark.slow
 
@@ -50,18 +52,18 @@ def served():
 
 def test_a_real_model_acts_and_answers_and_replays_without_its_server(served, tmp_path):
     world = grid_world()
-    make_env = ask_environment_maker({"grid": world}, look_of(None))
-    tasks = [dataclasses.replace(t, horizon=2) for t in ask_tasks(ask_pool(world, look_of(None), seed=0), 1, seed=0)]
-    settings = ServerSettings(NAME, served, form="object", most_tokens=100, together=1, timeout=300.0)
+    find = environment_maker("find", {"grid": world})
+    task = find_task(find_pool(world, seed=0), 0, seed=0, language=PlainLanguage())
+    tasks = [dataclasses.replace(task, horizon=1)]
+    settings = ServerSettings(NAME, served, form="object", most_tokens=60, together=1, timeout=300.0)
     client = Client(settings, AnswerCache(tmp_path / "answers.sqlite"))
-    first = play(make_env, LanguageModelAgent(client), tasks, seed=0)
-    used = [usage(e) for e in first]
-    assert all(u is not None and u.tokens_in > 0 and u.calls == len(e.steps) for u, e in zip(used, first, strict=True))
-    env = make_env()
+    (first,) = play(find, LanguageModelAgent(client), tasks, seed=0)
+    used = usage(first)
+    assert used is not None and used.tokens_in > 50 and used.calls == len(first.steps) == 1
+    env = ask_environment_maker({"grid": world}, look_of(None))()
     env.assistant = ModelAssistant(env.assistant, client)
-    env.reset(tasks[0])
+    env.reset(ask_tasks(ask_pool(world, look_of(None), seed=0), 1, seed=0)[0])
     env.step(Ask(Intention.REGION))
-    assert env.last_step.reply.text and env.last_step.reply.usage.calls == 1
+    assert env.last_step.reply.text and env.last_step.reply.usage.tokens_out > 0
     offline = Client(settings, AnswerCache(tmp_path / "answers.sqlite"), offline=True)
-    again = play(make_env, LanguageModelAgent(offline), tasks, seed=0)
-    assert [to_json(e) for e in again] == [to_json(e) for e in first]
+    assert to_json(play(find, LanguageModelAgent(offline), tasks, seed=0)[0]) == to_json(first)

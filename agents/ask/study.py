@@ -23,6 +23,7 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation.ask import COLUMNS, ask_row, ask_split
+from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, as_json, markdown
 from embodied.generate import HouseConfig
@@ -45,8 +46,8 @@ class StudySize:
     """Per house."""
     test_houses: int = 8
     test_tasks: int = 15
-    foresight: int = 24
-    """Tasks of the test that the oracles of asking play."""
+    foresight: int = 40
+    """Tasks of the test that the oracle of asking plays: every house's first five, of which three are ambiguous."""
 
 
 def after(steps: int, rule: AskRule) -> AskRule:
@@ -111,9 +112,7 @@ def run(out: Path, plan: StudySize, cache: Path) -> None:
         for name, agent in baselines().items():
             rows.append(judged(name, [agent]))
         rows.append(judged("learned asker (3 seeds)", [LearnedAsker(n) for n in nets]))
-        few = tasks[:: max(1, len(tasks) // plan.foresight)]
-        rows.append(judged("oracle of asking, in doubt", [Foresight(make_env, doubts=True)], few))
-        rows.append(judged("oracle of asking", [Foresight(make_env)], few))
+        rows.append(judged("oracle of asking", [Foresight(make_env)], spread(tasks, plan.foresight)))
         if not unseen:
             for name, agents in families().items():
                 curves[name] = [_point(judged(name, [a])) for a in agents]
