@@ -39,6 +39,11 @@ def test_a_house_survives_json_and_a_file(tmp_path):
     assert House.load(tmp_path / "house.json").digest == house.digest
 
 
+def test_what_a_built_thing_is_made_of_may_be_words_and_numbers():
+    house = with_thing(params=(("finish", "oak"), ("lean", 0.25), ("turns", 2.0)))
+    assert House.from_json(house.to_json()) == house
+
+
 def test_any_change_changes_the_digest():
     house = two_rooms()
     moved = with_thing(position=(2.5, 2.0, 0.0001))

@@ -20,10 +20,10 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
-from agents.common.checkpoint_file import CheckpointError
+from agents.common.checkpoint import CheckpointError
 from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
 from agents.common.lessons import Split
-from agents.common.session import Clock, TrainingError, as_good, falling_rate, tasks_of_update
+from agents.common.session import Clock, DivergedError, as_good, falling_rate, metrics_of, tasks_of_update
 from agents.common.spine import ADDED, NUMBERS
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
@@ -40,7 +40,7 @@ from agents.hanna.losses import (
 )
 from agents.hanna.policy import for_training
 from agents.hanna.training import learn_once, train
-from agents.hanna.training_config import SCALES, TrainingConfig
+from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
@@ -48,6 +48,7 @@ from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.identity import identity_of
 from embodied.interface import Ask, Move, Observation, Sight, Stop
 from embodied.language.plain import PlainLanguage
 from embodied.locks import LockedError, locked
@@ -67,13 +68,13 @@ TINY = dataclasses.replace(
     iterations=4,
     batch=6,
     training_steps=8,
-    evaluation_steps=12,
     validate_every=2,
     validation_tasks=6,
     instruction_length=40,
     learning_rate=3e-3,
     cooldown=0.25,
 )
+JUDGED = dataclasses.replace(EVALUATIONS["mini"], evaluation_steps=12)
 
 
 def setting(side: int = 6, houses: int = 1) -> Split:
@@ -91,17 +92,21 @@ def setting(side: int = 6, houses: int = 1) -> Split:
     return Split(worlds, tasks, lambda: HannaEnv(worlds, anna, moves), bank)
 
 
-def agent_for(split: Split, config: TrainingConfig = TINY):
+def agent_for(split: Split, config: TrainingConfig = TINY, evaluation=JUDGED):
     world = next(iter(split.worlds.values()))
     routes = build_routes(world, seed=3, language=PlainLanguage(), house_split="test")
     words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
-    return new_agent(config, words, split.bank.digest, split.bank.size)
+    return new_agent(config, words, split.bank.digest, split.bank.size, evaluation)
+
+
+def identity(agent):
+    return identity_of(settings=agent.config, encoder=agent.encoder_digest)
 
 
 def run(folder, config=TINY, split=None, **options):
     split = split or setting()
     agent = agent_for(split, config)
-    progress = train(agent, split, split, HannaTeacher(), folder, note=lambda line: None, **options)
+    progress = train(agent, split, split, HannaTeacher(), folder, identity(agent), note=lambda line: None, **options)
     return agent, progress
 
 
@@ -224,8 +229,8 @@ def test_where_the_agent_was_weighs_less():
 )
 def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, by_image):
     split = setting(houses=2)
-    chosen = dataclasses.replace(TINY, model=model, again=again, by_image=by_image)
-    policy = agent_for(split, chosen).policy(split.bank)
+    judged = dataclasses.replace(JUDGED, again=again, by_image=by_image)
+    policy = agent_for(split, dataclasses.replace(TINY, model=model), judged).policy(split.bank)
     policy.network.eval()
     policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)
     tasks = [dataclasses.replace(t, horizon=12) for t in split.tasks[::5]]
@@ -365,8 +370,10 @@ def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
     assert progress.update == 4
     for name, value in straight.network.state_dict().items():
         assert torch.equal(value, resumed.network.state_dict()[name]), name
-    a, b = ((tmp_path / d / "validation.jsonl").read_text().splitlines() for d in ("straight", "broken"))
-    assert [json.loads(line)["spl"] for line in a] == [json.loads(line)["spl"] for line in b]
+    a, b = (
+        [line for line in metrics_of(tmp_path / d) if line[1].startswith("validation/")] for d in ("straight", "broken")
+    )
+    assert a == b and {name for _, name, _ in a} >= {"validation/success", "validation/spl"}
 
 
 @pytest.mark.slow
@@ -374,13 +381,11 @@ def test_training_writes_what_a_researcher_looks_at(tmp_path):
     seen = []
     _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
     assert seen == [(2, 6), (4, 6)]
-    lines = [json.loads(line) for line in (tmp_path / "validation.jsonl").read_text().splitlines()]
-    assert [line["update"] for line in lines] == [2, 4]
-    assert progress.best == max(line["success"] for line in lines)
-    kept = [line["update"] for line in lines if as_good(line["success"], progress.best, 6)]
-    assert progress.best_update in kept
+    found = {update: value for update, name, value in metrics_of(tmp_path) if name == "validation/success"}
+    assert list(found) == [2, 4] and progress.best == max(found.values())
+    assert progress.best_update in [update for update, success in found.items() if as_good(success, progress.best, 6)]
     assert list(tmp_path.glob("events.out.tfevents.*"))
-    assert json.loads((tmp_path / "settings.json").read_text())["batch"] == 6
+    assert json.loads((tmp_path / "settings.json").read_text())["settings"]["batch"] == 6
 
 
 def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
@@ -410,14 +415,14 @@ def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
         run(tmp_path, dataclasses.replace(TINY, batch=5))
     other = setting()
     worlds = {n: other.bank._table.numpy() for n in other.worlds}
-    with pytest.raises(CheckpointError, match="learned from encoder tests"):
+    with pytest.raises(CheckpointError, match="encoder 'tests' -> 'another encoder'"):
         run(tmp_path, split=dataclasses.replace(other, bank=FeatureBank(worlds, "another encoder")))
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
     (tmp_path / "checkpoint.pt").write_bytes(before[: len(before) // 2])
     with pytest.raises(CheckpointError, match="cut short"):
         run(tmp_path)
     torch.save({"format": "something else"}, tmp_path / "checkpoint.pt")
-    with pytest.raises(CheckpointError, match="'something else'"):
+    with pytest.raises(CheckpointError, match="not a checkpoint of format"):
         run(tmp_path)
 
 
@@ -444,7 +449,7 @@ def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_pat
     before = (tmp_path / "checkpoint.pt").read_bytes()
     bad = setting()
     bad.bank._table[:] = torch.nan
-    with pytest.raises(TrainingError, match="update 2.*last checkpoint is intact"):
+    with pytest.raises(DivergedError, match="update 2.*last checkpoint is intact"):
         run(tmp_path, split=bad)
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
 
@@ -456,10 +461,9 @@ def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(t
     dark = {n: np.full_like(x, np.nan) for n, x in own.items()}
     bank = FeatureBank(own, split.bank.digest, [dark] if shown else [])
     config = dataclasses.replace(TINY, iterations=3, validate_every=1)
-    with pytest.raises(TrainingError, match="loss") if shown else contextlib.nullcontext():
-        train(
-            agent_for(split, config), dataclasses.replace(split, bank=bank), split, HannaTeacher(), tmp_path, note=str
-        )
+    with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
+        agent, shown_in = agent_for(split, config), dataclasses.replace(split, bank=bank)
+        train(agent, shown_in, split, HannaTeacher(), tmp_path, identity(agent), note=str)
 
 
 def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
@@ -467,7 +471,9 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
     agent, path = agent_for(split), tmp_path / "agent.safetensors"
     save_agent(agent, path)
     again = load_agent(path)
-    assert again.config == agent.config and again.vocabulary == agent.vocabulary
+    assert (again.config, again.evaluation, again.vocabulary) == (agent.config, JUDGED, agent.vocabulary)
+    save_agent(again, tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes(), "equal agents are equal files"
     for name, value in agent.network.state_dict().items():
         assert torch.allclose(value, again.network.state_dict()[name], atol=2e-3), name
     other = FeatureBank({"x": np.zeros((1, 36, 16))}, "another encoder")
@@ -508,8 +514,8 @@ def test_table_d1_is_the_default():
     d1 = SCALES["paper"]
     assert (d1.hidden_size, d1.navigation_embedding, d1.ask_embedding, d1.batch) == (256, 256, 128, 32)
     assert (d1.learning_rate, d1.dropout, d1.alpha, d1.iterations) == (1e-4, 0.3, 1.0, 30_000)
-    assert (d1.training_steps, d1.evaluation_steps, d1.instruction_length) == (20, 50, 50)
-    assert TrainingConfig.from_json(d1.to_json()) == d1
+    steps = EVALUATIONS["paper"].evaluation_steps
+    assert (d1.training_steps, steps, d1.instruction_length) == (20, 50, 50)
 
 
 @pytest.mark.slow
@@ -517,10 +523,11 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     here = Path(__file__).parent
     code = (
         "import sys, dataclasses; sys.path.insert(0, sys.argv[2])\n"
-        "import test_imitation as t; from pathlib import Path\n"
+        "import test_hanna_learner as t; from pathlib import Path\n"
         "config = dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6)\n"
         "split = t.setting(); agent = t.agent_for(split, config)\n"
-        "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), note=lambda line: print(line, flush=True))\n"
+        "note = lambda line: print(line, flush=True)\n"
+        "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), t.identity(agent), note=note)\n"
     )
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
     process = subprocess.Popen(
