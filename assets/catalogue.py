@@ -18,7 +18,7 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from assets import materials
-from assets.built import MAKERS
+from assets.built import BASICS, MAKERS
 from assets.cache import default_cache
 from assets.importing.importer import import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own, source_digest
@@ -88,6 +88,14 @@ class Catalogue:
         kept = {key: self._asset(key) for key in keys}
         return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
 
+    @functools.cached_property
+    def furnishing(self) -> Catalogue:
+        """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
+        furniture models are installed, only what code builds, the simple furniture included."""
+        if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
+            return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
+        return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
+
     def mesh(
         self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
     ) -> tuple[MeshPart, ...]:
@@ -117,6 +125,11 @@ class Catalogue:
           MeshError, PackError: a file is gone since the catalogue was read.
         """
         return {key: source_digest(self._own[key]) for key in sorted(set(keys)) if key in self._own}
+
+    @property
+    def models(self) -> frozenset[str]:
+        """The models of furniture libraries that are used, by the keys they have there."""
+        return frozenset(self._recipes[k].model or k for k in self._recipes if k not in self._own)
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
@@ -155,7 +168,9 @@ class Catalogue:
         return materials.finish(material_key, self.cache)
 
 
-def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
+def load_catalogue(
+    cache: Path | None = None, packs: Sequence[Path] | Path | str = (), own: Sequence[Path] | Path | str = ()
+) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
 
     Args:
@@ -163,8 +178,7 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    if isinstance(own, (str, Path)):  # the letters of a word are folders, too
-        own = (Path(own),)
+    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)

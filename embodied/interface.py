@@ -215,7 +215,24 @@ class FollowRoute:
     """Nodes from start to end."""
 
 
-Goal = FindObject | FollowRoute
+@dataclass(frozen=True)
+class FindDescribed:
+    """Find one object among its like (Ask-v0): the one that the requester has in mind."""
+
+    object_class: str
+    placement: str
+    """The one that is meant. Privileged, as the next two are."""
+    fitting: tuple[str, ...]
+    """All placements that the request describes, the one that is meant included."""
+    similar: tuple[str, ...] = ()
+    """Further placements of its class."""
+    words: tuple[str, ...] = ()
+    """Words of colour and material in the request."""
+    room_kind: str | None = None
+    """The kind of room in the request."""
+
+
+Goal = FindObject | FollowRoute | FindDescribed
 
 
 @dataclass(frozen=True)
@@ -223,7 +240,7 @@ class Task:
     id: str
     """Unique in a data set: '<world>/<kind>/<number>'."""
     kind: str
-    """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
+    """'find', 'vln', 'vnla', 'hanna', 'hari' or 'ask'."""
     world: str
     """Name of the house (House.name)."""
     start: Pose
@@ -269,6 +286,36 @@ class Intention(enum.Enum):
     """HARI: describe where I should go."""
     SUB = "sub"
     """HARI: give me a nearer goal."""
+    CONFIRM = "confirm"
+    """Ask-v0, as all below: is what I am at what you mean?"""
+    APPEARANCE = "appearance"
+    """What does it look like?"""
+    REGION = "region"
+    """Which room is it in?"""
+    ROUTE = "route"
+    """How do I get there?"""
+    DISAMBIGUATE = "disambiguate"
+    """Which of those that I see do you mean?"""
+    FREE = "free"
+    """A question in the agent's own words (Ask.question)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What language models were asked for one step."""
+
+    calls: int = 0
+    tokens_in: int = 0
+    tokens_out: int = 0
+    price: float = 0.0
+    """In the currency of the rates that were given; answers from the cache count what they first cost."""
+    invalid: int = 0
+    """Answers that were none: not the wanted JSON, an unknown action, HTML, too long."""
+    refusals: int = 0
+    """Answers in which the model declines."""
+
+    def __add__(self, other: Usage) -> Usage:
+        return Usage(*(getattr(self, n) + getattr(other, n) for n in Usage.__dataclass_fields__))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -281,6 +328,10 @@ class Thought:
     """Probability of each help action: {'help': 0.2, 'nothing': 0.8}."""
     reasons: tuple[float, ...] | None = None
     """HANNA: probabilities of (lost, uncertain_wrong, never_asked)."""
+    usage: Usage | None = None
+    """What a language model was asked; None where there is none."""
+    words: str = ""
+    """What a language model gave as its reason."""
     match: float | None = None
     """HANNA: how well the picture that it was shown matches what it sees, up to 1."""
 
@@ -373,6 +424,22 @@ class Reply:
     """What was answered; an uncooperative assistant may answer another question."""
     subtask: Subtask | None = None
     """Privileged; never shown to a policy."""
+    usage: Usage | None = None
+    """What a language model was asked for it; None where there is none."""
+    ruled_out: tuple[str, ...] = ()
+    """Ask-v0: placements that the answer tells are not meant. Privileged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Ask-v0: something that looks like what was asked for, as a simulated detector reports it."""
+
+    bearing: float
+    """Radians in [-pi, pi), relative to the agent's yaw, left positive."""
+    distance: float
+    """Metres."""
+    score: float
+    """0..1: how well it fits all that was said, to two digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -402,6 +469,10 @@ class Observation:
     """HARI: d^s."""
     goal_descriptions: tuple[Description, ...] = ()
     """HARI: the goal-description stack G^d, top last."""
+    detections: tuple[Detection, ...] = ()
+    """Ask-v0: the best first."""
+    advised: Move | Stop | None = None
+    """Ask-v0: what the route that was told says to do next; None where none is being followed."""
     moved: bool = False
     """Whether the last step led to another place, as wheels know."""
 
@@ -430,6 +501,10 @@ class Situation:
     """Node at the beginning of every navigation step so far, the current one last."""
     goals: tuple[int, ...] = ()
     """HARI: the true goal nodes on the stack, top last."""
+    question: str = ""
+    """Of a free question that is being answered: its words."""
+    possible: tuple[str, ...] = ()
+    """Ask-v0: placements that fit all that was said so far."""
 
 
 # What is written down ---------------------------------------------------------------------------
@@ -452,7 +527,7 @@ class Step:
     reply: Reply | None
     next_pose: Pose
     cost: float = 0.0
-    """HARI: the cost of this step, shaping excluded; with people, the price of the question."""
+    """HARI: the cost of this step, shaping excluded; Ask-v0 and with people: the price of the question."""
     seconds: float | None = None
     """When it was taken, since the episode began; None where no person took part."""
 

@@ -80,8 +80,7 @@ def main() -> None:
     observation, _ = env.reset(seed=args.seed)
     for _ in range(args.steps):
         features.append(encode(observation["rgb"]))
-        play = env.unwrapped._env
-        rooms.append(play.world.graph.room_of_node[play.pose.node])  # for the judgement below, not for an agent
+        rooms.append(env.unwrapped.room)  # for the judgement below, not for an agent
         moves = np.flatnonzero(observation["action_mask"][:-4])  # neither stop nor ask
         observation, _, terminated, truncated, _ = env.step(int(rng.choice(moves)))
         if terminated or truncated:

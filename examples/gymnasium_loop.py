@@ -3,7 +3,7 @@
     python examples/gymnasium_loop.py --kind HANNA --episodes 3
 
 Observations are arrays (`embodied.gym.spaces` says which), the action is a number, and `action_mask` says which numbers
-are possible now. Without `data=` a small flat is generated.
+are possible now; `info` has the words. Without `data=` a small flat is generated.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import gymnasium
 import numpy as np
 
 import embodied  # noqa: F401 - registers embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0
-from embodied.gym.spaces import text_of
 
 
 def main() -> None:
@@ -29,15 +28,15 @@ def main() -> None:
     rng = np.random.default_rng(args.seed)
     for episode in range(args.episodes):
         observation, info = env.reset(seed=args.seed + episode)
-        heard, total, ended = text_of(observation["instruction"]), 0.0, False
+        heard, total, ended = info["instruction"], 0.0, False
         print(f"{info['task']}: “{heard}”")
         while not ended:
             possible = np.flatnonzero(observation["action_mask"])
             observation, reward, terminated, truncated, info = env.step(int(rng.choice(possible)))
             total, ended = total + float(reward), terminated or truncated
-            if (said := text_of(observation["instruction"])) != heard:
-                print(f"    now: “{said}”")
-                heard = said
+            if info["instruction"] != heard:
+                heard = info["instruction"]
+                print(f"    now: “{heard}”")
         print(f"    reward {total:.2f}, success {info['success']:.0f}, {info['steps']:.0f} steps")
     env.close()
 

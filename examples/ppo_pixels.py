@@ -122,14 +122,14 @@ class Seeker(gymnasium.Wrapper):
 
     def _numbered(self) -> np.ndarray:
         goal = np.zeros(len(self._goals), np.float32)
-        goal[self._goals.index(self.env._env.task.request)] = 1.0
+        goal[self._goals.index(self.env.task.request)] = 1.0
         return goal
 
     def _direction(self) -> np.ndarray:
         """(3,) how far, and sine and cosine of where from straight ahead, left positive."""
-        play = self.env._env
-        x, y, _ = play.world.graph.positions[play.task.goal_nodes[0]] - play.world.graph.positions[play.pose.node]
-        aside = float(wrap(math.atan2(y, x) - play.pose.yaw))
+        env, positions = self.env, self.env.world.graph.positions
+        x, y, _ = positions[env.task.goal_nodes[0]] - positions[env.pose.node]
+        aside = float(wrap(math.atan2(y, x) - env.pose.yaw))
         return np.array([min(math.hypot(x, y) / FAR, 1.0), math.sin(aside), math.cos(aside)], np.float32)
 
 

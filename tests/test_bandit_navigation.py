@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ import torch
 from hand_worlds import grid_world
 
 from agents.bandit import navigation
-from agents.bandit.config import RUN_FORMAT
 from agents.bandit.navigation import (
     Decided,
     StateCritic,
@@ -23,15 +23,16 @@ from agents.bandit.navigation import (
     score_of,
     shortest_path,
 )
-from agents.bandit.navigation_study import NavigationSetting, gain, raters, rise, run_navigation_study, run_raters
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import CLEAN, Rater
+from agents.bandit.stars_study import StarsStudy, raters, rise
 from agents.common.actor_critic import advantages
-from agents.common.checkpoint_file import CheckpointError, read_checkpoint
+from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.lessons import Split
 from agents.common.vocabulary import build_vocabulary
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
 from agents.hanna.training_config import SCALES
+from agents.studies.engine import run_study
 from agents.vision.bank import FeatureBank
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
@@ -147,8 +148,8 @@ def test_a_killed_run_goes_on_exactly(split, tmp_path, monkeypatch):
     again = agent_for(split)
     found = learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with=before, note=silent)
     assert fingerprint(again) == fingerprint(whole)
-    assert found == read_checkpoint(tmp_path / "whole" / "checkpoint.pt", RUN_FORMAT)["history"]
-    with pytest.raises(CheckpointError, match="agent"):
+    assert found == read_checkpoint(tmp_path / "whole" / "checkpoint.pt")["history"]
+    with pytest.raises(CheckpointError, match="begin"):
         learn_from_stars(again, split, Rater(variance=1), STARS, tmp_path / "parts", begun_with="other", note=silent)
 
 
@@ -161,20 +162,8 @@ def test_while_the_critic_learns_alone_the_agent_stays_as_it_was(split, tmp_path
     assert fingerprint(agent) == before
 
 
-def test_a_gain_is_task_by_task_over_seeds():
-    before, after = (
-        np.array([0.0, 100.0, 0.0, 100.0]),
-        [np.array([100.0, 100.0, 0.0, 100.0]), np.array([0.0, 100.0, 100.0, 100.0])],
-    )
-    found = gain(after, before, ["a", "a", "b", "b"])
-    assert found.mean == pytest.approx(25.0)
-    assert found.half == pytest.approx(0.0)  # both houses gained as much
-
-
 def test_a_rise_is_the_last_quarter_less_the_updates_before_anything_is_learned():
-    found = rise([[0.1, 0.3, 0.9, 0.2, 0.3, 0.4, 0.5, 0.5]], untaught=2)
-    assert found.mean == pytest.approx(50.0 - 20.0)
-    assert found.half == pytest.approx(1.96 * math.sqrt(200.0 / 2))  # 10 and 30 vary by 200, the last two not at all
+    assert rise([0.1, 0.3, 0.9, 0.2, 0.3, 0.4, 0.5, 0.5], untaught=2) == pytest.approx(50.0 - 20.0)
 
 
 def test_raters_are_named_by_their_one_fault():
@@ -187,24 +176,26 @@ def test_raters_are_named_by_their_one_fault():
 def test_settings_are_checked():
     with pytest.raises(ValueError, match="score must be one of"):
         RatingConfig(score="stars")
-    setting = NavigationSetting(Path("data"), None, Path("agent"), Path("out"), STARS, (0,), decisions="best")
     with pytest.raises(ValueError, match="decisions must be one of"):
-        run_navigation_study(setting)
+        StarsStudy(Path("data"), (0,), agent=Path("agent"), encoder="", config=STARS, decisions="best")
     assert navigation.StateCritic(4)(torch.zeros(3, 2, 4)).shape == (3, 2)
 
 
 @pytest.mark.slow
-def test_a_study_learns_judges_and_writes_once(split, tmp_path):
-    agent = agent_for(split)
-    save_agent(agent, tmp_path / "agent.safetensors")
-    out = tmp_path / "study"
-    setting = NavigationSetting(tmp_path, None, tmp_path / "agent.safetensors", out, STARS, (0, 1), tasks=8)
-    path = run_raters(setting, split, split, ["clean", "granularity 4"], note=silent)
-    text = path.read_text()
-    assert "| clean |" in text and "| granularity 4 |" in text and "Not run: granularity 1" in text
-    assert "on 8 tasks in 1 houses" in text
-    assert (out / "figure_navigation.png").exists()
-    made = {p: p.stat().st_mtime_ns for p in out.rglob("*.safetensors")}
+def test_a_study_learns_judges_and_writes_once(split, tmp_path, monkeypatch):
+    save_agent(agent_for(split), tmp_path / "agent.safetensors")
+    data = SimpleNamespace(digest="d", names=lambda name: [name], split=lambda name: SimpleNamespace(**vars(split)))
+    monkeypatch.setattr("agents.bandit.stars_study.dataset_of", lambda *_: data)
+    monkeypatch.setattr("agents.bandit.stars_study.split_of", lambda *_: split)
+    for module in ("bandit.stars_study", "studies.episodes"):
+        monkeypatch.setattr(f"agents.{module}.Dataset", lambda _: data)
+    study = StarsStudy(tmp_path, (0, 1), 8, (0,), agent=tmp_path / "agent.safetensors", encoder="tests", config=STARS)
+    monkeypatch.setattr(StarsStudy, "about", lambda self: "Stars.")
+    wanted = ["clean", "granularity 4"]
+    text = run_study(study, ["stars"], tmp_path / "out", rows=wanted, note=silent)["stars"].read_text()
+    assert "| clean |" in text and "| granularity 4 |" in text and "granularity 1" in text.partition("Not run: ")[2]
+    assert (tmp_path / "out/stars-stars.png").exists()
+    made = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*.safetensors")}
     assert len(made) == 4
-    run_raters(setting, split, split, ["clean"], note=silent)
-    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.safetensors")} == made
+    run_study(study, ["stars"], tmp_path / "out", rows=["clean"], note=silent)
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*.safetensors")} == made

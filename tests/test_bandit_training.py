@@ -13,19 +13,19 @@ import pytest
 import torch
 
 from agents.bandit import corpus, libreoffice
-from agents.bandit.config import RUN_FORMAT, BanditConfig
+from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import CorpusError, Pair, Sizes, pairs_of
 from agents.bandit.network import Critic, EncoderDecoder, Translator, begin
 from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
-from agents.bandit.study import BanditStudySetting, Job, across_seeds, distinct, folder_of, history, run_study
+from agents.bandit.study import BanditStudy
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
-from agents.common.checkpoint_file import CheckpointError, read_checkpoint
+from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.decoding import drawn_with
-from agents.common.runs import Run
-from agents.common.studies import history_of
+from agents.common.session import Session
+from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.seeds import stream
@@ -316,7 +316,8 @@ def test_ratings_alone_improve_translations(data, trained, tmp_path):
 def weights(folder: Path) -> dict[str, torch.Tensor]:
     return {
         f"{k}.{n}": t
-        for k, m in read_checkpoint(folder / "checkpoint.pt", RUN_FORMAT)["modules"].items()
+        for k, m in read_checkpoint(folder / "checkpoint.pt")["parts"].items()
+        if k in ("translator", "critic")
         for n, t in m.items()
     }
 
@@ -329,17 +330,17 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     )
     rater = Rater(granularity=5, variance=0.5)
     whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
-    save = Run.save
+    save = Session.save
 
-    def killed(run, progress):
-        save(run, progress)
-        if progress.update == 13:
+    def killed(session):
+        save(session)
+        if session.progress.update == 13:
             raise SystemExit
 
-    monkeypatch.setattr(Run, "save", killed)
+    monkeypatch.setattr(Session, "save", killed)
     with pytest.raises(SystemExit):
         bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
-    monkeypatch.setattr(Run, "save", save)
+    monkeypatch.setattr(Session, "save", save)
     parts = bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
     assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [
         {k: v for k, v in p.items() if k != "seconds"} for p in whole
@@ -366,33 +367,19 @@ def test_diverging_says_so_and_keeps_the_checkpoint(data, trained, tmp_path):
 
 
 def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
-    config = dataclasses.replace(TOY, pretraining_passes=1, critic_passes=1)
-    setting = BanditStudySetting(data, tmp_path, config, seeds=2)
-    said = []
-    path = run_study(setting, ["3.2"], note=said.append)["3.2"]
-    text = path.read_text()
-    assert "2.82 ± 0.03" in text and text.count("|") == 6 * 6
+    study = BanditStudy(data, dataclasses.replace(TOY, pretraining_passes=1, critic_passes=1), (0, 1))
+    text = run_study(study, ["3.2"], tmp_path, note=silent)["3.2"].read_text()
+    assert "(2.82)" in text and "| weakly pre-trained, Δ NED-A2C |" in text
     first = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")}
     assert len(first) == 2 * (1 + 2 + 6)
-    run_study(setting, ["3.2"], note=said.append)
+    text = run_study(study, ["3.2", "held-out"], tmp_path, note=silent)["held-out"].read_text()
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")} == first
-    with pytest.raises(ValueError, match="unknown studies"):
-        run_study(setting, ["9.9"], note=silent)
-    text = run_study(setting, ["held-out"], note=silent)["held-out"].read_text()
-    assert "| entropy | 2 |" in text
-    for seed in (0, 1):
-        job = Job("full", "supervised")
-        folder = folder_of(setting, seed, job)
-        found = json.loads((folder / "behaviour.json").read_text())
-        assert found["BLEU"] == pytest.approx(history(setting, seed, job)[0]["held-out BLEU"])
-        assert 0 < found["entropy"] < np.log(TOY.target_words) and found["perplexity"] > 1
-
-
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"history": 3}', '{"history": [3]}'])
-def test_a_damaged_result_is_named(tmp_path, text):
-    (tmp_path / "result.json").write_text(text)
-    with pytest.raises(ValueError, match="result.json"):
-        history_of(tmp_path)
+    rows = {r["label"]: r["values"] for r in json.loads((tmp_path / "bandit-held-out.json").read_text())["rows"]}
+    assert (
+        0 < rows["reference"]["entropy"]["mean"] < np.log(TOY.target_words)
+        and rows["reference"]["perplexity"]["mean"] > 1
+    )
+    assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", '{"splits": {"dev": 3}}', '{"splits": {"dev": {"documents": 3}}}'])
@@ -400,19 +387,6 @@ def test_a_damaged_corpus_file_is_named(tmp_path, text):
     (tmp_path / "corpus.json").write_text(text)
     with pytest.raises(CorpusError, match="corpus.json.*make the corpus again"):
         pairs_of(tmp_path)
-
-
-def test_runs_that_two_studies_share_are_made_once():
-    assert distinct([Job("full", "a2c"), Job("full", "a2c", passes=5), Job("weak", "a2c")]) == [
-        Job("full", "a2c", passes=5),
-        Job("weak", "a2c"),
-    ]
-
-
-def test_intervals_over_seeds_are_students():
-    found = across_seeds([1.0, 2.0, 3.0])
-    assert found.mean == 2.0 and found.half == pytest.approx(4.302653 / np.sqrt(3), rel=1e-5)
-    assert np.isnan(across_seeds([1.0]).half)
 
 
 def test_pieces_leave_no_word_unknown_and_come_back_whole():

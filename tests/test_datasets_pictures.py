@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import os
 import shutil
@@ -154,10 +153,10 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
 
     def features(quality: str | None, ray: str | None = None, houses: int | None = None, lights: int = 1) -> str:
         lines: list[str] = []
-        args = argparse.Namespace(data=data.folder, cache=data.folder / "cache", quality=quality, workers=1, ray=ray)
-        args.threads, args.device, args.network, args.encoder, args.split = 1, "cpu", "random", None, None
-        args.houses, args.lights = houses, lights
-        assert vision.run_features(args, lines.append) == 0
+        vision.make_features(
+            data.folder, encoder, data.folder / "cache", quality=quality, ray=ray, first=houses, lights=lights,
+            note=lines.append,
+        )  # fmt: skip
         return lines[-1]
 
     for name in names:

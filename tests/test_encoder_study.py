@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from hand_data import build, small_house
 
+from agents.studies.engine import run_study
 from agents.vision.config import WAYS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import random_encoder, save_encoder
 from agents.vision.labels import HouseStrips
 from agents.vision.resnet import ARCHITECTURES
-from agents.vision.study import EncoderStudySetting, run_study
+from agents.vision.study import EncoderStudy
 from embodied.cli import learning, study
 from embodied.records import read_json
 
@@ -59,30 +60,30 @@ def setting(data, tmp_path, monkeypatch):
     for k, path in enumerate(files):
         save_encoder(random_encoder(seed=k), path)
     source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "fast", 2)
-    return EncoderStudySetting(
-        source, tmp_path / "study", VisionConfig(least_views=1), ready={"two": files[:2], "one": files[2:]}
-    )
+    ready = {"two": files[:2], "one": files[2:]}
+    return EncoderStudy(source, VisionConfig(least_views=1), (0,), pictures=("fast", "unlit"), ready=ready)
 
 
 @pytest.mark.slow
-def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_is_trained(setting, data):
-    lines: list[str] = []
-    made = run_study(setting, ["encoders", "pictures"], pictures=("fast", "unlit"), note=lines.append)
-    assert len(lines) == 3 and not (setting.out / "compact").exists()
-    text = made["pictures"].read_text()
-    for row in ("| two, fast | 2 |", "| two, unlit | 2 |", "| one, unlit | 1 |"):
-        assert row in text
-    for quality, houses in ((None, 2), ("fast", 1), ("unlit", 1)):  # other pictures are of a house's own light
-        body = read_json(setting.reading("one", 0, quality))
-        assert body["houses"] == houses * len(data.names("val_unseen")) and body["mean_ap"] > body["chance_ap"]
-    again: list[str] = []
-    run_study(setting, ["pictures"], pictures=("fast", "unlit"), note=again.append)
-    assert all(line.endswith("done before") for line in again) and len(again) == 3
+def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_is_trained(setting, data, tmp_path):
+    out, rows = tmp_path / "study", ["one", "two"]
+    run_study(setting, ["encoders", "pictures"], out, rows=rows, note=lambda line: None)
+    body = read_json(out / "vision-pictures.json")
+    found = {r["label"]: r["values"] for r in body["rows"]}
+    assert [c["key"] for c in body["columns"]][:2] == ["AP_fast", "chance_AP_fast"]
+    for name in rows:
+        for way in ("fast", "unlit"):
+            assert found[name][f"AP_{way}"]["mean"] > found[name][f"chance_AP_{way}"]["mean"]
+    assert found["two"]["AP_fast"]["half_width"] is not None and found["one"]["AP_fast"]["half_width"] is None
+    assert "Not run: compact, keen" in (out / "vision-encoders.md").read_text()
+    kept = {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
+    run_study(setting, ["pictures"], out, rows=rows, note=lambda line: None)
+    assert kept == {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
     with pytest.raises(ValueError, match=r"\['keen'\] are trained by the study"):
-        EncoderStudySetting(setting.source, setting.out, setting.config, ready={"keen": [setting.out]})
+        dataclasses.replace(setting, ready={"keen": [setting.source.folder]})
 
 
 def test_files_of_one_name_are_training_seeds(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -48,11 +49,47 @@ def test_missing_values_do_not_count():
 
 
 def test_ratios_are_sums_over_sums():
-    r = tables.ratio([(1, 2), (0, 8)], ["a", "b"])
+    r = tables.estimate([1, 0], ["a", "b"], weights=[2, 8])
     assert r.mean == pytest.approx(0.1) and r.n == 10 and r.half > 0
 
 
 @pytest.mark.slow
+def test_of_one_value_per_seed_the_interval_is_students_over_seeds():
+    runs = [tables.Samples((v,)) for v in (1.0, 2.0, 3.0)]
+    e = tables.interval(runs)
+    assert e.mean == 2.0 and e.half == pytest.approx(4.302653 / math.sqrt(3), rel=1e-5)
+    assert math.isnan(tables.interval(runs[:1]).half), "one seed says nothing about another"
+
+
+def test_tasks_in_houses_crossed_with_seeds_by_hand():
+    """Houses a and b have 1 and 0 by both seeds: seeds add nothing, two houses have one degree of freedom."""
+    e = tables.interval([tables.Samples((1.0, 0.0), ("a", "b"))] * 2)
+    assert e.mean == 0.5 and e.n == 4
+    by_house = (1**2 + 1**2) / 16 * 2  # each house is off by twice a half
+    assert e.half == pytest.approx(12.7062 * math.sqrt(by_house), rel=1e-4)
+    apart = tables.interval([tables.Samples((1.0, 1.0), ("a", "b")), tables.Samples((0.0, 0.0), ("a", "b"))])
+    assert apart.half == pytest.approx(e.half), "and the same with the two exchanged"
+
+
+def test_forty_of_forty_is_not_certain():
+    """Clopper and Pearson: the chance of forty successes is 2.5 % where each has 91.2 %."""
+    forty = tables.Samples((1.0,) * 40, tuple("abcd") * 10, share=True)
+    assert 1 - tables.interval([forty]).half == pytest.approx(0.9119, abs=1e-4)
+    assert tables.interval([forty] * 3).half == tables.interval([forty]).half, "seeds are no other tasks"
+    none = dataclasses.replace(forty, values=(0.0,) * 40)
+    assert tables.interval([none]).half == tables.interval([forty]).half
+    assert tables.interval([dataclasses.replace(forty, share=False)]).half == 0.0
+
+
+def test_agents_are_compared_task_by_task():
+    first, second = (tables.Samples(v, ("a", "a", "b", "b")) for v in ((1.0, 0.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0)))
+    assert tables.less(first, second).values == (1.0, 0.0, 1.0, 0.0)
+    e = tables.interval([tables.less(first, second)])
+    assert e.mean == 0.5 and e.half == 0.0, "both houses gain as much"
+    with pytest.raises(ValueError, match="same tasks"):
+        tables.less(first, dataclasses.replace(second, groups=("a", "b", "b", "b")))
+
+
 def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
     tasks = build(tmp_path / "d", tmp_path / "c").tasks("train")
     some = spread(tasks, 6)

@@ -17,7 +17,7 @@ EXAMPLES = ROOT / "examples"
 
 @pytest.fixture(scope="module")
 def flats(tmp_path_factory) -> Path:
-    """Where the data set of two examples goes; whichever runs first builds it."""
+    """Where the data set of an example goes."""
     return tmp_path_factory.mktemp("examples") / "flats"
 
 
@@ -48,24 +48,9 @@ def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_own_policy_stands_in_the_table_beside_the_baselines(tmp_path, flats):
-    said = run("own_policy.py", tmp_path, "--data", str(flats))
-    assert re.search(r"\| onward \|.*\n.*random walk", said) and "| shortest | test_unseen | 100.0" in said
-
-
-@pytest.mark.gl
-@pytest.mark.slow
 def test_the_gymnasium_loop_hears_help(tmp_path):
     said = run("gymnasium_loop.py", tmp_path, "--episodes", "2")
     assert said.count("“find ") >= 2 and said.count("reward") == 2
-
-
-@pytest.mark.gl
-@pytest.mark.slow
-def test_own_furniture_stands_in_a_house_and_is_seen(tmp_path):
-    run("own_furniture.py", tmp_path, "--out", "out")
-    blue, green, red = cv2.split(cv2.imread(str(tmp_path / "out" / "table.png")).astype(int))
-    assert ((red > 100) & (green < 60) & (blue < 60)).mean() > 0.01, "the red table is in the picture"
 
 
 @pytest.mark.gl

@@ -7,7 +7,9 @@ of its kind. What carries a checksum may never be the last.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import hashlib
 import io
 import json
 import shutil
@@ -17,45 +19,54 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
+import rerun.blueprint as rrb
 import torch
 from conftest import two_rooms
 from hand_data import build
 
-from agents.bandit import store
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
-from agents.bandit.store import load_translator, save_weights
+from agents.bandit.store import load_translator, save_network
 from agents.bandit.training import NumberedCorpus
 from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
-from agents.common.session import Progress
+from agents.common.checkpoint import restore
+from agents.common.session import Session
 from agents.common.tensor_file import save_tensors
 from agents.common.vocabulary import build_vocabulary
+from agents.common.weights import FORMAT
 from agents.hanna.agent import load_agent, new_agent, save_agent
-from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.training_config import SCALES
 from agents.hari import agent as hari
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.words import FeatureWords
+from agents.iliad.nav.stages import config_of
+from agents.iliad.regex.run import load_student
 from agents.vision.encoder import random_encoder
 from agents.vision.features import load_features, save_features
 from agents.vision.labels import HouseStrips
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.errors import UnableError
+from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
 from embodied.house.house import House
 from embodied.interface import Episode
+from embodied.mattersim.graphs import load_graphs
 from embodied.navigation.graph import from_matterport
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import load_lines, save_lines, to_json
 from embodied.render.panorama import Panorama
-from embodied.render.panorama_file import PanoramaFile, write_panoramas
+from embodied.render.panorama_file import MAGIC, TAIL, PanoramaFile, write_panoramas
+from embodied.render.sightings import load_table, save_table, sightings_table
 from embodied.seeds import stream
+from viz.report import judged
+from viz.sinks import Sinks, check_recording, open_recording
 
 pytestmark = pytest.mark.slow
 
-MUTATIONS = 20
-"""Of each of the KINDS; together a little over 300."""
+MUTATIONS = 36
+"""Of each of the KINDS; together some 750."""
 CLEAR = (ValueError, OSError, UnableError)
 """What the command line shows as one line."""
 VALUES = (None, True, False, 0, -1, 10**30, 1e300, -0.5, "", "nope", "../../etc", [], {}, [[]], "9" * 5000)
@@ -91,6 +102,8 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
     _write_learned(folder)
     _write_others(folder)
     _write_pictures(folder)
+    _write_shown(folder)
+    shutil.copy(home / "connectivity.json", folder / "scan_connectivity.json")
     whole = lambda _: _of(Dataset(data.folder))
     return {
         "house.json": Kind(folder / "house.json", lambda p: House.load(p).to_json(), False),
@@ -109,6 +122,10 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
         "checkpoint": Kind(folder / "checkpoint.pt", _resumed, True),
         "panoramas": Kind(folder / "a.pano", _pictures, True),
+        "graph of the simulator": Kind(folder / "scan_connectivity.json", _simulated, False),
+        "table.json": Kind(folder / "table.json", lambda p: judged(p.parent), False),
+        "sightings": Kind(folder / "sightings.npz", _sighted, False),
+        "recording": Kind(folder / "a.rrd", _recorded, False),
         "strips": Kind(folder / "strips.npz", lambda p: HouseStrips.load(p).rgb.tolist(), True),
     }
 
@@ -149,7 +166,9 @@ def _agent():
 def _write_learned(folder: Path) -> None:
     agent = _agent()
     save_agent(agent, folder / "agent.safetensors")
-    save_checkpoint(folder / "checkpoint.pt", agent, torch.optim.Adam(agent.network.parameters()), Progress(3))
+    parts = {"network": agent.network, "adam": torch.optim.Adam(agent.network.parameters())}
+    with Session(folder, {"settings": {"batch": 2}}, parts, 5, note=str) as session:
+        session.save()
     save_features(folder / "features.safetensors", np.ones((2, 36, 4)), random_encoder(seed=0), "house")
 
 
@@ -159,7 +178,7 @@ def _write_others(folder: Path) -> None:
     hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
     words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
     material = NumberedCorpus(BanditConfig(hidden_size=8), {}, (words, words), "", "")
-    save_weights(Translator(4, 4, 8), material, folder / "translator.safetensors")
+    save_network(Translator(4, 4, 8), material, folder / "translator.safetensors", {})
 
 
 def _weights(network: torch.nn.Module) -> list[float]:
@@ -168,8 +187,8 @@ def _weights(network: torch.nn.Module) -> list[float]:
 
 def _resumed(path: Path) -> object:
     agent = _agent()
-    progress = load_checkpoint(path, agent, torch.optim.Adam(agent.network.parameters()))
-    return progress, _weights(agent.network)
+    parts = {"network": agent.network, "adam": torch.optim.Adam(agent.network.parameters())}
+    return restore(path, {"settings": {"batch": 2}}, parts)["progress"], _weights(agent.network)
 
 
 def _write_pictures(folder: Path) -> None:
@@ -178,6 +197,38 @@ def _write_pictures(folder: Path) -> None:
     shapes = (1, 192, 576, 3), (1, 12, 36, 2), (1, 12, 36), (1, 12, 36), (1,)
     types = np.uint8, np.uint8, np.int8, np.float16, np.int8
     HouseStrips("a", ("door", "wall"), *(np.zeros(s, t) for s, t in zip(shapes, types))).save(folder / "strips.npz")
+
+
+def _write_shown(folder: Path) -> None:
+    """What is made to be looked at, and the sightings in a cache."""
+    values = {"success": tables.Estimate(0.5, 0.1, 40)}
+    (folder / "table.json").write_text(tables.as_json([tables.Row("shortest path", "val_seen", 0, 40, 4, values)]))
+    save_table(folder / "sightings.npz", sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3))
+    with open_recording(Sinks(folder / "a.rrd"), rrb.Blueprint(), name="fuzz", properties={}) as recording:
+        recording.log("text", rr.TextDocument("a"))
+
+
+def _simulated(path: Path) -> object:
+    load_graphs.cache_clear()
+    graphs = load_graphs(str(path.parent), ("scan",))
+    assert np.isfinite(graphs.positions).all()
+    return graphs.positions.tolist(), graphs.neighbours.tolist()
+
+
+def _sighted(path: Path) -> object:
+    table = load_table(path)
+    if table is None:
+        raise ValueError("made anew")
+    return {f.name: np.asarray(getattr(table, f.name)).tolist() for f in dataclasses.fields(table)}
+
+
+def _recorded(path: Path) -> object:
+    """Only what is no recording at all is refused; what is inside is the viewer's to read."""
+    with contextlib.redirect_stderr(io.StringIO()) as said:
+        check_recording(path)
+    if said.getvalue():
+        raise ValueError(said.getvalue())
+    return path.read_bytes()
 
 
 def _pictures(path: Path) -> object:
@@ -258,6 +309,10 @@ KINDS = (
     "features",
     "checkpoint",
     "panoramas",
+    "graph of the simulator",
+    "table.json",
+    "sightings",
+    "recording",
     "strips",
 )
 
@@ -282,7 +337,7 @@ def test_a_damaged_file_is_refused_in_a_line_or_harmless(name, kinds):
                 assert found == good or not kind.guarded or damage == before, (name, k, "believed although changed")
     finally:
         kind.path.write_bytes(before)
-    assert refused >= MUTATIONS // 4, "most damage is noticed"
+    assert refused >= MUTATIONS // 4 or name == "recording", "most damage is noticed"
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -306,23 +361,27 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
 
 
 BESIDE = [
-    (hari.load_agent, hari.FORMAT, {}, "missing fields"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": "{"}, "as JSON"),
-    (hari.load_agent, hari.FORMAT, {"names": "[1]", "settings": '{"execution": {}}'}, r"names\[0\] should be str"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"wings": 2}}'}, "unknown fields"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {"heads": 0}}'}, "at least 1"),
-    (hari.load_agent, hari.FORMAT, {"names": "[]", "settings": '{"execution": {}}'}, "execution policy alone"),
-    (load_translator, store.FORMATS[0], {"lexicons": "[]"}, "missing fields"),
-    (load_translator, store.FORMATS[0], {"config": "[]", "lexicons": "[]"}, "should be an object"),
-    (load_translator, store.FORMATS[0], {"config": '{"units": "bytes"}', "lexicons": "[]"}, "units must be one of"),
-    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "7"}, "words of two languages"),
-    (load_translator, store.FORMATS[0], {"config": "{}", "lexicons": "[1, 2]"}, "cannot be read"),
+    (hari.load_agent, "hari", "{}", "missing fields"),
+    (hari.load_agent, "hari", "{", "as JSON"),
+    (hari.load_agent, "hari", '{"names": [1], "execution": {}}', r"names\[0\] should be"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {"wings": 2}}', "unknown fields"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {"heads": 0}}', "at least 1"),
+    (hari.load_agent, "hari", '{"names": [], "execution": {}}', "execution policy alone"),
+    (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
+    (load_translator, "bandit", '{"config": {}}', "missing fields"),
+    (load_translator, "bandit", '{"config": [], "lexicons": ["", ""]}', "should be an object"),
+    (load_translator, "bandit", '{"config": {"units": "bytes"}, "lexicons": ["", ""]}', "units must be one of"),
+    (load_translator, "bandit", '{"config": {}, "lexicons": [1, 2]}', "should be"),
+    (load_translator, "bandit", '{"config": {}, "lexicons": ["1", "2"]}', "cannot be read"),
+    (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown fields"),
+    (config_of, "nav", '{"config": {}}', "missing fields"),
 ]
 
 
-@pytest.mark.parametrize(("read", "form", "about", "match"), BESIDE)
-def test_weights_beside_settings_that_cannot_be_are_refused(read, form, about, match, tmp_path):
-    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": form, **about})
+@pytest.mark.parametrize(("read", "kind", "about", "match"), BESIDE)
+def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, match, tmp_path):
+    facts = {"format": FORMAT, "kind": kind, "about": about}
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, facts)
     with pytest.raises(ValueError, match=match):
         read(tmp_path / "a.safetensors")
 
@@ -346,6 +405,24 @@ def test_strips_in_an_archive_that_says_it_is_packed_otherwise_are_refused(offse
             kind.read(kind.path)
     finally:
         kind.path.write_bytes(before)
+
+
+def test_an_index_of_pictures_that_is_whole_and_wrong_is_refused_or_its_pictures_have_its_size(tmp_path):
+    """Whoever changes the index knows how to write its checksum."""
+    _write_pictures(tmp_path)
+    body, refused = (tmp_path / "a.pano").read_bytes(), 0
+    length, _, _ = TAIL.unpack(body[-TAIL.size :])
+    pictures, index = body[: -TAIL.size - length], body[-TAIL.size - length : -TAIL.size]
+    for k in range(60):
+        wrong = edited(index, stream(3, "index", k))
+        tail = TAIL.pack(len(wrong), hashlib.sha256(wrong).digest(), MAGIC)
+        (tmp_path / "b.pano").write_bytes(pictures + wrong + tail)
+        try:
+            with PanoramaFile(tmp_path / "b.pano") as file:
+                assert all(file.rgb(n).shape == (6, file.size, file.size, 3) for n in range(len(file)))
+        except CLEAR:
+            refused += 1
+    assert refused > 20
 
 
 def test_the_mutations_are_what_they_say():

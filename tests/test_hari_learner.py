@@ -11,7 +11,7 @@ import torch
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
-from agents.common.checkpoint_file import CheckpointError
+from agents.common.checkpoint import CheckpointError
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
@@ -35,6 +35,7 @@ from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
+from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
@@ -46,6 +47,10 @@ QUICK = IntentionConfig(
     hidden_size=24, learning_rate=1e-2, batch=16, critic_iterations=1, iterations=2, validate_every=2
 )
 CUR, GOAL, SUB = (INTENTIONS.index(n) for n in ("cur", "goal", "sub"))
+
+
+def identity(settings):
+    return identity_of(settings=settings)
 
 
 def silent(line: str) -> None:
@@ -450,20 +455,16 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
     world, lessons = grid_lessons()
     config = dataclasses.replace(SMALL, iterations=4, dropout=0.1)
     whole = new_executor(config, words_of(world))
-    pretrain(whole, lessons, tmp_path / "whole", note=silent)
+    pretrain(whole, lessons, tmp_path / "whole", identity(config), note=silent)
     half = new_executor(dataclasses.replace(config, iterations=2), words_of(world))
-    pretrain(half, lessons, tmp_path / "parts", note=silent)
+    pretrain(half, lessons, tmp_path / "parts", identity(half.config), note=silent)
     again = new_executor(config, words_of(world))
-    pretrain(again, lessons, tmp_path / "parts", note=silent)
+    pretrain(again, lessons, tmp_path / "parts", identity(config), note=silent)
     for a, b in zip(whole.network.parameters(), again.network.parameters(), strict=True):
         assert torch.equal(a, b)
     with pytest.raises(CheckpointError, match="batch 8 -> 4"):
-        pretrain(
-            new_executor(dataclasses.replace(config, batch=4), words_of(world)),
-            lessons,
-            tmp_path / "parts",
-            note=silent,
-        )
+        other = new_executor(dataclasses.replace(config, batch=4), words_of(world))
+        pretrain(other, lessons, tmp_path / "parts", identity(other.config), note=silent)
 
     say = lessons.describer
     ground = Ground(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
@@ -473,7 +474,7 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
             settings = dataclasses.replace(QUICK, iterations=updates, batch=4, validation_tasks=4)
             actor, critic = new_heads(settings, SMALL.hidden_size)
             runs[name] = HariAgent(whole, actor, settings)
-            train(runs[name], critic, ground, ground, tmp_path / name, note=silent)
+            train(runs[name], critic, ground, ground, tmp_path / name, identity(settings), note=silent)
     for a, b in zip(runs["one"].actor.parameters(), runs["two"].actor.parameters(), strict=True):
         assert torch.equal(a, b)
 

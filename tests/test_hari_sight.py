@@ -25,7 +25,7 @@ from agents.hari.policy import policy_of
 from agents.hari.pretraining import Curriculum, learn_once, pretraining_success
 from agents.hari.rules import RULES, RuleAgent
 from agents.hari.sight import Headings, Seeing, hidden_channels
-from agents.hari.sight_study import Covered
+from agents.hari.study import Covered
 from agents.hari.words import collate, feature_words, percept
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer

@@ -10,8 +10,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from agents.common.checkpoint_file import CheckpointError
-from agents.common.runs import Run
+from agents.common.checkpoint import CheckpointError
+from agents.common.session import Session
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, reinforce, reinforce_loss
@@ -205,7 +205,7 @@ QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=
 def test_each_learner_learns_the_buttons(tmp_path, settings, least):
     config = LearnerConfig(**{**vars(QUICK), **settings})
     p = problem()
-    found = train(p, config, tmp_path, lambda path: path.touch(), note=silent)
+    found = train(p, config, tmp_path, lambda path, identity: path.touch(), note=silent)
     assert found[-1]["success"] >= least
     assert (tmp_path / "best.safetensors").exists()
     assert [h["episodes"] for h in found] == [160, 320, 480]
@@ -214,7 +214,7 @@ def test_each_learner_learns_the_buttons(tmp_path, settings, least):
 
 def test_a_button_that_is_never_described_is_never_learned(tmp_path):
     p = problem(Watcher(dumb=(2,)))
-    found = train(p, QUICK, tmp_path, lambda path: None, note=silent)
+    found = train(p, QUICK, tmp_path, lambda path, identity: None, note=silent)
     right = [p.student.greedy([w], [str(w.button)])[0] == w.button for w in WISHES]
     assert right[0] and right[1] and right[3]
     assert found[-1]["described"] < 1
@@ -225,25 +225,29 @@ def test_a_button_that_is_never_described_is_never_learned(tmp_path):
 def test_a_killed_run_goes_on_exactly(tmp_path, monkeypatch, learner):
     config = LearnerConfig(**{**vars(QUICK), "learner": learner, "checkpoint_minutes": 1e-9})
     whole = problem()
-    expected = train(whole, config, tmp_path / "whole", lambda path: None, note=silent)
-    save, saved = Run.save, []
+    expected = train(whole, config, tmp_path / "whole", lambda path, identity: None, note=silent)
+    save, saved = Session.save, []
 
-    def killed(self, progress):
+    def killed(self):
         if len(saved) == 33:
             raise KeyboardInterrupt
-        saved.append(progress)
-        save(self, progress)
+        saved.append(self.progress)
+        save(self)
 
-    monkeypatch.setattr(Run, "save", killed)
+    monkeypatch.setattr(Session, "save", killed)
     with pytest.raises(KeyboardInterrupt):
-        train(problem(), config, tmp_path / "cut", lambda path: None, note=silent)
-    monkeypatch.setattr(Run, "save", save)
+        train(problem(), config, tmp_path / "cut", lambda path, identity: None, note=silent)
+    monkeypatch.setattr(Session, "save", save)
     again = problem()
-    assert train(again, config, tmp_path / "cut", lambda path: None, note=silent) == expected
+    assert train(again, config, tmp_path / "cut", lambda path, identity: None, note=silent) == expected
     assert torch.equal(again.student.table.weight, whole.student.table.weight)
     with pytest.raises(CheckpointError, match="mixing"):
         train(
-            problem(), LearnerConfig(**{**vars(config), "mixing": 0.9}), tmp_path / "cut", lambda p: None, note=silent
+            problem(),
+            LearnerConfig(**{**vars(config), "mixing": 0.9}),
+            tmp_path / "cut",
+            lambda p, identity: None,
+            note=silent,
         )
 
 
@@ -271,7 +275,14 @@ def test_episodes_to_a_threshold_are_the_first_validation_above_it():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("learner", "ppo"), ("mixing", 1.5), ("batch", 0), ("learning_rate", 0.0), ("anneal_every", -1)],
+    [
+        ("learner", "ppo"),
+        ("mixing", 1.5),
+        ("batch", 0),
+        ("learning_rate", 0.0),
+        ("anneal_every", -1),
+        ("entropy", math.nan),
+    ],
 )
 def test_settings_out_of_range_are_refused(field, value):
     with pytest.raises(ValueError, match=field):

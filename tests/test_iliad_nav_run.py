@@ -10,7 +10,7 @@ import pytest
 import torch
 from hand_data import build, small_house
 
-from agents.common.checkpoint_file import CheckpointError
+from agents.common.checkpoint import CheckpointError
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.network import Follower
@@ -19,8 +19,8 @@ from agents.iliad.nav.showing import episode_of, lines_of, tell
 from agents.iliad.nav.stages import load_follower, new_walker
 from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import NavWorld, walk_along
-from agents.iliad.study import IliadStudySetting, report, run_study
-from agents.iliad.subjects import NavSubject
+from agents.iliad.study import IliadStudy, NavStudyWorld
+from agents.studies.engine import run_study
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features
 from embodied.cli import main
@@ -96,7 +96,7 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
         cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
     assert cut == expected and len(expected) == 2
     (one,), (other,) = ((tmp_path / k).rglob("checkpoint.pt") for k in ("whole", "cut"))
-    a, b = (torch.load(p, weights_only=True)["modules"]["student"] for p in (one, other))
+    a, b = (torch.load(p, weights_only=True)["parts"]["student"] for p in (one, other))
     assert all(torch.equal(a[k], b[k]) for k in a)
     (best,) = (tmp_path / "whole").rglob("best.safetensors")
     student, loaded = load_follower(best, grounds.data.eyes)
@@ -135,12 +135,12 @@ def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
 
 
 def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
-    setting = IliadStudySetting(tmp_path, NavSubject(SMALL, source), QUICK, seeds=2)
-    text = run_study(setting, ["3.5"], note=silent)["3.5"].read_text()
-    assert "NAV" in text and "| λ = 0.5 | 2 |" in text and "(29.4)" in text and "Not run" not in text
-    assert "Not run yet: DAgger" in report(setting, ["3.4"])["3.4"].read_text()
-    with pytest.raises(ValueError, match="REGEX only"):
-        run_study(setting, ["describer"], note=silent)
+    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
+    text = run_study(study, ["3.5"], tmp_path, rows=["λ = 0.5"], note=silent)["3.5"].read_text()
+    assert "| λ = 0.5 | " in text and "validation" not in text.partition("|")[2].splitlines()[0]
+    assert "Not run: λ = 0, λ = 1." in text
+    with pytest.raises(ValueError, match="unknown studies"):
+        run_study(study, ["describer"], tmp_path, note=silent)
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):

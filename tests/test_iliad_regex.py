@@ -12,7 +12,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.common.checkpoint_file import CheckpointError
+from agents.common.checkpoint import CheckpointError
 from agents.common.decoding import likeliest
 from agents.iliad.config import LearnerConfig
 from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
@@ -47,9 +47,9 @@ from agents.iliad.regex.stages import new_network
 from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
 from agents.iliad.regex.words import made_up, read_words
 from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
-from agents.iliad.study import IliadStudySetting, report, run_study
-from agents.iliad.subjects import RegexSubject
+from agents.iliad.study import IliadStudy, RegexStudyWorld
 from agents.iliad.training import IliadProblem, train
+from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.seeds import stream
 
@@ -239,7 +239,7 @@ def test_templates_of_ones_own_are_split_and_filled(tmp_path):
 
 @pytest.mark.parametrize(
     ("body", "message"),
-    [("[1]", "object from rules"), ("{", "not JSON"), ('{"(a*)*@b": ["x"]}', "no rule"), ('{"()(V)()@": []}', "list")],
+    [("[1]", "object from rules"), ("{", "as JSON"), ('{"(a*)*@b": ["x"]}', "no rule"), ('{"()(V)()@": []}', "list")],
 )
 def test_templates_that_cannot_be_used_are_refused(tmp_path, body, message):
     path = tmp_path / "own.json"
@@ -417,7 +417,7 @@ def test_a_small_student_learns_to_change_words_from_descriptions(data, tmp_path
     marginal = RegexMarginal(list(PLACES))
     problem = IliadProblem(RegexWorld(), Neighbour(), marginal, student, explorer, training, held, {"world": "easy"})
     learner = LearnerConfig(iterations=120, batch=16, learning_rate=1e-2, cooldown=0.4, validate_every=40)
-    found = train(problem, learner, tmp_path, lambda path: None, note=silent)
+    found = train(problem, learner, tmp_path, lambda path, identity: None, note=silent)
     assert found[-1]["success"] > 0.9, found
 
 
@@ -467,11 +467,12 @@ def grounds(tmp_path_factory):
 @pytest.mark.parametrize("learner", ["adel", "dagger", "continuous"])
 def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     config = dataclasses.replace(QUICK, learner=learner)
-    expected = learn(grounds, config, tmp_path / "whole", note=silent)
-    cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+    go = lambda config, name, **how: learn(grounds, config, tmp_path / name, tmp_path / "begun", note=silent, **how)
+    expected = go(config, "whole")
+    cut = go(config, "cut", minutes=1e-9)
     assert len(cut) < len(expected) == 2
     for _ in range(4):
-        cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+        cut = go(config, "cut", minutes=1e-9)
     assert cut == expected
     (best,) = (tmp_path / "whole").rglob("best.safetensors")
     student, loaded = load_student(best)
@@ -479,7 +480,7 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     items = grounds.data.splits["test"][:4]
     assert all(isinstance(e.rule, str) for e in student.greedy(items, [q.requests[0] for q in items]))
     with pytest.raises(CheckpointError, match="batch"):
-        learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
+        go(dataclasses.replace(config, batch=5), "cut")
 
 
 @pytest.mark.slow
@@ -491,6 +492,19 @@ def test_a_teacher_is_trained_once_and_data_of_other_settings_are_refused(ground
     assert first.digest == second.digest == grounds.digest
     with pytest.raises(ValueError, match="another folder"):
         prepare(dataclasses.replace(SMALL, items=10), tmp_path, note=silent)
+
+
+@pytest.mark.slow
+def test_a_stage_whose_weights_were_lost_writes_them_again_and_damaged_data_are_named(tmp_path):
+    prepare(SMALL, tmp_path, note=silent)
+    path = tmp_path / "executor.safetensors"
+    before = path.read_bytes()
+    path.unlink()  # as a kill leaves it between the last checkpoint and the weights
+    prepare(SMALL, tmp_path, note=silent)
+    assert path.read_bytes() == before
+    (tmp_path / "data.json").write_text('{"identity": {}, "words": [1]}')
+    with pytest.raises(ValueError, match="data.json"):
+        prepare(SMALL, tmp_path, note=silent)
 
 
 def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
@@ -513,14 +527,16 @@ def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
 @pytest.mark.slow
 def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     config = dataclasses.replace(SMALL, teacher="grammar")
-    setting = IliadStudySetting(tmp_path, RegexSubject(config), QUICK, seeds=2)
-    pages = run_study(setting, ["3.5", "C.1"], note=silent)
+    study = IliadStudy(RegexStudyWorld(config), QUICK, (0, 1))
+    pages = run_study(study, ["3.5", "C.1"], tmp_path, note=silent)
     text = pages["3.5"].read_text()
-    assert "| λ = 0.5 | 2 |" in text and "(55.7)" in text and "Not run" not in text
-    assert len(list(tmp_path.rglob("judged.json"))) == 2 * 4, "some runs are the same"
-    assert "Not run yet: DAgger" in report(setting, ["3.4"])["3.4"].read_text()
-    with pytest.raises(ValueError, match="unknown studies"):
-        run_study(setting, ["3.3"], note=silent)
+    assert "| λ = 0.5 | " in text and "(55.7)" in text and "Not run" not in text
+    runs = list((tmp_path / "runs").iterdir())
+    assert len(runs) == 2 * 4, "some runs are the same"
+    assert "Not run: DAgger" in run_study(study, ["3.4"], tmp_path, report=True, note=silent)["3.4"].read_text()
+    other = dataclasses.replace(study, config=dataclasses.replace(QUICK, learning_rate=0.5))
+    text = run_study(other, ["3.5"], tmp_path, report=True, note=silent)["3.5"].read_text()
+    assert "Not run: λ = 0, λ = 1, λ = 0.5." in text and "learning rate 0.5" in text, "never old numbers, new caption"
 
 
 @pytest.mark.slow

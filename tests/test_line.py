@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import re
 import socket
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -245,29 +242,3 @@ def test_wrong_input_gives_one_clear_line(command, complaint, tmp_path, monkeypa
     said = capsys.readouterr().err.strip()
     assert complaint in said and said.startswith("error: ") and len(said.splitlines()) == 1
     assert not (tmp_path / "x").exists()
-
-
-def test_what_the_readme_shows_in_python_runs_as_it_stands(shared_cache):
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 2
-    for block in blocks:
-        done = subprocess.run(
-            [sys.executable, "-c", block],
-            check=False,
-            capture_output=True,
-            text=True,
-            cwd=shared_cache,
-            env={**os.environ, "EMBODIED_CACHE": str(shared_cache)},
-            timeout=900,
-        )
-        assert done.returncode == 0, done.stderr
-
-
-def test_every_place_that_the_readme_names_is_there():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    named = [
-        *re.findall(r"\]\(([^)#:]+)\)", text),
-        *re.findall(r"`((?:agents|docs|embodied|assets|viz)/[\w./]*)`", text),
-    ]
-    assert len(named) > 8
-    assert [n for n in named if not (ROOT / n).exists() and not n.startswith("embodied/HANNA")] == []

@@ -1,9 +1,8 @@
-"""One word per idea: a public class name means one thing in the whole project, and tests bear their subject's."""
+"""One word per idea: a public class name means one thing in the whole project."""
 
 from __future__ import annotations
 
 import ast
-import re
 from collections import defaultdict
 from pathlib import Path
 
@@ -25,13 +24,3 @@ def test_a_public_class_name_stands_for_one_class():
                     homes[node.name].append(path.relative_to(ROOT).as_posix())
     assert {name: where for name, where in homes.items() if len(where) > 1 and name not in TWICE} == {}
     assert all(len(homes[name]) > 1 for name in TWICE), "an exception that is none any more"
-
-
-def test_every_test_file_bears_the_name_of_what_it_tests():
-    """Of a module or folder, alone or with a topic behind it; CONTRIBUTING.md says what the few others are about."""
-    rooms = {p.stem for top in PACKAGES for p in (ROOT / top).rglob("*.py")}
-    rooms |= {p.name for top in (*PACKAGES, "examples") for p in (ROOT / top, *(ROOT / top).rglob("*")) if p.is_dir()}
-    listed = set(re.findall(r"^\| `test_(\w+)` \|", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE))
-    files = {p.stem.removeprefix("test_") for p in (ROOT / "tests").glob("test_*.py")}
-    strange = {name for name in files if not any(f"{name}_".startswith(f"{room}_") for room in rooms)}
-    assert strange == listed

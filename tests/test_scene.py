@@ -18,7 +18,7 @@ from embodied.house.house import Placement
 from embodied.scene import collision
 from embodied.scene import model as scene
 from embodied.scene.backdrop import DOME
-from embodied.scene.house_meshes import house_parts, owners
+from embodied.scene.house_meshes import house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 
@@ -41,6 +41,14 @@ def test_every_geom_is_traceable_to_its_owner(house, compiled):
     assert all(named[g].startswith(owner + "#") for g, owner in whose.items())
     drawn = {owner for g, owner in whose.items() if compiled.kind_of_geom[g] != "collision"}
     assert drawn == {p.owner for p in house_parts(house, HandCatalogue())}
+
+
+def test_every_instance_id_has_a_class(house):
+    classes = dict(zip(("nothing", *owners(house)), instance_classes(house), strict=True))
+    assert all(classes[p.id] == p.object_class for p in house.placements)
+    room, opening = house.rooms[0].id, house.openings[0]
+    assert (classes["nothing"], classes[f"{room}/floor"], classes[f"{room}/wall_0"]) == ("nothing", "floor", "wall")
+    assert classes[f"{opening.id}/frame"] == opening.kind and classes["outdoor/ground"] == "outdoors"
 
 
 def test_only_boxes_collide_and_only_meshes_are_drawn(compiled):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.common.checkpoint_file import CheckpointError
+from agents.common.checkpoint import CheckpointError
 from agents.common.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
@@ -290,7 +290,7 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     config = VisionConfig(network="keen", epochs=3, batch=2, least_views=1)
-    houses, checkpoint = [strips_of_colours(4, seed=0), strips_of_colours(4, seed=1)], tmp_path / "checkpoint.pt"
+    houses, folder = [strips_of_colours(4, seed=0), strips_of_colours(4, seed=1)], tmp_path / "run"
     whole, _, _ = train_encoder(houses, config, note=lambda line: None)
 
     def stop(line: str) -> None:
@@ -298,12 +298,12 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train_encoder(houses, config, checkpoint, note=stop)
+        train_encoder(houses, config, folder, note=stop)
     lines: list[str] = []
-    again, _, _ = train_encoder(houses, config, checkpoint, note=lines.append)
-    assert lines[0] == "going on after epoch 2 of 3" and again.digest == whole.digest
+    again, _, _ = train_encoder(houses, config, folder, note=lines.append)
+    assert "continuing after update 2" in lines and again.digest == whole.digest
     with pytest.raises(CheckpointError, match="epochs 3 -> 5"):
-        train_encoder(houses, dataclasses.replace(config, epochs=5), checkpoint)
+        train_encoder(houses, dataclasses.replace(config, epochs=5), folder)
 
 
 @pytest.mark.slow
@@ -526,13 +526,13 @@ def test_the_settings_name_the_networks_that_there_are():
 FULL = """
 import resource, signal, sys, torch
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
-from agents.common.checkpoint_file import write_checkpoint
+from agents.common.checkpoint import write_checkpoint
 from agents.vision.encoder import random_encoder, save_encoder
 from embodied import cli
 from embodied.cli import doctor
 encoder = random_encoder(seed=0)
 writes = {"encoder.safetensors": lambda path: save_encoder(encoder, path),
-          "checkpoint.pt": lambda path: write_checkpoint(path, "k", {"x": torch.zeros(100_000)})}
+          "checkpoint.pt": lambda path: write_checkpoint(path, {"parts": torch.zeros(100_000)})}
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 doctor.run = lambda args: writes[sys.argv[1]](sys.argv[2])
 raise SystemExit(cli.main(["doctor"]))

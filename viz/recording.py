@@ -117,6 +117,8 @@ def record(
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
+        if step.seconds is not None:  # people took part
+            recording.set_time("seconds", duration=step.seconds)
         log_step(recording, world, task, step, state, views)
         yield step
     if state.last is not None:
@@ -325,8 +327,13 @@ def log_aim(recording: rr.RecordingStream, world: World, state: Story, views: Vi
 def log_thought(recording: rr.RecordingStream, step: Step) -> None:
     """The policy's own probabilities, where it gives them."""
     thought = step.action.thought
+    for usage in (thought.usage if thought else None, step.reply.usage if step.reply else None):
+        if usage is not None:
+            recording.log("events", rr.TextLog(f"language model: {usage}"))
     if thought is None:
         return
+    if thought.words:
+        recording.log("events", rr.TextLog(f"because: {thought.words}"))
     if thought.moves is not None:
         recording.log("plot/moves", rr.BarChart(np.asarray(thought.moves)))
     for name, p in (thought.asks or {}).items():

@@ -24,6 +24,12 @@ QUESTIONS = {
     Intention.CUR: "Where am I?",
     Intention.GOAL: "Where should I go?",
     Intention.SUB: "Can you give me a nearer goal?",
+    Intention.CONFIRM: "Is it this one?",
+    Intention.APPEARANCE: "What does it look like?",
+    Intention.REGION: "Which room is it in?",
+    Intention.ROUTE: "How do I get there?",
+    Intention.DISAMBIGUATE: "Which of these do you mean?",
+    Intention.FREE: "May I ask something?",
 }
 SIDES = (
     "ahead",
@@ -85,7 +91,9 @@ class Story:
         """Take in the action of `step` and the reply to it."""
         if isinstance(step.action, Ask):
             self.requests += 1
-            self.dialogue.append(f"**Agent** (step {self.count}): {QUESTIONS[step.action.intention]}")
+            self.dialogue.append(
+                f"**Agent** (step {self.count}): {step.action.question or QUESTIONS[step.action.intention]}"
+            )
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)

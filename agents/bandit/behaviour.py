@@ -10,11 +10,10 @@ import numpy as np
 import torch
 
 from agents.bandit.bleu import corpus_parts, sentence_bleu
-from agents.bandit.config import RUN_FORMAT
 from agents.bandit.network import Translator
 from agents.bandit.training import NumberedCorpus, sampled
 from agents.bandit.translate import greedy, in_order, padded, perplexity
-from agents.common.checkpoint_file import read_checkpoint
+from agents.common.checkpoint import read_checkpoint
 
 COLUMNS = (
     "BLEU",
@@ -74,5 +73,5 @@ def translator_of_run(m: NumberedCorpus, folder: Path) -> Translator:
       CheckpointError: missing or damaged.
     """
     translator = m.translator()
-    translator.load_state_dict(read_checkpoint(Path(folder) / "checkpoint.pt", RUN_FORMAT)["modules"]["translator"])
+    translator.load_state_dict(read_checkpoint(Path(folder) / "checkpoint.pt")["parts"]["translator"])
     return translator

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from dataclasses import dataclass
 
 from agents.common.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
 
 UNITS = ("words", "pieces")
-RUN_FORMAT = "embodied-bandit-run-1"
-"""Of the checkpoints of all stages."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,9 +54,6 @@ class BanditConfig(RunSettings):
                 )
         if not self.bandit_set.startswith("bandit"):
             raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
-
-    def to_json(self) -> str:
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
 
 
 SCALES: dict[str, BanditConfig] = {

@@ -12,28 +12,27 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.bandit.config import RUN_FORMAT
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
-from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.lessons import Split
-from agents.common.runs import Run
-from agents.common.session import Note, seed_of, tasks_of_update
+from agents.common.session import Note, Session, descend, seed_of, tasks_of_update
+from agents.common.tensor_file import checksum_of
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
-from assets.cache import digest
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.identity import identity_of
 from embodied.interface import Action, Ask, Episode, Intention, Observation
-from embodied.locks import locked
 from embodied.navigation.graph import NavGraph
 from embodied.seeds import stream
 
@@ -152,7 +151,7 @@ def learn_from_stars(
 ) -> list[dict[str, float]]:
     """Fine-tune `agent` in place by ratings of episodes in the houses of `split`; resumable.
 
-    Writes checkpoint.pt, result.json and, at the end, agent.safetensors into `folder`. Dropout is off,
+    Writes what agents.common.session writes and, at the end, best.safetensors into `folder`. Dropout is off,
     so that the policy that is rated is the one that learns.
 
     Args:
@@ -166,26 +165,24 @@ def learn_from_stars(
         "agent": torch.optim.Adam(agent.network.parameters(), config.learning_rate),
         "critic": torch.optim.Adam(critic.parameters(), config.critic_rate),
     }
-    kept = {k: v for k, v in dataclasses.asdict(config).items() if k != "updates"}
-    run = Run(
-        folder,
-        {**kept, "rater": dataclasses.asdict(rater), "agent": begun_with},
-        {"agent": agent.network, "critic": critic},
-        optimizers,
-        RUN_FORMAT,
-    )
+    identity = stars_identity(config, rater, begun_with)
+    parts = {"agent": agent.network, "critic": critic, **{f"{k} optimizer": o for k, o in optimizers.items()}}
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
-    with locked(run.folder), run.session(config.updates, 2.0, note) as session:
+    with Session(
+        folder, identity, parts, config.updates, may_change=("updates",), checkpoint_minutes=2.0, every=10, note=note
+    ) as session:
         for update in session:
             numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, update)
-            run.history.append({"update": update + 1, **numbers})
-            if (update + 1) % 10 == 0:
-                last = run.history[-10:]
-                means = ", ".join(f"{k} {np.mean([h[k] for h in last]):.3f}" for k in numbers)
-                note(f"{folder}: {update + 1}/{config.updates}, {means}")
-    save_agent(agent, Path(folder) / "agent.safetensors")
-    return run.history[: config.updates]
+            session.add(numbers)
+            session.history.append({"update": update + 1, **numbers})
+    save_agent(agent, Path(folder) / "best.safetensors", identity)
+    return session.history[: config.updates]
+
+
+def stars_identity(config: RatingConfig, rater: Rater, begun_with: str) -> dict[str, Any]:
+    """All that a run depends on; `begun_with` as of learn_from_stars."""
+    return identity_of("agents.bandit.navigation", settings=config, rater=rater, begin=begun_with)
 
 
 def _learn_once(
@@ -210,8 +207,8 @@ def _learn_once(
     where = f"navigation from ratings, update {update}"
     loss = critic_loss(found)
     if update >= config.critic_updates:
-        descend(actor_loss(found), optimizers["agent"], config.clip, f"{where}, agent")
-    descend(loss, optimizers["critic"], config.clip, f"{where}, critic")
+        descend(actor_loss(found), optimizers["agent"], f"{where}, agent", config.clip)
+    descend(loss, optimizers["critic"], f"{where}, critic", config.clip)
     success = [metrics.success(e, split.worlds[e.task.world].graph) for e in episodes]
     return {
         "score": float(np.mean(scores)),
@@ -223,4 +220,4 @@ def _learn_once(
 
 def fingerprint(agent: HannaAgent) -> str:
     """Of an agent's weights."""
-    return digest(*(v.detach().cpu().numpy().tobytes() for _, v in sorted(agent.network.state_dict().items())))
+    return checksum_of(agent.network.state_dict(), {})

@@ -30,7 +30,7 @@ class RatingConfig:
     """First updates, in which the critic learns alone."""
     score: str = "SDTW"
     """What a rating is made from: 'success', 'nDTW' of the walk against the shortest one, which teaches to stand
-    still rather than to err (docs/results.md), or 'SDTW': nDTW where the goal was reached, else nothing."""
+    still rather than to err (docs/results/bandit.md), or 'SDTW': nDTW where the goal was reached, else nothing."""
     clip: float = 5.0
     """Longest gradient."""
     seed: int = 0

@@ -21,22 +21,24 @@ import torch
 from torch import Tensor
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
-from agents.bandit.config import RUN_FORMAT, BanditConfig
+from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import corpus_digest, load
 from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import CLEAN, Rater
-from agents.bandit.store import load_weights, save_weights
+from agents.bandit.store import load_network, save_network
 from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
 from agents.bandit.words import BUILDERS, WordNumbers
-from agents.common.actor_critic import Decisions, actor_loss, critic_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss, critic_loss
+from agents.common.checkpoint import Stateful
 from agents.common.decoding import drawn_with
-from agents.common.runs import Run
-from agents.common.session import Note
-from embodied.locks import locked
+from agents.common.session import Note, Session, descend
+from agents.common.weights import weights_digest
+from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
 Step = Callable[[np.ndarray, int, int], Mapping[str, float]]
-Finish = Callable[[int, Mapping[str, float]], Mapping[str, float]]
+History = Sequence[Mapping[str, float]]
+Finish = Callable[[int, Mapping[str, float], History], Mapping[str, float]]
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
 REFERENCES = ("full", "weak")
@@ -78,13 +80,10 @@ class NumberedCorpus:
         source, target = self.lexicons
         return begin(Critic(len(source), len(target), self.config.hidden_size), self._generator("critic"))
 
-    def identity(self, *fields: str, **more: object) -> dict[str, object]:
+    def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
         """What a stage depends on: settings by name, and the corpus."""
-        return {
-            "corpus": self.digest,
-            **{name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)},
-            **more,
-        }
+        settings = {name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}
+        return identity_of("agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more)
 
     def _generator(self, name: str) -> torch.Generator:
         return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
@@ -116,21 +115,22 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
     config, data = m.config, m.splits["supervised"]
     translator = m.translator()
     optimizer = adam(translator, config.pretraining_rate)
-    run = Run(folder, m.identity(), {"translator": translator}, {"translator": optimizer}, RUN_FORMAT)
+    identity = m.identity("pretrain")
+    parts: dict[str, Stateful] = {"translator": translator, "translator optimizer": optimizer}
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source, target = rows(data.source, chosen), rows(data.target, chosen)
         loss = supervised_loss(translator, source, target)
-        descend(loss, optimizer, config.clip, f"pre-training, update {update}")
+        descend(loss, optimizer, f"pre-training, update {update}", config.clip)
         return {"loss": float(loss.detach()) * len(chosen), "sentences": len(chosen)}
 
-    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
+    def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
         found = perplexity(translator, m.splits["dev"])
-        before = [h["dev perplexity"] for h in run.history]
+        before = [h["dev perplexity"] for h in history]
         if turn == 0:
-            save_weights(translator, m, folder / "weak.safetensors")
+            save_network(translator, m, folder / "weak.safetensors", identity)
         if found < min(before, default=math.inf):
-            save_weights(translator, m, folder / "full.safetensors")
+            save_network(translator, m, folder / "full.safetensors", identity)
         if turn + 1 >= config.decay_from and before and found > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
@@ -141,7 +141,7 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
             "learning rate": optimizer.param_groups[0]["lr"],
         }
 
-    return _passes(run, m, data, "pretrain", config.pretraining_passes, step, finish, note)
+    return _passes(folder, identity, parts, m, data, "pretrain", config.pretraining_passes, step, finish, note)
 
 
 def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
@@ -151,10 +151,10 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
     """
     config, data = m.config, m.splits["supervised"]
     translator, critic = m.translator(), m.critic()
-    load_weights(translator, reference)
+    load_network(translator, reference)
     optimizer = adam(critic, config.pretraining_rate)
-    identity = m.identity("critic_passes", reference=reference.stem)
-    run = Run(folder, identity, {"critic": critic}, {"critic": optimizer}, RUN_FORMAT)
+    identity = m.identity("critic", "critic_passes", begin=weights_digest(reference))
+    parts: dict[str, Stateful] = {"critic": critic, "critic optimizer": optimizer}
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source = rows(data.source, chosen)
@@ -164,14 +164,14 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
         values = critic(source, target)
         rated = Decisions(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
         loss = critic_loss(rated)
-        descend(loss, optimizer, config.clip, f"critic, update {update}")
+        descend(loss, optimizer, f"critic, update {update}", config.clip)
         return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
 
-    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
-        save_weights(critic, m, folder / "critic.safetensors")
+    def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
+        save_network(critic, m, folder / "critic.safetensors", identity)
         return {"mean square error": sums["error"] / sums["words"]}
 
-    return _passes(run, m, data, "critic", config.critic_passes, step, finish, note)
+    return _passes(folder, identity, parts, m, data, "critic", config.critic_passes, step, finish, note)
 
 
 def bandit(
@@ -198,17 +198,18 @@ def bandit(
         raise ValueError(f"learner must be one of {LEARNERS}, got {learner!r}")
     config, data = m.config, m.splits[m.config.bandit_set]
     translator, critic = m.translator(), m.critic()
-    load_weights(translator, reference)
+    load_network(translator, reference)
     optimizers = {"translator": adam(translator, config.bandit_rate)}
     if learner == "a2c":
-        load_weights(critic, critic_file)
+        load_network(critic, critic_file)
         optimizers["critic"] = adam(critic, config.bandit_rate)
-    modules = {
-        name: network for name, network in (("translator", translator), ("critic", critic)) if name in optimizers
-    }
-    about = {"reference": reference.stem, "learner": learner, "rater": dataclasses.asdict(rater)}
-    fields = ("critic_passes", "bandit_rate", "bandit_set")
-    run = Run(folder, m.identity(*fields, ratings=m.bandit_digest, **about), modules, optimizers, RUN_FORMAT)
+    about = {"begin": weights_digest(reference), "learner": learner, "rater": dataclasses.asdict(rater)}
+    if learner == "a2c":
+        about["critic"] = weights_digest(critic_file)
+    identity = m.identity("bandit", "critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, **about)
+    parts: dict[str, Stateful] = {"translator": translator, "translator optimizer": optimizers["translator"]}
+    if learner == "a2c":
+        parts |= {"critic": critic, "critic optimizer": optimizers["critic"]}
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said = sampled(translator, m, data, chosen, "bandit", turn)
@@ -217,7 +218,7 @@ def bandit(
         where = f"{learner}, update {update}"
         if learner == "supervised":
             loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
-            descend(loss, optimizers["translator"], config.clip, where)
+            descend(loss, optimizers["translator"], where, config.clip)
         if learner == "a2c":
             rngs = [stream(config.seed, "rating", turn, int(i)) for i in chosen]
             ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs)]
@@ -226,7 +227,7 @@ def bandit(
             numbers["rating"] = float(sum(ratings))
         return numbers
 
-    def finish(turn: int, sums: Mapping[str, float]) -> dict[str, float]:
+    def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
         found = {
             "per-sentence BLEU": 100 * sums["score"] / sums["sentences"],
             "held-out BLEU": judged(translator, m, "test"),
@@ -234,7 +235,9 @@ def bandit(
         }
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
-    return _passes(run, m, data, "bandit", passes, step, finish, note)
+    found = _passes(folder, identity, parts, m, data, "bandit", passes, step, finish, note)
+    save_network(translator, m, folder / "best.safetensors", identity)
+    return found
 
 
 def learn_from_ratings(
@@ -251,8 +254,8 @@ def learn_from_ratings(
     rated = Decisions(
         translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0
     )
-    descend(actor_loss(rated), optimizers["translator"], clip, f"{where}, translator")
-    descend(critic_loss(rated), optimizers["critic"], clip, f"{where}, critic")
+    descend(actor_loss(rated), optimizers["translator"], f"{where}, translator", clip)
+    descend(critic_loss(rated), optimizers["critic"], f"{where}, critic", clip)
 
 
 def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> Tensor:
@@ -289,28 +292,37 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
 
 
 def _passes(
-    run: Run, m: NumberedCorpus, data: Numbered, purpose: str, passes: int, step: Step, finish: Finish, note: Note
+    folder: Path,
+    identity: Identity,
+    parts: Mapping[str, Stateful],
+    m: NumberedCorpus,
+    data: Numbered,
+    purpose: str,
+    passes: int,
+    step: Step,
+    finish: Finish,
+    note: Note,
 ) -> list[dict[str, float]]:
-    """Go on with `run` until it has had so many passes over `data`; returns what `finish` said of each.
+    """Go on with a run until it has had so many passes over `data`; returns what `finish` said of each.
 
     Args:
       purpose: names the random order of the sentences, anew in every pass.
       step: is given sentences, the pass and the number of the update, does it, and returns numbers to add up.
-      finish: is given a pass and the sums of its numbers; returns what is kept of it.
+      finish: is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it.
 
     Raises:
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
     config, lengths = m.config, [len(s) for s in data.source]
     each, order = -(-len(lengths) // config.batch), None
-    with locked(run.folder), run.session(passes * each, config.checkpoint_minutes, note) as session:
+    minutes = config.checkpoint_minutes
+    with Session(folder, identity, parts, passes * each, checkpoint_minutes=minutes, every=each, note=note) as session:
         for update in session:
             turn, place = divmod(update, each)
             if order is None or place == 0:
                 order = batches(lengths, config.batch, stream(config.seed, purpose, "order", turn))
-            run.add(step(order[place], turn, update))
+            session.add(step(order[place], turn, update))
             if place + 1 == each:
-                run.history.append({"pass": turn + 1, **finish(turn, run.sums)})
-                run.sums = {}
-                note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
-    return run.history[:passes]
+                session.record({"pass": turn + 1, **finish(turn, session.sums, session.history)})
+                session.sums = {}
+    return session.history[:passes]

@@ -8,17 +8,9 @@ the value here and the signs of E.1 and E.2 turn around.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
-import torch
 from torch import Tensor
-
-from embodied.errors import UnableError
-
-
-class DivergedError(UnableError):
-    """A loss or a gradient is not a number any more; the last checkpoint is intact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,25 +54,3 @@ def costs_to_go(costs: Tensor, mask: Tensor) -> Tensor:
 
 def _returns(rated: Decisions) -> Tensor:
     return rated.returns if rated.returns.dim() == 2 else rated.returns[:, None]
-
-
-def descend(loss: Tensor, optimizer: torch.optim.Optimizer, clip: float, what: str) -> float:
-    """One step of `optimizer` down `loss`, the gradient's norm cut to `clip`; returns the norm before.
-
-    Raises:
-      DivergedError: the loss or a gradient is not finite; no weight was changed.
-    """
-    optimizer.zero_grad(set_to_none=True)
-    loss.backward()
-    norm = torch.nn.utils.clip_grad_norm_(parameters_of(optimizer), clip)
-    if not (torch.isfinite(loss) and torch.isfinite(norm)):
-        raise DivergedError(
-            f"{what}: loss {float(loss.detach()):.3g}, gradient {float(norm):.3g}, not finite; "
-            "the last checkpoint is intact, lower the learning rate and begin anew or from it"
-        )
-    optimizer.step()
-    return float(norm)
-
-
-def parameters_of(optimizer: torch.optim.Optimizer) -> Iterable[torch.nn.Parameter]:
-    return [p for group in optimizer.param_groups for p in group["params"]]

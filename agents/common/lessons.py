@@ -53,6 +53,10 @@ class Lessons:
         """
         return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla, lights)
 
+    def identity(self) -> dict[str, str]:
+        """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
+        return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train")}
+
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, as in `drawings`."""
         return drawings(self.data, self.data.names(name), self.quality)
@@ -81,7 +85,12 @@ def split_of(
       quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
       vnla: VNLA's rule of play, as in Dataset.split.
       lights: lightings of every house that the bank can show.
+
+    Raises:
+      ValueError: more houses than there are.
     """
+    if houses is not None and houses > (there := len(data.names(name))):
+        raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
     split = data.split(name, houses=houses, vnla=vnla)
     pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
     paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}

@@ -40,17 +40,6 @@ def join_launcher(device: str) -> str:
     return f"cuda:{dist.get_node_local_rank()}" if device == "cuda" else device
 
 
-def use_threads(threads: int) -> None:
-    """Let PyTorch use so many threads on the CPU.
-
-    Raises:
-      ValueError: fewer than one.
-    """
-    if threads < 1:
-        raise ValueError(f"--threads should be at least 1, got {threads}")
-    torch.set_num_threads(threads)
-
-
 def share(items: Sequence[T]) -> Sequence[T]:
     """What this process works on: every n-th item."""
     return items[rank() :: processes()]

@@ -1,32 +1,50 @@
-"""What every learner's training loop needs: where a run is, whose time it takes, how it is stopped and what it draws.
+"""The one training session: where a run is, what it finds, and how it is saved, stopped and gone on with.
 
-Every random draw is named by (seed, update), so a run that was stopped goes on exactly as if it had
-not been.
+Every random draw is named by (seed, update), so a run that was stopped goes on exactly as if it had not been. A run
+folder holds checkpoint.pt, settings.json, and metrics.csv, beside TensorBoard's files, where that is installed.
 """
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import dataclasses
+import importlib.util
+import io
 import math
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Self, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import torch
 
+from agents.common import parallel
+from agents.common.checkpoint import Stateful, restore, write_checkpoint
+from assets.cache import write_bytes, write_json
 from embodied.errors import UnableError
+from embodied.identity import Identity
+from embodied.locks import locked
+from embodied.records import from_plain
 from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from torch.utils.tensorboard import SummaryWriter
 
 Note = Callable[[str], None]
 T = TypeVar("T")
+EVERY = 20
+"""Updates per progress line."""
+METRICS = "metrics.csv"
+HEADS = ("update", "minutes", "metric", "value")
 
 
-class TrainingError(UnableError):
-    """Training cannot go on; the last checkpoint is intact."""
+class DivergedError(UnableError):
+    """A loss or a gradient is not a number any more; the last checkpoint is intact."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +55,12 @@ class Progress:
     """Updates done."""
     seconds: float = 0.0
     """Spent so far, over all sessions."""
-    best: float = -1.0
-    """Best validation success so far."""
+    best: float = -math.inf
+    """Best validation so far."""
     best_update: int = 0
     """After which best.safetensors was kept."""
-    processor: float | None = None
-    """Seconds of processor time spent so far, of all threads; None by runs that began before this was counted, and by
-    learners that do not count it."""
+    processor: float = 0.0
+    """Seconds of processor time spent so far, of all threads."""
 
 
 @dataclass
@@ -64,6 +81,259 @@ class Clock:
         """Count some of the seconds spent on one kind of work as another's."""
         self.spent[source] -= seconds
         self.spent[to] = self.spent.get(to, 0.0) + seconds
+
+
+class Session:
+    """One session of a resumable run: owns its folder, counts updates and seconds, saves when due, ends when told.
+
+        with Session(folder, identity, {"network": network, "adam": optimizer}, total, note=note) as session:
+            for update in session:                              # counts from 0
+                session.add({"loss": ...})
+                if session.due(every):
+                    session.record({"success": ...})            # what a validation found
+                    if session.improved(success): keep(...)
+
+    What the body did with an update counts, and is saved, when the next one is asked for. Of several processes
+    (agents.common.parallel) the first writes.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        identity: Identity,
+        parts: Mapping[str, Stateful],
+        total: int,
+        *,
+        may_change: Collection[str] = (),
+        minutes: float | None = None,
+        checkpoint_minutes: float = 3.0,
+        every: int = EVERY,
+        note: Note = print,
+    ) -> None:
+        """
+        Args:
+          identity: all that the run depends on; one with other settings is refused, and leaves the folder as it is.
+          parts: networks, optimizers and schedules, by name; they are given the state of the checkpoint.
+          total: updates of the whole run.
+          may_change: names of settings that may differ on resuming.
+          minutes: stop after this long, as if interrupted.
+          checkpoint_minutes: how often to save besides.
+          every: updates per progress line.
+        """
+        self.folder, self.identity, self.parts, self.total = Path(folder), identity, parts, total
+        self.progress, self.clock = Progress(), Clock()
+        self.sums: dict[str, float] = {}
+        """Of what is being counted, such as a pass; the caller empties it."""
+        self.history: list[dict[str, float]] = []
+        """What was found so far, such as one entry per validation."""
+        self._note = parallel.one_voice(note)
+        self._may_change, self._minutes, self._saved_every, self._every = may_change, minutes, checkpoint_minutes, every
+        self._means: dict[str, list[float]] = {}
+        self._writer: SummaryWriter | None = None
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        """
+        Raises:
+          LockedError: another process trains in the folder.
+          CheckpointError: damaged, or of a run with another identity.
+        """
+        with contextlib.ExitStack() as stack:
+            if parallel.rank() == 0:
+                stack.enter_context(locked(self.folder))
+            if self.path.exists():
+                body = restore(self.path, self.identity, self.parts, self._may_change)
+                self.progress = from_plain(Progress, _finite(body["progress"]), f"{self.path}: progress")
+                self.sums, self.history = body["sums"], body["history"]
+                self._note(f"continuing after update {self.progress.update}")
+            if parallel.rank() == 0:
+                write_json(self.folder / "settings.json", dict(self.identity), indent=1)
+                _forget_after(self.folder / METRICS, self.progress.update)
+            self._stop = stack.enter_context(stop_signal())
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self._writer is not None:
+            self._writer.close()
+        self._stack.close()
+
+    @property
+    def path(self) -> Path:
+        return self.folder / "checkpoint.pt"
+
+    @property
+    def done(self) -> int:
+        """Updates done, the one at hand included."""
+        return self.progress.update + 1
+
+    def due(self, every: int) -> bool:
+        """Whether the update at hand is an `every`-th one, or the last."""
+        return self.done % every == 0 or self.done == self.total
+
+    def add(self, numbers: Mapping[str, float]) -> None:
+        """Count an update's numbers in: into `sums`, and into the means of the progress line."""
+        for name, value in numbers.items():
+            self.sums[name] = self.sums.get(name, 0.0) + value
+            self._means.setdefault(name, []).append(value)
+
+    def record(self, found: Mapping[str, float]) -> None:
+        """Keep what a validation, or a pass, found."""
+        entry = {"update": float(self.done), **found}
+        self.history.append(entry)
+        self._log("validation", found)
+        self._note(f"after {self.done} updates: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
+
+    def improved(self, score: float, *, episodes: int | None = None) -> bool:
+        """Whether the weights at hand are to be kept: they are the best so far or, of `episodes` tasks, as good as it.
+
+        Of agents that a few hundred tasks cannot tell apart, the one that learned longest is kept, not the luckiest.
+        """
+        best = max(self.progress.best, score)
+        kept = score >= best if episodes is None else as_good(score, best, episodes)
+        if kept:
+            self.progress = dataclasses.replace(self.progress, best=best, best_update=self.done)
+        return kept
+
+    def save(self) -> None:
+        """Write the checkpoint, atomically."""
+        states = {k: p.state_dict() for k, p in self.parts.items()}
+        body = {
+            "identity": self.identity,
+            "progress": vars(self.progress),
+            "sums": self.sums,
+            "history": self.history,
+            "parts": states,
+        }
+        write_checkpoint(self.path, body)
+
+    def __iter__(self) -> Iterator[int]:
+        """The updates that are left.
+
+        Raises:
+          KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+        """
+        began = saved = self._since = time.monotonic()
+        used, before, first = time.process_time(), self.progress, parallel.rank() == 0
+        while self.progress.update < self.total:
+            yield self.progress.update
+            now = time.monotonic()
+            self.progress = dataclasses.replace(
+                self.progress,
+                update=self.progress.update + 1,
+                seconds=before.seconds + now - began,
+                processor=before.processor + time.process_time() - used,
+            )
+            last = self.progress.update == self.total
+            if self._means and (self.progress.update % self._every == 0 or last):
+                self._report()
+            stopped = parallel.any_of_us(self._stop.is_set(), self._device)
+            late = parallel.any_of_us(self._minutes is not None and now - began > 60 * self._minutes, self._device)
+            if first and (last or stopped or late or now - saved > 60 * self._saved_every):
+                self.save()
+                saved = now
+            if stopped or (late and not last):
+                why = "stopped" if stopped else "time is up"
+                self._note(f"{why} after update {self.progress.update}; the same command goes on from there")
+                if stopped:
+                    raise KeyboardInterrupt
+                return
+
+    @property
+    def _device(self) -> torch.device:
+        modules = (p for part in self.parts.values() if isinstance(part, torch.nn.Module) for p in part.parameters())
+        return next(modules, torch.zeros(0)).device
+
+    def _report(self) -> None:
+        """Say, and log, the means of what was counted since the last report."""
+        update, p = self.progress.update, self.progress
+        means = {name: math.fsum(values) / len(values) for name, values in self._means.items()}
+        done, passed = max(map(len, self._means.values())), time.monotonic() - self._since
+        spent = {what: seconds / passed for what, seconds in sorted(self.clock.spent.items())}
+        self._log("train", means, self.progress.update)
+        self._log("share of time", spent, self.progress.update)
+        said = "  ".join(f"{k} {v:.3g}" for k, v in means.items())
+        shares = f"  ({', '.join(f'{k} {100 * v:.0f} %' for k, v in spent.items())})" if spent else ""
+        left = (self.total - update) * passed / done / 60
+        self._note(f"{update}/{self.total}  {said}{shares}  {p.seconds / 60:.1f} min, {left:.0f} to go")
+        self._means, self.clock.spent, self._since = {}, {}, time.monotonic()
+
+    def _log(self, kind: str, numbers: Mapping[str, float], update: int | None = None) -> None:
+        if parallel.rank() or not numbers:
+            return
+        at = self.done if update is None else update
+        if self._writer is None and importlib.util.find_spec("tensorboard"):
+            from torch.utils.tensorboard import SummaryWriter  # slow to import, wanted by training only
+
+            self._writer = SummaryWriter(str(self.folder), purge_step=at)
+        path = self.folder / METRICS
+        fresh = not path.exists()
+        with open(path, "a", newline="", encoding="utf-8") as f:
+            writer = csv.writer(f, lineterminator="\n")
+            if fresh:
+                writer.writerow(HEADS)
+            for name, value in numbers.items():
+                if self._writer is not None:
+                    self._writer.add_scalar(f"{kind}/{name}", value, at)
+                writer.writerow([at, round(self.progress.seconds / 60, 2), f"{kind}/{name}", repr(float(value))])
+
+
+def metrics_of(folder: Path) -> list[tuple[int, str, float]]:
+    """(update, metric, value) of all that a run's metrics.csv holds; nothing if it has not begun.
+
+    Raises:
+      ValueError: a line is damaged; names the file and the line.
+    """
+    path = Path(folder) / METRICS
+    if not path.exists():
+        return []
+    found = []
+    for number, line in enumerate(csv.DictReader(path.open(newline="", encoding="utf-8")), 2):
+        try:
+            found.append((int(line["update"]), line["metric"], float(line["value"])))
+        except (TypeError, KeyError, ValueError) as e:
+            raise ValueError(f"{path}:{number}: expected {', '.join(HEADS)}; delete that line") from e
+    return found
+
+
+def _forget_after(path: Path, update: int) -> None:
+    """Drop what metrics.csv holds of updates that will be done again."""
+    if not path.exists():
+        return
+    kept = io.StringIO()
+    writer = csv.writer(kept, lineterminator="\n")
+    with open(path, newline="", encoding="utf-8") as f:
+        for k, row in enumerate(csv.reader(f)):
+            if k == 0 or (row and row[0].isdigit() and int(row[0]) <= update):
+                writer.writerow(row)
+    write_bytes(path, kept.getvalue().encode())
+
+
+def _finite(progress: Mapping[str, Any]) -> dict[str, Any]:
+    """Progress as `from_plain` takes it, to which infinity is no number."""
+    return {k: v for k, v in progress.items() if not (k == "best" and v == -math.inf)}
+
+
+@contextmanager
+def stop_signal() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C sets, so that the update at hand can end; the second interrupts at once."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def once(number: int, frame: Any) -> None:
+        event.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, once)
+    try:
+        yield event
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# What an update draws, and how it descends -------------------------------------------------------
 
 
 def tasks_of_update(tasks: Sequence[T], update: int, batch: int, seed: int) -> list[T]:
@@ -96,107 +366,39 @@ def as_good(success: float, best: float, episodes: int) -> bool:
     return success >= best - math.sqrt(best * (1 - best) / episodes)
 
 
-@contextmanager
-def stop_signal() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C sets, so that the update at hand can end; the second interrupts at once."""
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-
-    def once(number: int, frame: Any) -> None:
-        event.set()
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, once)
-    try:
-        yield event
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-class Session:
-    """One session of a resumable run: counts updates and seconds, saves when due, and ends when told.
-
-        with Session(progress, total, save, minutes=30, note=note) as session:
-            for update in session:
-                ...                                             # update counts from 0
-                session.progress = dataclasses.replace(session.progress, best=...)
-
-    What the body did with an update counts, and is saved, when the next one is asked for.
-    """
-
-    def __init__(
-        self,
-        progress: Progress,
-        total: int,
-        save: Callable[[Progress], None],
-        *,
-        minutes: float | None = None,
-        checkpoint_minutes: float = 3.0,
-        note: Note = print,
-    ) -> None:
-        """
-        Args:
-          total: updates of the whole run.
-          save: writes a checkpoint.
-          minutes: stop after this long, as if interrupted.
-          checkpoint_minutes: how often to save besides.
-        """
-        self.progress, self.total, self._save, self._note = progress, total, save, note
-        self._minutes, self._every = minutes, checkpoint_minutes
-        self._signals = stop_signal()
-
-    def __enter__(self) -> Self:
-        self._stop = self._signals.__enter__()
-        if self.progress.update:
-            self._note(f"continuing after update {self.progress.update}")
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._signals.__exit__(*error)
-
-    def __iter__(self) -> Iterator[int]:
-        """The updates that are left.
-
-        Raises:
-          KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
-        """
-        began = saved = time.monotonic()
-        before = self.progress.seconds
-        while self.progress.update < self.total:
-            yield self.progress.update
-            now = time.monotonic()
-            self.progress = dataclasses.replace(
-                self.progress, update=self.progress.update + 1, seconds=before + now - began
-            )
-            last, stopped = self.progress.update == self.total, self._stop.is_set()
-            late = self._minutes is not None and now - began > 60 * self._minutes
-            if last or stopped or late or now - saved > 60 * self._every:
-                self._save(self.progress)
-                saved = now
-            if stopped or (late and not last):
-                why = "stopped" if stopped else "time is up"
-                self._note(f"{why} after update {self.progress.update}; the same command goes on from there")
-                if stopped:
-                    raise KeyboardInterrupt
-                return
-
-
 def falling_rate(rate: float, update: int, updates: int, cooldown: float) -> float:
     """A learning rate that falls linearly over the last share `cooldown` of the updates; never zero."""
     falling = round(cooldown * updates)
     return rate * min(1.0, (updates - update) / (falling + 1))
 
 
-def refuse_divergence(update: int, loss: torch.Tensor, norm: torch.Tensor) -> None:
-    """Called before weights change.
+def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, clip: float = math.inf) -> float:
+    """One step of `optimizer` down `loss`, gradients added up over processes and their norm cut to `clip`; returns the
+    norm before.
+
+    Args:
+      what: names the update, for messages.
 
     Raises:
-      TrainingError: the loss or the gradient's norm is not finite.
+      DivergedError: the loss or a gradient is not finite; no weight was changed.
     """
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    parameters = [p for group in optimizer.param_groups for p in group["params"]]
+    parallel.add_gradients(parameters)
+    if clip < math.inf:
+        norm = torch.nn.utils.clip_grad_norm_(parameters, clip)
+    else:
+        norm = torch.nn.utils.get_total_norm([p.grad for p in parameters if p.grad is not None])
     if not (torch.isfinite(loss) and torch.isfinite(norm)):
-        raise TrainingError(
-            f"update {update}: loss {float(loss.detach()):.3g}, gradient {float(norm):.3g}, not finite; the last "
-            "checkpoint is intact, lower the learning rate and begin from it"
+        raise DivergedError(
+            f"{what}: loss {float(loss.detach()):.3g}, gradient {float(norm):.3g}, not finite; the last checkpoint is "
+            "intact, lower the learning rate and begin anew or from it"
         )
+    optimizer.step()
+    return float(norm)
+
+
+def set_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
+    for group in optimizer.param_groups:
+        group["lr"] = rate

@@ -101,6 +101,25 @@ class ImitationSettings(ValidatedRunSettings):
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
     instruction_length: int = 50
     """Words of an instruction that are read."""
+    validation_tasks: int = 200
+    """Tasks of each validation."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "lights", "instruction_length")
+        require(self, NOT_NEGATIVE, "weight_decay", "training_houses")
+        require(self, NOT_ALL, "environment_dropout")
+        require(self, SHARE, "cooldown")
+
+
+MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")
+"""Of the settings of a run, those that may differ on resuming without changing what was learned so far."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationSettings:
+    """How an agent by imitation is judged, in validations too."""
+
     evaluation_temperature: float = 0.0
     """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
     the distribution, between them it is sharpened. An agent that is often wrong and always takes its
@@ -108,24 +127,9 @@ class ImitationSettings(ValidatedRunSettings):
     ask_threshold: float = 0.5
     """When judged, the learned rule asks where asking is more probable than this."""
     evaluation_batch: int = 32
-    """Has no influence on results here, only on speed."""
-    validation_tasks: int = 200
-    """Tasks of each validation."""
+    """Episodes judged side by side; has no influence on results, only on speed."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self, AT_LEAST_ONE, "lights", "instruction_length", "evaluation_batch")
-        require(self, NOT_NEGATIVE, "weight_decay", "evaluation_temperature", "training_houses")
-        require(self, NOT_ALL, "environment_dropout")
-        require(self, SHARE, "cooldown", "ask_threshold")
-
-
-MAY_CHANGE = (
-    "iterations",
-    "cooldown",
-    "checkpoint_minutes",
-    "evaluation_batch",
-    "evaluation_temperature",
-    "ask_threshold",
-)
-"""Of ImitationSettings, those that may differ on resuming without changing what was learned so far."""
+        require(self, AT_LEAST_ONE, "evaluation_batch")
+        require(self, NOT_NEGATIVE, "evaluation_temperature")
+        require(self, SHARE, "ask_threshold")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-WEIGHTS = Path(__file__).resolve().parents[1] / "weights"
+WEIGHTS = Path(__file__).resolve().parent.parent / "weights"
 SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
 SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
 SHIPPED_VNLA = WEIGHTS / "vnla_mini.safetensors"

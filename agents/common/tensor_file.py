@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -26,7 +27,17 @@ def save_tensors(path: Path, tensors: Mapping[str, Tensor], about: Mapping[str, 
     """
     whole = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {**about, CHECKSUM: checksum_of(whole, about)}
-    write_bytes(Path(path), safetensors.torch.save(whole, metadata=metadata))
+    write_bytes(Path(path), _sorted(safetensors.torch.save(whole, metadata=metadata)))
+
+
+def _sorted(file: bytes) -> bytes:
+    """A .safetensors file with its metadata in order, so that equal tensors are equal files."""
+    (size,) = struct.unpack("<Q", file[:8])
+    header = json.loads(file[8 : 8 + size])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 8)
+    return struct.pack("<Q", len(text)) + text + file[8 + size :]
 
 
 def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:

@@ -39,10 +39,13 @@ class Vocabulary:
     def number_of(self) -> dict[str, int]:
         return {word: i for i, word in enumerate(self.words)}
 
+    def number(self, word: str) -> int:
+        """The number of a word, that of UNKNOWN where there is none."""
+        return self.number_of.get(word, 1)
+
     def encode(self, text: str, length: int) -> np.ndarray:
         """(length,) int64 numbers of the words, then END if it fits, then padding."""
-        number = self.number_of
-        numbers = [number.get(word, 1) for word in tokenize(text)][:length]
+        numbers = [self.number(word) for word in tokenize(text)[:length]]
         if len(numbers) < length:
             numbers.append(2)
         return np.array(numbers + [0] * (length - len(numbers)), dtype=np.int64)

@@ -8,23 +8,35 @@ from pathlib import Path
 
 import torch
 
-from agents.common.agent_file import read_agent, refuse_features, write_agent
 from agents.common.choosing import choose_at
 from agents.common.shipped import SHIPPED_AGENT
 from agents.common.tensor_file import put
 from agents.common.vocabulary import Vocabulary
+from agents.common.weights import halved, load_weights, refuse_features, save_weights
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
-from agents.hanna.training_config import TrainingConfig
+from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.bank import FeatureBank
+from embodied.identity import Identity
 
-FORMAT, OLD_FORMAT = "embodied-agent-2", "embodied-agent-1"
-"""The older one has no checksum."""
 NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+AS_PUBLISHED = HannaEvaluation()
 SHIPPED = SHIPPED_AGENT
 """The agent of this repository; see agents/weights/README.md."""
+
+
+@dataclass(frozen=True)
+class HannaAbout:
+    """What stands beside the weights in an agent's file."""
+
+    config: TrainingConfig
+    evaluation: HannaEvaluation
+    encoder: str
+    """Digest of the encoder whose features it learned from."""
+    feature_size: int
+    words: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,48 +47,58 @@ class HannaAgent:
     encoder_digest: str
     """Of the encoder whose features it learned from; others mean nothing to it."""
     feature_size: int
+    evaluation: HannaEvaluation = AS_PUBLISHED
+    """How it is judged, if nobody says otherwise."""
 
     def policy(self, bank: FeatureBank) -> HannaPolicy:
-        """The agent acting as it is judged: see the evaluation settings of TrainingConfig.
+        """The agent acting as it is judged: see HannaEvaluation.
 
         Raises:
           ValueError: features of another encoder.
         """
         refuse_features(bank.digest, self.encoder_digest)
-        config = self.config
+        config, judged = self.config, self.evaluation
         learned = ask_patiently(
-            config.ask_threshold,
-            first=config.first_ask_threshold,
-            on_route=config.route_ask_threshold,
-            patience=config.patience,
+            judged.ask_threshold,
+            first=judged.first_ask_threshold,
+            on_route=judged.route_ask_threshold,
+            patience=judged.patience,
         )
         rule = learned if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
             self.network,
             self.vocabulary,
             bank,
-            choose=choose_at(config.evaluation_temperature),
+            choose=choose_at(judged.evaluation_temperature),
             ask_rule=rule,
             instruction_length=config.instruction_length,
             turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
-            again=config.again,
-            by_image=config.by_image,
-            search=config.search,
+            again=judged.again,
+            by_image=judged.by_image,
+            search=judged.search,
         )
 
 
-def new_agent(config: TrainingConfig, vocabulary: Vocabulary, encoder_digest: str, feature_size: int) -> HannaAgent:
+def new_agent(
+    config: TrainingConfig,
+    vocabulary: Vocabulary,
+    encoder_digest: str,
+    feature_size: int,
+    evaluation: HannaEvaluation = AS_PUBLISHED,
+) -> HannaAgent:
     """An untrained agent; its weights follow from config.seed."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         network = NETWORKS[config.model](config.network_config(len(vocabulary), feature_size))
-    return HannaAgent(network, vocabulary, config, encoder_digest, feature_size)
+    return HannaAgent(network, vocabulary, config, encoder_digest, feature_size, evaluation)
 
 
-def save_agent(agent: HannaAgent, path: Path) -> None:
-    """Write weights in half precision, with settings and vocabulary, atomically."""
-    write_agent(agent, path, FORMAT)
+def save_agent(agent: HannaAgent, path: Path, identity: Identity | None = None) -> None:
+    """Write weights in half precision, with settings, vocabulary and what it was trained with, atomically."""
+    words = agent.vocabulary.words
+    about = HannaAbout(agent.config, agent.evaluation, agent.encoder_digest, agent.feature_size, words)
+    save_weights(path, "hanna", halved(agent.network), about, identity)
 
 
 def load_agent(path: Path = SHIPPED) -> HannaAgent:
@@ -86,10 +108,9 @@ def load_agent(path: Path = SHIPPED) -> HannaAgent:
       FileNotFoundError, OSError.
       ValueError: truncated, changed, or of another format.
     """
-    file = read_agent(path, (FORMAT, OLD_FORMAT), "train the agent again with `embodied train hanna`")
-    config = TrainingConfig.from_json(file.config)
-    agent = new_agent(config, Vocabulary(file.words), file.encoder, file.feature_size)
-    put(agent.network, file.tensors, path)
+    tensors, told = load_weights(path, "hanna", HannaAbout, "train the agent again with `embodied train hanna`")
+    agent = new_agent(told.config, Vocabulary(told.words), told.encoder, told.feature_size, told.evaluation)
+    put(agent.network, tensors, path)
     agent.network.eval()
     return agent
 

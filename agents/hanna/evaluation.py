@@ -1,16 +1,15 @@
-"""Learned HANNA agents to be judged beside those without learning, and why their episodes fail.
+"""How HANNA agents are judged: the variants of an agent by name, and what is counted of their episodes.
 
-The judging itself is embodied.evaluation.evaluate.evaluate, the same for everybody.
+The playing itself is embodied.evaluation, the same for everybody.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import nn
 
@@ -22,11 +21,31 @@ from agents.hanna.network import Scores
 from agents.hanna.percept import Percept, slot_distribution
 from agents.hanna.policy import PerfectInterpretation
 from agents.vision.bank import FeatureBank
+from embodied.evaluation.evaluate import agent as agent_without_learning
+from embodied.evaluation.tables import Samples, interval, measured
 from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
 from embodied.navigation.graph import nearest
 from embodied.teachers.hanna import HannaTeacher, segments
 
 REASONS = ("lost", "uncertain_wrong", "never_asked")
+WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
+"""Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
+COLUMNS = ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")
+ASK_THRESHOLDS: Mapping[str, Mapping[str, HannaAskRule]] = {
+    "learned": {f"learned, above {x:g}": ask_above(x) for x in (0.9, 0.75, 0.5, 0.35, 0.2, 0.1)},
+    "every k steps": {f"learned, every {k}": ask_every(k) for k in (20, 12, 8, 5, 3, 2)},
+    "at random": {f"learned, with {p:g}": ask_with(p) for p in (0.03, 0.06, 0.12, 0.2, 0.35, 0.6)},
+}
+"""Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
+PLAINER: Mapping[str, Mapping[str, Any]] = {
+    "learned, without search": {"search": 0.0},
+    "learned, not by image": {"by_image": False},
+    "learned, without a trail": {"by_image": False, "again": 1.0},
+    "learned, likeliest move": {"choose": choose_at(0.0)},
+    "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
+}
+"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
+asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
 def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
@@ -46,36 +65,14 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     }
 
 
-PRICED: Mapping[str, Mapping[str, HannaAskRule]] = {
-    "learned": {f"learned, above {x:g}": ask_above(x) for x in (0.9, 0.75, 0.5, 0.35, 0.2, 0.1)},
-    "every k steps": {f"learned, every {k}": ask_every(k) for k in (20, 12, 8, 5, 3, 2)},
-    "at random": {f"learned, with {p:g}": ask_with(p) for p in (0.03, 0.06, 0.12, 0.2, 0.35, 0.6)},
-}
-"""Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
-
-
-def priced_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """A learned agent that asks by each rule of PRICED."""
+def all_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+    """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
+    PLAINER."""
     learned = agent.policy(bank)
-    rules = {name: rule for kind in PRICED.values() for name, rule in kind.items()}
-    return {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
-
-
-PLAINER: Mapping[str, Mapping[str, Any]] = {
-    "learned, without search": {"search": 0.0},
-    "learned, not by image": {"by_image": False},
-    "learned, without a trail": {"by_image": False, "again": 1.0},
-    "learned, likeliest move": {"choose": choose_at(0.0)},
-    "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
-}
-"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
-asks (docs/sources.md, S36, S161; S162 stays)."""
-
-
-def plainer_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """A learned agent judged in each way of PLAINER."""
-    learned = agent.policy(bank)
-    return {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
+    rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
+    asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
+    plainer = {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
+    return {**hanna_policies(agent, bank), **asking, **plainer, **sight_policies(agent, bank)}
 
 
 UNWILLING = 20.0
@@ -126,88 +123,87 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     }
 
 
-@dataclass(frozen=True)
-class Failures:
-    """How unsuccessful episodes failed, as shares of all episodes."""
+def players(agent: HannaAgent, bank: FeatureBank, only: Sequence[str] = ()) -> dict[str, Agent]:
+    """Who plays the rows `only`; without names the variants of the paper's tables and who does not learn.
 
-    ran_out: float
-    """The horizon cut them short."""
-    stopped_elsewhere: float
-    """They stopped in the main task away from every goal."""
-    passed_goal: float
-    """They were at a goal at some time and did not stop there (part of the two above)."""
-    never_asked: float
-    """They never asked (part of the first two)."""
-    departed_wrong: float
-    """Share of sub-tasks left more than 2 m from their target."""
+    Raises:
+      ValueError: a row that is none.
+    """
+    without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
+    every = {**without, **all_policies(agent, bank)}
+    if unknown := sorted(set(only) - set(every)):
+        raise ValueError(f"unknown rows {unknown}; there are {list(every)}")
+    return {name: every[name] for name in only or (*without, *hanna_policies(agent, bank), "blind", "rules only")}
 
 
-def failures(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> Failures:
-    """Why episodes failed."""
-    out = {"limit": 0, "stop": 0, "passed": 0, "silent": 0}
-    left, wrong = 0, 0
+def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
+    """The metrics of all tasks, how episodes failed, and how well conditions are predicted, per episode."""
+    graphs = {name: place.graph for name, place in places.items()}
+    return {**measured(episodes, graphs), **failures(episodes, places), **predictions(episodes, places)}
+
+
+def failures(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
+    """How episodes failed: 'ran out' of steps, 'stopped elsewhere', 'passed goal' without stopping there and 'never
+    asked' (parts of the two before); 'departed wrong': sub-tasks left more than 2 m from their target, of all that were
+    left; 'request share': of all steps (Figure D.1a)."""
+    found: dict[str, list[tuple[float, float]]] = {}
     for e in episodes:
-        graph = worlds[e.task.world].graph
+        graph = places[e.task.world].graph
         near = [graph.distance[v, nearest(graph, v, e.task.goal_nodes)] <= e.task.radius + 1e-9 for v in e.nodes]
-        if not near[-1]:
-            out["limit" if e.ended == "limit" else "stop"] += 1
-            out["passed"] += any(near)
-            out["silent"] += e.requests == 0
-        for piece in segments(e.steps):
-            if piece[0].mode is Mode.SUB and isinstance(piece[-1].action, Stop):
-                left += 1
-                wrong += graph.distance[piece[-1].pose.node, piece[0].targets[0]] > 2.0 + 1e-9
-    n = max(1, len(episodes))
-    return Failures(out["limit"] / n, out["stop"] / n, out["passed"] / n, out["silent"] / n, wrong / max(1, left))
+        pieces = [p for p in segments(e.steps) if p[0].mode is Mode.SUB and isinstance(p[-1].action, Stop)]
+        wrong = sum(graph.distance[p[-1].pose.node, p[0].targets[0]] > 2.0 + 1e-9 for p in pieces)
+        counts = {
+            "ran out": (not near[-1] and e.ended == "limit", 1),
+            "stopped elsewhere": (not near[-1] and e.ended != "limit", 1),
+            "passed goal": (not near[-1] and any(near), 1),
+            "never asked": (not near[-1] and e.requests == 0, 1),
+            "departed wrong": (wrong, len(pieces)),
+            "request share": (sum(isinstance(s.action, Ask) for s in e.steps), len(e.steps)),
+        }
+        for name, (some, all_) in counts.items():
+            found.setdefault(name, []).append((float(some), float(all_)))
+    return _ratios(found, [e.task.world for e in episodes])
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """How well one condition is predicted (Figure D.2), over steps where help could be asked."""
-
-    reason: str
-    accuracy: float
-    precision: float
-    recall: float
-    true_share: float
-    predicted_share: float
-    steps: int
-
-    @property
-    def f1(self) -> float:
-        both = self.precision + self.recall
-        return 2 * self.precision * self.recall / both if both else 0.0
-
-
-def predictions(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> tuple[Prediction, ...]:
-    """Figures D.1(b) and D.2: predicted against true conditions, reasons at probability 0.5 and more."""
-    truth, said = [], []
-    teacher = HannaTeacher()
+def predictions(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
+    """Figures D.1(b) and D.2: each condition as predicted (reasons at probability 0.5 and more) against as it was, over
+    steps where help could be asked: 'lost accuracy', 'lost precision', 'lost recall', 'lost predicted', 'lost true'."""
+    teacher, found = HannaTeacher(), dict[str, list[tuple[float, float]]]()
     for e in episodes:
-        for step, label in zip(e.steps, teacher.relabel(e, worlds[e.task.world]), strict=True):
-            thought = step.action.thought
-            if label.reasons is not None and thought is not None and thought.reasons is not None:
-                truth.append(label.reasons)
-                said.append([p >= 0.5 for p in thought.reasons])
-    if not truth:
-        return ()
-    t, s = np.array(truth, dtype=bool), np.array(said, dtype=bool)
-    share = lambda hit, of: float(hit[of].mean()) if of.any() else float("nan")
-    return tuple(
-        Prediction(
-            name,
-            float((t[:, i] == s[:, i]).mean()),
-            share(t[:, i], s[:, i]),
-            share(s[:, i], t[:, i]),
-            float(t[:, i].mean()),
-            float(s[:, i].mean()),
-            len(t),
-        )
-        for i, name in enumerate(REASONS)
-    )
+        pairs = [
+            (label.reasons, [p >= 0.5 for p in step.action.thought.reasons])
+            for step, label in zip(e.steps, teacher.relabel(e, places[e.task.world]), strict=True)
+            if label.reasons is not None and step.action.thought is not None and step.action.thought.reasons is not None
+        ]
+        for i, reason in enumerate(REASONS):
+            true, said = [t[i] for t, _ in pairs], [s[i] for _, s in pairs]
+            both = sum(t and s for t, s in zip(true, said, strict=True))
+            same = sum(t == s for t, s in zip(true, said, strict=True))
+            counts = {
+                "accuracy": (same, len(pairs)),
+                "precision": (both, sum(said)),
+                "recall": (both, sum(true)),
+                "predicted": (sum(said), len(pairs)),
+                "true": (sum(true), len(pairs)),
+            }
+            for name, (some, all_) in counts.items():
+                found.setdefault(f"{reason.replace('_', ' ')} {name}", []).append((float(some), float(all_)))
+    return _ratios(found, [e.task.world for e in episodes])
 
 
-def request_share(episodes: Sequence[Episode]) -> float:
-    """Share of all steps at which help was asked for (Figure D.1a)."""
-    kinds = [type(s.action) for e in episodes for s in e.steps]
-    return kinds.count(Ask) / max(1, len(kinds))
+def behaviour(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, float | None]:
+    """The means of `failures` and `predictions`; None where there was nothing to count."""
+    found = {**failures(episodes, places), **predictions(episodes, places)}
+    means = {name: interval([samples]).mean for name, samples in found.items()}
+    return {name: None if math.isnan(mean) else mean for name, mean in means.items()}
+
+
+def _ratios(counts: Mapping[str, Sequence[tuple[float, float]]], houses: Iterable[str]) -> dict[str, Samples]:
+    groups = tuple(houses)
+    return {
+        name: Samples(tuple(a for a, _ in pairs), groups, tuple(b for _, b in pairs)) for name, pairs in counts.items()
+    }
+
+
+Keep = Callable[[str, str, Sequence[Episode]], None]
+"""Is given split, row and episodes (to save them)."""

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
-
-import torch
+from typing import Any
 
 from agents.common.lessons import Lessons
-from agents.common.parallel import join_launcher, one_voice
-from agents.common.session import Progress
+from agents.common.parallel import one_voice
+from agents.common.session import Note, Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
+from agents.common.weights import weights_digest
 from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.hanna.training import train
-from agents.hanna.training_config import TrainingConfig
-from agents.vision.run import encoder_of
-from embodied.datasets.store import Dataset, dataset_of
+from agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from embodied.datasets.store import Dataset
+from embodied.identity import identity_of
 from embodied.interface import Episode
 from embodied.teachers.hanna import HannaTeacher
-
-Note = Callable[[str], None]
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
@@ -30,29 +27,10 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
     return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], least=2)
 
 
-def run_train_hanna(
-    args: argparse.Namespace,
-    config: TrainingConfig,
-    note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
-) -> int:
-    """Train an agent on a data set's training houses, validating on its unseen validation houses."""
-    torch.set_num_threads(args.threads)
-    train_agent(
-        Lessons(dataset_of(args.data, "hanna"), encoder_of(args), args.quality, join_launcher(args.device)),
-        config,
-        args.out,
-        minutes=args.minutes,
-        begin=args.begin,
-        note=note,
-        on_validation=on_validation,
-    )
-    return 0
-
-
 def train_agent(
     lessons: Lessons,
     config: TrainingConfig,
+    evaluation: HannaEvaluation,
     folder: Path,
     *,
     minutes: float | None = None,
@@ -73,7 +51,8 @@ def train_agent(
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else load_agent(begin)
-    agent = new_agent(config, other.vocabulary if other else vocabulary_of(data, houses), encoder.speaks, encoder.size)
+    words = other.vocabulary if other else vocabulary_of(data, houses)
+    agent = new_agent(config, words, encoder.speaks, encoder.size, evaluation)
     if other is not None and begin is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         note(f"new runs begin with the weights of {begin}")
@@ -81,6 +60,14 @@ def train_agent(
     parameters = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})
     note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
+    identity = training_identity(lessons, config, begin)
     return train(
-        agent, training, validation, HannaTeacher(), folder, minutes=minutes, note=note, on_validation=on_validation
-    )
+        agent, training, validation, HannaTeacher(), folder, identity,
+        minutes=minutes, note=note, on_validation=on_validation,
+    )  # fmt: skip
+
+
+def training_identity(lessons: Lessons, config: TrainingConfig, begin: Path | None = None) -> dict[str, Any]:
+    """All that a trained agent depends on; `begin` as of train_agent."""
+    begun = {} if begin is None else {"begin": weights_digest(begin)}
+    return identity_of("agents.hanna.run", settings=config, **lessons.identity(), **begun)

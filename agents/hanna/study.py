@@ -1,400 +1,253 @@
-"""The dissertation's tables on our houses (agents.hanna.study_tables): train the agents of each row, judge all on the
-same tasks, print both."""
+"""The tables of 4.2 as data, and HANNA as a learner of agents.studies.engine."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import itertools
-import json
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import joblib
-import torch
-
-from agents.common.figures import conditions_figure, curves_figure, houses_figure, requests_curves, requests_figure
 from agents.common.lessons import Lessons, drawings, split_of
-from agents.common.processor_time import ProcessorTime
-from agents.common.studies import kept_episodes, refuse_unknown
-from agents.common.tables import side_by_side as beside
-from agents.hanna.agent import load_agent
-from agents.hanna.evaluation import PRICED, hanna_policies, plainer_policies, priced_policies
-from agents.hanna.judging import about
+from agents.common.session import Note
+from agents.common.weights import weights_digest
+from agents.hanna.agent import HannaAgent, load_agent
+from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, counted
 from agents.hanna.run import train_agent
-from agents.hanna.study_tables import COMPARED, PRICES, SHORTER, TABLES, TEST, VARIANTS, Line, Table
-from agents.hanna.training_config import TrainingConfig
-from agents.vision.bank import FeatureBank
-from agents.vision.drawn import pictures_of
-from agents.vision.encoder import Encoder, load_encoder
-from assets.cache import write_bytes, write_json
+from agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.vision.encoder import load_encoder
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
-from embodied.evaluation.tables import Estimate, Row, difference, row, save, shown
 from embodied.interface import Agent, Episode
-from embodied.locks import locked
-from embodied.navigation.graph import NavGraph
 
-Note = Callable[[str], None]
+FINAL = StudyRow("final")
+TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
+FULL = ("success", "spl", "navigation error", "requests")
 
 
-@dataclass(frozen=True)
-class StudySetting:
-    """What all agents of a study share."""
+def learned(label: str, played: str = "learned", **train: Any) -> StudyRow:
+    """A row of an agent that differs from the settings of the study in `train`."""
+    return StudyRow(label, train, {"played": played})
 
-    data: Path
+
+def without(label: str, played: str) -> StudyRow:
+    """A row of an agent that does not learn."""
+    return StudyRow(label, None, {"played": played})
+
+
+NO_ASK = learned("No ask", ask_rule="never", alpha=0.5)
+RANDOM_ASK = learned("Random ask", ask_rule="random", alpha=0.5)
+EVERY_5 = learned("Ask every 5", ask_rule="every5", alpha=0.5)
+LEARNED = learned("Learned")
+HALF = learned("half curiosity", alpha=0.5)
+IMAGE_ONLY = learned("Target image only", read_assistance=False)
+LANGUAGE = learned("+ language instruction")
+LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
+NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
+OURS = learned("Our model, alpha = 1")
+PLAIN_OURS = learned("our model, alpha = 0, no conditions", alpha=0.0, predict_reasons=False)
+ABLATIONS: Mapping[str, Mapping[str, Any]] = {
+    "No inter-task reset": {"reset_inter_task": False},
+    "No condition prediction": {"predict_reasons": False},
+    "No cosine-similarity attention": {"similarity_attention": False},
+    "No curiosity loss": {"alpha": 0.0},
+}
+RECIPE: Mapping[str, Mapping[str, Any]] = {
+    "no guided asking": {"guided_asking": 0.0},
+    "no curiosity floor": {"curiosity_floor": 0.0},
+    "no environment dropout": {"environment_dropout": 0.0},
+    "no falling rate": {"cooldown": 0.0},
+    "no reasons": {"predict_reasons": False},
+}
+"""One thing less that `mini` does otherwise than Table D.1 (docs/sources.md, S32 to S35)."""
+HOUSES = (8, 32, 128, 256)
+REASONS = tuple(
+    f"{r} {what}" for r in ("lost", "uncertain wrong", "never asked") for what in ("accuracy", "precision", "recall")
+)
+SHORTER = "equal_passes"
+"""In a row's settings: trained on fewer houses for as many passes as the agent of all houses, not as many updates."""
+
+
+def _houses_table(every: int) -> Table:
+    """Success against training houses, of those numbers that are fewer than `every`."""
+    counts = [n for n in HOUSES if n < every]
+    updates = {n: learned(f"{n} houses", training_houses=n) for n in counts}
+    passes = [learned(f"{n} houses, equal passes", training_houses=n, equal_passes=True) for n in counts]
+    plain = [learned(f"{n} houses, without a trail", "learned, without a trail", training_houses=n) for n in counts]
+    every_house = learned("all houses")
+    rows = [
+        *(dataclasses.replace(r, x=n, series="equal updates") for n, r in updates.items()),
+        dataclasses.replace(every_house, x=every, series="equal updates"),
+        *(dataclasses.replace(r, x=n, series="equal passes") for n, r in zip(counts, passes, strict=True)),
+        *plain,
+        learned("all houses, without a trail", "learned, without a trail"),
+    ]
+    steps = [(updates[b], updates[a]) for a, b in itertools.pairwise(counts)]
+    return Table(
+        "Success and the number of training houses (no counterpart in the dissertation)",
+        tuple(rows), FULL, TEST, (*steps, *((every_house, r) for r in updates.values())),
+        Figure(("success",), "training houses", "success (%)", log=True),
+    )  # fmt: skip
+
+
+def _requests_table() -> Table:
+    asked = [learned(name.removeprefix("learned, "), name) for kind in ASK_THRESHOLDS.values() for name in kind]
+    priced = [learned(f"trained at price {p:g}", ask_price=p) for p in (0.25, 4.0)]
+    title = "Success and the number of requests (no counterpart in the dissertation)"
+    return Table(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
+
+
+TABLES: Mapping[str, Table] = {
+    "4.3": Table(
+        "Results on the test splits",
+        (
+            without("Random walk", "random walk"),
+            without("Forward 10", "forward 10"),
+            learned("No assistance", ask_rule="never", alpha=0.5),
+            learned("Learn to interpret assistance"),
+            without("Shortest", "shortest"),
+            learned("Perfect assistance interpretation", "learned, perfect interpretation"),
+        ),
+        FULL,
+        TEST,
+    ),
+    "4.4": Table("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
+    "4.5": Table(
+        "Help-request policies",
+        (NO_ASK, RANDOM_ASK, EVERY_5, LEARNED),
+        ("success", "requests"),
+        TEST,
+        ((HALF, NO_ASK), (HALF, RANDOM_ASK), (HALF, EVERY_5)),
+    ),
+    "4.6": Table(
+        "Model and curiosity",
+        (LSTM, NO_CURIOSITY, OURS),
+        ("success", "mistake repeat", "request repeat"),
+        ("test_unseen",),
+        ((PLAIN_OURS, LSTM), (OURS, NO_CURIOSITY)),
+    ),
+    "D.1": Table("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
+    "D.2": Table(
+        "Ablations",
+        (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
+        FULL,
+        VALIDATION,
+        tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
+    ),
+    "lights": Table(
+        "Success and the number of lightings of each training house (no counterpart in the dissertation)",
+        (learned("1 lighting"), learned("3 lightings", lights=3)),
+        FULL,
+        TEST,
+        ((learned("3 lightings", lights=3), learned("1 lighting")),),
+    ),
+    "departures": Table(
+        "What mini does otherwise than Table D.1, one thing less at a time (no counterpart in the dissertation)",
+        (
+            learned("as mini is"),
+            *(learned(name, **off) for name, off in RECIPE.items()),
+            *(learned(name.removeprefix("learned, "), name) for name in PLAINER),
+        ),
+        (*FULL, "mistake repeat", "request repeat"),
+        TEST,
+        tuple((learned("as mini is"), learned(name, **off)) for name, off in RECIPE.items()),
+    ),
+    "requests": _requests_table(),
+    "houses": _houses_table(max(HOUSES) + 1),
+}
+"""The studies by name. D.2 is on the validation splits, as in the dissertation. Pairs that are compared differ in one
+thing: half curiosity is learned asking with the alpha of heuristic askers (Table D.1, note)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HannaStudy(EpisodeStudy):
+    """Tables 4.3 to 4.6 and D.2, and success against houses, lightings and requests."""
+
     encoder: Path
-    out: Path
     config: TrainingConfig
-    """Where the variants start from."""
-    tasks: int | None = None
-    """At most so many tasks per split, from all houses alike."""
-    seed: int = 0
-    """Of judging; training has its own in `config`."""
+    """Where the rows start from."""
+    evaluation: HannaEvaluation
     device: str = "cpu"
-    threads: int = 1
-    """Of PyTorch, per agent in training."""
     quality: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
-    seeds: int = 1
-    """Agents per row, from the seed of `config` on."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
-    judged_in: Path | None = None
+    elsewhere: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
 
-    @property
-    def judges(self) -> Path:
-        """The data set that agents are judged in."""
-        return self.data if self.judged_in is None else self.judged_in
+    name = "hanna"
+    makers = ("agents.hanna.run",)
+    judges = (*JUDGES, "agents.hanna.evaluation")
 
-    def config_of(self, variant: str, seed: int | None = None) -> TrainingConfig:
-        chosen = VARIANTS[SHORTER.get(variant, variant)]
-        config = dataclasses.replace(self.config, seed=self.config.seed if seed is None else seed, **chosen)
-        if variant not in SHORTER:
+    def tables(self) -> Mapping[str, Table]:
+        """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
+        every = len(self._lessons().data.names("train"))
+        ood = Dataset(self.elsewhere or self.data).ood
+        found = {}
+        for name, table in {**TABLES, "houses": _houses_table(every)}.items():
+            splits = [s for s in table.splits if self.elsewhere is None or not s.endswith("_seen")]
+            found[name] = dataclasses.replace(table, splits=(*splits, *(ood if table.splits == TEST else ())))
+        return found
+
+    def settings(self, train: Mapping[str, Any], seed: int) -> TrainingConfig:
+        changes = {k: v for k, v in train.items() if k != SHORTER}
+        config = dataclasses.replace(self.config, seed=seed, **changes)
+        if SHORTER not in train:
             return config
-        share = min(1.0, config.training_houses / len(dataset_of(self.data, "hanna").names("train")))
-        iterations = max(1, round(config.iterations * share))
-        return dataclasses.replace(config, iterations=iterations, validate_every=min(config.validate_every, iterations))
+        share = min(1.0, config.training_houses / len(self._lessons().data.names("train")))
+        updates = max(1, round(config.iterations * share))
+        return dataclasses.replace(config, iterations=updates, validate_every=min(config.validate_every, updates))
 
-    def folder_of(self, variant: str, seed: int | None = None) -> Path:
-        name = variant.replace(",", "").replace(" ", "_")
-        return self.out / "agents" / name / f"seed_{self.config.seed if seed is None else seed}"
+    def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
+        data = dataset_of(self.data, "hanna")
+        drawn = drawings(data, data.names("train"), self.quality)
+        begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
+        return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
 
-    def repeats(self) -> range:
-        """Training seeds."""
-        return range(self.config.seed, self.config.seed + self.seeds)
+    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
+        """Features that are missing are told before anything is trained."""
+        judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
+        for split in splits:
+            split_of(judged, split, encoder, quality=self.quality)
 
+    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+        train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
+        return home / "best.safetensors"
 
-def run_study(
-    setting: StudySetting,
-    names: Sequence[str],
-    *,
-    rows: Sequence[str] | None = None,
-    workers: int = 1,
-    note: Note = print,
-) -> dict[str, Path]:
-    """Train what is missing, judge, and write the tables as Markdown, CSV and JSON, and the learning curves;
-    returns the Markdown files.
+    def load(self, weights: Path) -> HannaAgent:
+        return dataclasses.replace(load_agent(weights), evaluation=self.evaluation)
 
-    Agents are trained in `workers` processes; each goes on from its run folder, so the same
-    command continues after an interruption. Results, but for the processor time they took, do not depend on `workers`.
+    def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
+        played = judge["played"]
+        if agent is None:
+            return agent_without_learning("hanna", played)
+        data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
+        return all_policies(agent, split_of(data, split, encoder, quality=self.quality).bank)[played]
 
-    Args:
-      rows: train and judge these agents of VARIANTS and SHORTER only; tables say which rows they lack.
+    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
+        return dataset_of(self.elsewhere or self.data, "hanna")
 
-    Raises:
-      ValueError: an unknown study, or rows that none of the tables can have.
-      FileNotFoundError: features of a split that agents are judged on are missing; said before any is trained.
-      LockedError: another process writes to the study's folder.
-    """
-    refuse_unknown(names, TABLES)
-    data = dataset_of(setting.judges, "hanna")
-    whole = [_possible(TABLES[n], setting, data, None) for n in names]
-    refuse_unknown(rows or (), _agents(whole), "rows of these tables")
-    tables = {n: _possible(TABLES[n], setting, data, rows) for n in names}
-    if empty := [n for n, table in tables.items() if not table.lines]:
-        raise ValueError(f"rows {list(rows or ())} leave nothing of {empty}; leave these out, or add rows of theirs")
-    wanted = _agents(tables.values())
-    jobs = (
-        joblib.delayed(_train)(setting, v, seed, note if workers == 1 else None)
-        for seed in setting.repeats()
-        for v in wanted
-    )
-    for split in dict.fromkeys(split for table in tables.values() for split in table.splits):
-        _bank(setting, data, split)
-    with locked(setting.out):
-        cost = ProcessorTime(setting.out / "judging_seconds.json")
-        for variant, trained, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
-            cost.trained(variant, trained)
-            note(line)
-        curves_figure({v: _validations(setting.folder_of(v)) for v in wanted}, setting.out / "figure_curves.png")
-        plays = _plays(setting, tables.values())
-        for took, line in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
-            joblib.delayed(_play)(setting, *where, names) for where, names in plays.items()
-        ):
-            cost.judged(took)
-            note(line)
-        judged = _Judge(setting, data, cost, note)
-        return {name: _write(setting, name, table, judged) for name, table in tables.items()}
+    def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
+        data = self.judged_in(row.judge)
+        drawn = drawings(data, data.names(split), self.quality)
+        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
 
+    def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
+        return counted(episodes, split.worlds)
 
-def _agents(tables: Iterable[Table]) -> list[str]:
-    """The learning agents that tables show or compare, each once."""
-    names = ([*(line.variant for line in t.lines), *itertools.chain(*t.compared)] for t in tables)
-    return [*dict.fromkeys(name for name in itertools.chain(*names) if name)]
-
-
-def _plays(setting: StudySetting, tables: Iterable[Table]) -> Mapping[tuple[str, str, int], list[str]]:
-    """(variant, split, training seed) to what is played of that agent."""
-    found: dict[tuple[str, str, int], dict[str, None]] = {}
-    for table in tables:
-        pairs = [Line(name, name) for pair in table.compared for name in pair]
-        for line in (*table.lines, *pairs):
-            for split in table.splits:
-                for seed in setting.repeats() if line.variant else (setting.config.seed,):
-                    found.setdefault((line.variant, split, seed), {})[line.played] = None
-    return {where: list(names) for where, names in found.items()}
-
-
-def _play(
-    setting: StudySetting, variant: str, split: str, seed: int, names: Sequence[str]
-) -> tuple[dict[str, float], str]:
-    """Play what has not been played; the seconds of processor time that each took, and what to tell."""
-    torch.set_num_threads(setting.threads)
-    player, took = _Player(setting, Dataset(setting.judges)), {}
-    for name in names:
-        began = time.process_time()
-        player.episodes(variant, name, split, seed)
-        took[player.named(variant, name, split, seed)] = time.process_time() - began
-    return took, f"{variant or 'without learning'}, seed {seed}: judged on {split}"
-
-
-def _possible(table: Table, setting: StudySetting, data: Dataset, rows: Sequence[str] | None) -> Table:
-    """The table without agents that are not wanted, or that learn from as many training houses as there are, or more;
-    with the splits out of distribution that there are, and without seen houses where agents are judged in those of
-    another data set.
-
-    Args:
-      data: that agents are judged in.
-      rows: agents that are wanted; None: all.
-    """
-    houses = len(dataset_of(setting.data, "hanna").names("train"))
-    wanted = lambda variant: rows is None or variant in rows
-    there = lambda variant: not variant or (wanted(variant) and setting.config_of(variant).training_houses < houses)
-    kept = [k for k, s in enumerate(table.splits) if setting.judged_in is None or not s.endswith("_seen")]
-    printed = lambda line: {name: [x[k] for k in kept if k < len(x)] for name, x in line.printed.items()}
-    return dataclasses.replace(
-        table,
-        lines=tuple(dataclasses.replace(x, printed=printed(x)) for x in table.lines if there(x.variant)),
-        splits=(*(table.splits[k] for k in kept), *(data.ood if table.splits == TEST else ())),
-        compared=tuple(pair for pair in table.compared if all(map(there, pair))),
-    )
-
-
-def _train(setting: StudySetting, variant: str, seed: int, note: Note | None) -> tuple[str, float | None, str]:
-    """Train an agent, or go on; which, the seconds of processor time it took, and what to tell."""
-    torch.set_num_threads(setting.threads)
-    data, encoder, folder = Dataset(setting.data), load_encoder(setting.encoder), setting.folder_of(variant, seed)
-    config = setting.config_of(variant, seed)
-    with contextlib.ExitStack() as stack:
-        if note is None:
-            folder.mkdir(parents=True, exist_ok=True)
-            log = stack.enter_context(open(folder / "log.txt", "a", buffering=1, encoding="utf-8"))
-            note = lambda line: print(line, file=log)
-        lessons = Lessons(data, encoder, setting.quality, device=setting.device)
-        progress = train_agent(lessons, config, folder, begin=setting.begin, note=note)
-    best = f"best validation {100 * progress.best:.1f} %, kept after {progress.best_update}"
-    return variant, progress.processor, f"{variant}, seed {seed}: {progress.update} updates, {best}"
-
-
-def _validations(folder: Path) -> list[dict[str, float]]:
-    """How a training went, validation by validation."""
-    path = folder / "validation.jsonl"
-    text = path.read_text(encoding="utf-8").splitlines()
-    try:
-        lines: list[dict[str, float]] = [json.loads(line) for line in text]
-    except ValueError as e:
-        raise ValueError(f"{path} holds a line that is no JSON ({e}); delete that line") from e
-    return list({line["update"]: line for line in lines}.values())  # a resumed run may have validated twice
-
-
-class _Player:
-    """Plays an agent of a study on a split, or takes from the study's folder what it played before."""
-
-    def __init__(self, setting: StudySetting, data: Dataset) -> None:
-        self.setting, self.data = setting, data
-        self.encoder: Encoder = load_encoder(setting.encoder)
-        self._splits: dict[str, tuple[SplitData, FeatureBank, dict[str, Any]]] = {}
-
-    def episodes(self, variant: str, played: str, split: str, seed: int) -> list[Episode]:
-        whole, bank, drawn = self._split(split)
-        path = self.setting.folder_of(variant, seed) / "best.safetensors"
-        looks = (path, self.encoder.digest, drawn) if variant else ()
-
-        def policy() -> Agent:
-            if not variant:
-                return agent_without_learning("hanna", played)
-            agent = load_agent(path)
-            every = (hanna_policies, priced_policies, plainer_policies)
-            return {name: policy for make in every for name, policy in make(agent, bank).items()}[played]
-
-        name = f"{variant}, seed {seed}, {played}" if variant else played
-        return kept_episodes(
-            self.setting.out / "episodes",
-            name,
-            (self.data.digest, played, *looks),
-            whole,
-            policy,
-            seed=self.setting.seed,
-            limit=self.setting.tasks,
+    def about(self) -> str:
+        c, told = self.config, super().about()
+        begun = f", begun with {self.begin.name}" if self.begin else ""
+        judged = (
+            f" Judged in the data set {self.judged_in({}).digest[:16]}, not that of training." if self.elsewhere else ""
+        )
+        return (
+            f"{told}{judged} Pictures: {self.depends({})['pictures']}. {c.iterations} updates of {c.batch} "
+            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g}."
         )
 
-    def named(self, variant: str, played: str, split: str, seed: int) -> str:
-        """What `episodes` plays, in words."""
-        agent = f"{variant}, seed {seed}, {played}" if variant else played
-        how = f"{self.setting.tasks or 'all'} tasks, judged with seed {self.setting.seed}"
-        return f"{agent} on {split} of {self.data.digest}, {how}"
-
-    def _split(self, name: str) -> tuple[SplitData, FeatureBank, dict[str, Any]]:
-        if name not in self._splits:
-            quality = self.setting.quality
-            drawn = {n: dataclasses.asdict(pictures_of(self.data, n, quality)) for n in self.data.names(name)}
-            self._splits[name] = self.data.split(name), _bank(self.setting, self.data, name), drawn
-        return self._splits[name]
-
-
-def _bank(setting: StudySetting, data: Dataset, split: str) -> FeatureBank:
-    """What agents see in a split's houses."""
-    return split_of(data, split, load_encoder(setting.encoder).digest, quality=setting.quality).bank
-
-
-class _Judge:
-    """The episodes of a table's rows, with all of their training seeds, and what they come to."""
-
-    def __init__(self, setting: StudySetting, data: Dataset, cost: ProcessorTime, note: Note) -> None:
-        self.setting, self.data, self.cost, self.note = setting, data, cost, note
-        self.folder = setting.out if setting.judged_in is None else setting.out / f"judged_in_{data.digest[:16]}"
-        """Where tables and figures go; agents and episodes are shared."""
-        self.behaviour: dict[tuple[str, str], dict] = {}
-        self.player = _Player(setting, data)
-        self._episodes: dict[tuple[str, str], list[Episode]] = {}
-
-    def row(self, line: Line, split: str) -> Row:
-        episodes = self.episodes(line, split)
-        return row(line.key, split, episodes, self._graphs(split), seed=self.setting.seed)
-
-    def difference(self, first: str, second: str, split: str, column: str) -> Estimate:
-        """How far agent `first` lies above `second`, task by task."""
-        pair = [self.episodes(Line(name, name), split) for name in (first, second)]
-        return difference(pair[0], pair[1], column, self._graphs(split))
-
-    def episodes(self, line: Line, split: str) -> list[Episode]:
-        """Those of all training seeds, one seed after the other."""
-        if (line.key, split) not in self._episodes:
-            seeds = self.setting.repeats() if line.variant else [self.setting.config.seed]
-            found = [e for seed in seeds for e in self.player.episodes(line.variant, line.played, split, seed)]
-            if line.variant and line.played == "learned":
-                self.behaviour[line.key, split] = about(found, self.data.places(split))
-            self._episodes[line.key, split] = found
-            success = self.row(line, split).values["success"]
-            self.note(f"{line.key} on {split}: success {shown('success', success)} %")
-        return self._episodes[line.key, split]
-
-    def _graphs(self, split: str) -> dict[str, NavGraph]:
-        return {name: place.graph for name, place in self.data.places(split).items()}
-
-
-def _write(setting: StudySetting, name: str, table: Table, judged: _Judge) -> Path:
-    """One study's files; the figures go with the tables they belong to."""
-    rows = [
-        dataclasses.replace(judged.row(line, split), agent=line.label) for split in table.splits for line in table.lines
-    ]
-    stem = f"table_{name}"
-    save(rows, judged.folder, stem)
-    path = judged.folder / f"{stem}.md"
-    write_bytes(path, side_by_side(setting, name, table, rows, judged).encode())
-    learned = [line for line in table.lines if line.variant == "final"]
-    if name == "4.5" and learned:
-        behaviour = judged.behaviour[learned[-1].key, "test_unseen"]
-        write_json(judged.folder / "behaviour.json", behaviour, indent=1)
-        requests_figure(behaviour, judged.folder / "figure_D.1.png")
-        conditions_figure(behaviour, judged.folder / "figure_D.2.png")
-    if name == "requests":
-        by = {line.played: r.values for line, r in zip(table.lines, rows, strict=True)}
-        trained = [r.values for line, r in zip(table.lines, rows, strict=True) if line.variant in PRICES]
-        requests_curves(
-            {kind: [(by[n]["requests"], by[n]["success"]) for n in rules if n in by] for kind, rules in PRICED.items()}
-            | {"trained at a price": [(v["requests"], v["success"]) for v in trained]},
-            judged.folder / "figure_requests.png",
-        )
-    if name == "houses":
-        there = len(dataset_of(setting.data, "hanna").names("train"))
-        count = {line.variant: setting.config_of(line.variant).training_houses or there for line in table.lines}
-        lines = [line for _ in table.splits for line in table.lines]
-        by_trail = {(r.split, x.variant): r for x, r in zip(lines, rows, strict=True) if x.played == "learned"}
-        houses_figure(
-            {
-                f"{s}, {how}": [
-                    (n, by_trail[s, variant].values["success"])
-                    for variant, n in count.items()
-                    if n == there or (variant in SHORTER) == (how == "equal passes")
-                ]
-                for s in table.splits
-                for how in ("equal updates", "equal passes")
-            },
-            judged.folder / "figure_houses.png",
-        )
-    return path
-
-
-def side_by_side(setting: StudySetting, name: str, table: Table, rows: Sequence[Row], judged: _Judge) -> str:
-    """The table with the dissertation's numbers in brackets, and what it was made with."""
-    by = {(r.agent, r.split): r for r in rows}
-    first = {r.split: r for r in rows}
-    tasks = {s: len({e.task.id for e in judged.episodes(table.lines[0], s)}) for s in table.splits}
-    counts = "; ".join(f"{s}: {tasks[s]} tasks in {first[s].houses} houses" for s in table.splits)
-    c = setting.config
-    brackets = "; in brackets the dissertation's numbers" if any(line.printed for line in table.lines) else ""
-    how = (
-        f"{counts}{_where(setting, table, judged)}. Mean and 95 % interval clustered by "
-        f"house{' and training seed' if setting.seeds > 1 else ''}{brackets}. Trained {c.iterations} updates of "
-        f"{c.batch} episodes, "
-        f"{f'begun with {setting.begin.name}, ' if setting.begin else ''}"
-        f"{'seeds' if setting.seeds > 1 else 'seed'} {', '.join(map(str, setting.repeats()))}; judged with seed "
-        f"{setting.seed}, temperature {c.evaluation_temperature:g}, ask threshold {c.ask_threshold:g}. Rates in per "
-        f"cent.{_cost(setting, table, judged)}"
-    )
-    title = f"{name}: {table.title}" if name.isalpha() else f"Table {name}: {table.title}"
-    lines = [(line.label, line.printed) for line in table.lines]
-    value = lambda label, split, column: by[label, split].values[column]
-    pairs = [
-        f"- {first} less {second}, {split}: "
-        + ", ".join(f"{column} {shown(column, judged.difference(first, second, split, column))}" for column in COMPARED)
-        for first, second in table.compared
-        for split in table.splits
-    ]
-    told = ["", "Task by task, between agents that differ in one thing:", "", *pairs, ""] if pairs else []
-    there = _agents([table])
-    if missing := [a for a in _agents([_possible(TABLES[name], setting, judged.data, None)]) if a not in there]:
-        told += ["", f"Not run: {', '.join(missing)}.", ""]
-    return beside(title, table.splits, table.columns, lines, value, how) + "\n".join(told)
-
-
-def _where(setting: StudySetting, table: Table, judged: _Judge) -> str:
-    """How the pictures are drawn that agents are judged by and learn from, and whose houses those are."""
-    seen = drawings(judged.data, itertools.chain(*map(judged.data.names, table.splits)), setting.quality)
-    data = dataset_of(setting.data, "hanna")
-    other = f", of the data set {judged.data.digest[:16]}, not that of training" if setting.judged_in else ""
-    return f"{other}; drawn {seen}, those of training {drawings(data, data.names('train'), setting.quality)}"
-
-
-def _cost(setting: StudySetting, table: Table, judged: _Judge) -> str:
-    """The processor time of a table's agents, where it was counted."""
-    plays = [(*where, name) for where, names in _plays(setting, [table]).items() for name in names]
-    played = (judged.player.named(variant, name, split, seed) for variant, split, seed, name in plays)
-    hours = judged.cost.hours(_agents([table]), played)
-    return "" if hours is None else f" Processor time: {hours[0]:.2f} hours to train, {hours[1]:.2f} to judge."
+    def _lessons(self) -> Lessons:
+        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.quality, self.device)

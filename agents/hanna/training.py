@@ -19,11 +19,11 @@ from agents.common.losses import IGNORE
 from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
-from agents.hanna.checkpoint import load_checkpoint, save_checkpoint
 from agents.hanna.collect import Experience, collect, imitation_loss
 from agents.hanna.policy import HannaPolicy, for_training
 from agents.hanna.training_config import TrainingConfig
 from embodied.evaluation import metrics
+from embodied.identity import Identity
 from embodied.interface import Agent, Episode, Place, Task, Teacher
 from embodied.seeds import stream
 
@@ -34,6 +34,7 @@ def train(
     validation: Split,
     teacher: Teacher,
     folder: Path,
+    identity: Identity,
     *,
     minutes: float | None = None,
     note: Note = print,
@@ -41,14 +42,14 @@ def train(
 ) -> Progress:
     """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised."""
     learner = HannaLearner(agent, training, teacher)
-    return spine.train(learner, validation, folder, minutes=minutes, note=note, on_validation=on_validation)
+    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=on_validation)
 
 
 class HannaLearner:
     """A HANNA agent in training: its optimizer, and how it plays."""
 
     def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
-        self.agent, self.config, self.network = agent, agent.config, agent.network
+        self.agent, self.config, self.evaluation, self.network = agent, agent.config, agent.evaluation, agent.network
         config: TrainingConfig = agent.config
         self.optimizer = torch.optim.Adam(
             agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
@@ -68,16 +69,10 @@ class HannaLearner:
         return self.agent.policy(split.bank)
 
     def task(self, task: Task) -> Task:
-        return dataclasses.replace(task, horizon=self.config.evaluation_steps)
+        return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
 
-    def keep(self, path: Path) -> None:
-        save_agent(self.agent, path)
-
-    def save(self, path: Path, progress: Progress) -> None:
-        save_checkpoint(path, self.agent, self.optimizer, progress)
-
-    def load(self, path: Path) -> Progress:
-        return load_checkpoint(path, self.agent, self.optimizer)
+    def keep(self, path: Path, identity: Identity) -> None:
+        save_agent(self.agent, path, identity)
 
 
 def learn_once(
@@ -92,7 +87,8 @@ def learn_once(
     """One update; returns the numbers to report.
 
     Raises:
-      TrainingError: the loss or a gradient is not finite (weights are as before), or memory ran out.
+      DivergedError: the loss or a gradient is not finite (weights are as before).
+      UnableError: memory ran out.
     """
     config = agent.config
     tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))

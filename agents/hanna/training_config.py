@@ -7,8 +7,6 @@ success radius with the task (embodied.tasks.hanna).
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from dataclasses import dataclass
 
 from agents.common.settings import (
@@ -17,13 +15,13 @@ from agents.common.settings import (
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
+    EvaluationSettings,
     ImitationSettings,
     require,
     require_word,
 )
 from agents.hanna.asking import RULES
 from agents.hanna.config import HannaSizes
-from embodied.records import from_json
 
 MODELS = ("hanna", "lstm")
 
@@ -54,8 +52,6 @@ class TrainingConfig(ImitationSettings):
     """Weight of the curiosity-encouraging loss; 0: ablation. The authors: 0.5 with ask rules other than 'learned'."""
     curiosity_floor: float = 0.0
     """Mistakes less likely than this are not pushed down further; 0: Eq 4.13, without bound (docs/sources.md, S34)."""
-    evaluation_steps: int = 50
-    """Horizon of episodes that are judged."""
     ask_rule: str = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
     guided_asking: float = 0.0
@@ -63,21 +59,6 @@ class TrainingConfig(ImitationSettings):
     A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
     ask_price: float = 1.0
     """What a needless request costs in training, against one that is missing; 1: Eq 4.14."""
-    again: float = 1.0
-    """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
-    lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
-    by_image: bool = False
-    """When judged, an agent that is shown an image of where to go stops there and nowhere else, and walks straight to
-    it where it has been there (hanna.trail; docs/sources.md, S161)."""
-    search: float = 0.0
-    """When judged by image, what the worth of a way that was not tried yet is multiplied with for each move back to it,
-    so that an agent that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
-    first_ask_threshold: float = 0.5
-    """When judged, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
-    route_ask_threshold: float = 0.5
-    """When judged, `ask_threshold` on a route (docs/sources.md, S162)."""
-    patience: int = 0
-    """When judged, moves after departing from a route before the learned rule asks again."""
     read_assistance: bool = True
     """False: on routes there is only the target image (Table 4.4)."""
     reset_inter_task: bool = True
@@ -94,11 +75,11 @@ class TrainingConfig(ImitationSettings):
         require_word(self, "model", MODELS)
         require_word(self, "ask_rule", tuple(sorted(RULES)))
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
-        require(self, AT_LEAST_ONE, "training_steps", "evaluation_steps")
-        require(self, NOT_NEGATIVE, "alpha", "patience")
+        require(self, AT_LEAST_ONE, "training_steps")
+        require(self, NOT_NEGATIVE, "alpha")
         require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
-        require(self, SHARE, "guided_asking", "again", "search", "first_ask_threshold", "route_ask_threshold")
+        require(self, SHARE, "guided_asking")
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""
@@ -116,17 +97,35 @@ class TrainingConfig(ImitationSettings):
             similarity_attention=self.similarity_attention,
         )
 
-    def to_json(self) -> str:
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
 
-    @staticmethod
-    def from_json(text: str) -> TrainingConfig:
-        """Read what `to_json` wrote; unknown fields are refused."""
-        return from_json(TrainingConfig, text)
+@dataclass(frozen=True, kw_only=True)
+class HannaEvaluation(EvaluationSettings):
+    """How a HANNA agent is judged."""
 
+    evaluation_steps: int = 50
+    """Horizon of episodes that are judged."""
+    again: float = 1.0
+    """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
+    lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
+    by_image: bool = False
+    """When judged, an agent that is shown an image of where to go stops there and nowhere else, and walks straight to
+    it where it has been there (hanna.trail; docs/sources.md, S161)."""
+    search: float = 0.0
+    """When judged by image, what the worth of a way that was not tried yet is multiplied with for each move back to it,
+    so that an agent that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
+    first_ask_threshold: float = 0.5
+    """When judged, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
+    route_ask_threshold: float = 0.5
+    """When judged, `ask_threshold` on a route (docs/sources.md, S162)."""
+    patience: int = 0
+    """When judged, moves after departing from a route before the learned rule asks again."""
 
-JUDGED = ("again", "by_image", "search", "first_ask_threshold", "route_ask_threshold", "patience")
-"""Of TrainingConfig, those that say only how an agent is judged, besides agents.common.settings.MAY_CHANGE."""
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "evaluation_steps")
+        require(self, NOT_NEGATIVE, "patience")
+        require(self, SHARE, "again", "search", "first_ask_threshold", "route_ask_threshold")
+
 
 SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
@@ -142,6 +141,14 @@ SCALES: dict[str, TrainingConfig] = {
         curiosity_floor=0.02,
         environment_dropout=0.4,
         guided_asking=0.5,
+        validate_every=200,
+        validation_tasks=200,
+    ),
+    "paper": TrainingConfig(),
+}
+"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""
+EVALUATIONS: dict[str, HannaEvaluation] = {
+    "mini": HannaEvaluation(
         again=0.1,
         by_image=True,
         search=0.2,
@@ -149,9 +156,7 @@ SCALES: dict[str, TrainingConfig] = {
         route_ask_threshold=0.7,
         patience=2,
         evaluation_temperature=0.5,
-        validate_every=200,
-        validation_tasks=200,
     ),
-    "paper": TrainingConfig(),
+    "paper": HannaEvaluation(),
 }
-"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""
+"""How agents of each scale are judged."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,45 +10,30 @@ import numpy as np
 import torch
 from torch import nn
 
-from agents.common.tensor_file import load_tensors, save_tensors
-from agents.hari.config import ExecutionConfig, IntentionConfig, as_dict
+from agents.common.tensor_file import put
+from agents.common.weights import load_weights, save_weights
+from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.sight import Seeing
 from agents.hari.words import FeatureWords
+from embodied.identity import Identity
 from embodied.interface import FeatureSource, Sight
-from embodied.records import from_plain, parse
 
-FORMAT, OLD_FORMAT = "embodied-hari-2", "embodied-hari-1"
-"""The older one has no checksum."""
+REMEDY = "train it again with `embodied train hari`"
 
 
 @dataclass(frozen=True)
-class Configs:
-    """Settings of the policies in a file."""
+class HariAbout:
+    """What stands beside the weights in a file."""
+
+    names: tuple[str, ...]
+    """The words that the policies know."""
 
     execution: ExecutionConfig
     intention: IntentionConfig | None = None
     """None for an execution policy alone."""
     sight: Seeing | None = None
     """None for an execution policy that reads words alone."""
-
-
-@dataclass(frozen=True)
-class HariSettings:
-    """What stands beside the weights in a file."""
-
-    settings: Configs
-    names: tuple[str, ...]
-    """The words that the policies know."""
-
-
-@dataclass(frozen=True)
-class _About:
-    """The same as the file holds it: JSON as text."""
-
-    format: str
-    settings: str
-    names: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,15 +104,18 @@ def begun_with(executor: Executor, other: Executor) -> Executor:
     return new
 
 
-def save_executor(executor: Executor, path: Path) -> None:
-    """Write an execution policy, atomically."""
-    _save({"execution": executor.network}, _settings_of(executor), executor.words, path)
+def save_executor(executor: Executor, path: Path, identity: Identity | None = None) -> None:
+    """Write an execution policy and what it was trained with, atomically."""
+    about = HariAbout(executor.words.names, executor.config, sight=executor.seeing)
+    save_weights(path, "hari", _named("execution", executor.network), about, identity)
 
 
-def save_agent(agent: HariAgent, path: Path) -> None:
-    """Write an agent with its execution policy, atomically."""
-    settings = _settings_of(agent.executor) | {"intention": as_dict(agent.config)}
-    _save({"execution": agent.executor.network, "actor": agent.actor}, settings, agent.executor.words, path)
+def save_agent(agent: HariAgent, path: Path, identity: Identity | None = None) -> None:
+    """Write an agent with its execution policy and what it was trained with, atomically."""
+    executor = agent.executor
+    about = HariAbout(executor.words.names, executor.config, agent.config, executor.seeing)
+    tensors = _named("execution", executor.network) | _named("actor", agent.actor)
+    save_weights(path, "hari", tensors, about, identity)
 
 
 def load_executor(path: Path) -> Executor:
@@ -138,9 +124,9 @@ def load_executor(path: Path) -> Executor:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, told = _load(Path(path))
-    executor = new_executor(told.settings.execution, FeatureWords(told.names), told.settings.sight)
-    _fill(executor.network, tensors, "execution", path)
+    tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
+    executor = new_executor(told.execution, FeatureWords(told.names), told.sight)
+    put(executor.network, _of("execution", tensors), path)
     executor.network.eval()
     return executor
 
@@ -151,8 +137,8 @@ def load_agent(path: Path) -> HariAgent:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.
     """
-    tensors, told = _load(Path(path))
-    config = told.settings.intention
+    tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
+    config = told.intention
     if config is None:
         raise ValueError(
             f"{path} holds an execution policy alone; teach it to ask: "
@@ -160,34 +146,14 @@ def load_agent(path: Path) -> HariAgent:
         )
     executor = load_executor(path)
     actor, _ = new_heads(config, executor.config.hidden_size)
-    _fill(actor, tensors, "actor", path)
+    put(actor, _of("actor", tensors), path)
     actor.eval()
     return HariAgent(executor, actor, config)
 
 
-def _settings_of(executor: Executor) -> dict[str, dict[str, object]]:
-    seeing = executor.seeing
-    return {"execution": as_dict(executor.config)} | ({"sight": dataclasses.asdict(seeing)} if seeing else {})
+def _named(name: str, module: nn.Module) -> dict[str, torch.Tensor]:
+    return {f"{name}.{k}": v for k, v in module.state_dict().items()}
 
 
-def _save(
-    modules: dict[str, nn.Module], settings: dict[str, dict[str, object]], words: FeatureWords, path: Path
-) -> None:
-    about = {"format": FORMAT, "settings": json.dumps(settings), "names": json.dumps(words.names)}
-    tensors = {f"{n}.{k}": v for n, m in modules.items() for k, v in m.state_dict().items()}
-    save_tensors(Path(path), tensors, about)
-
-
-def _load(path: Path) -> tuple[dict[str, torch.Tensor], HariSettings]:
-    tensors, about = load_tensors(path, (FORMAT, OLD_FORMAT), "train it again with `embodied train hari`")
-    told = from_plain(_About, about, str(path))
-    body = {"names": parse(told.names, "a list of names"), "settings": parse(told.settings, "settings")}
-    return tensors, from_plain(HariSettings, body, str(path))
-
-
-def _fill(module: nn.Module, tensors: dict[str, torch.Tensor], name: str, path: Path) -> None:
-    mine = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
-    try:
-        module.load_state_dict(mine)
-    except RuntimeError as e:
-        raise ValueError(f"{path}: its weights are not those of its settings ({e}); train it again") from e
+def _of(name: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 from agents.common.settings import (
@@ -148,8 +147,3 @@ INTENTION_SCALES: dict[str, IntentionConfig] = {
     ),
     "paper": IntentionConfig(),
 }
-
-
-def as_dict(config: ExecutionConfig | IntentionConfig) -> dict[str, object]:
-    """Field to value, as it is written into checkpoints and weights."""
-    return dataclasses.asdict(config)

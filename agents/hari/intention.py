@@ -10,7 +10,6 @@ for update in ...:
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,25 +18,20 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss, descend
-from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
-from agents.common.session import Note, Progress, Session, seed_of, tasks_of_update
+from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
+from agents.common.checkpoint import Stateful
+from agents.common.session import Note, Progress, Session, descend, seed_of, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent
-from agents.hari.config import as_dict
 from agents.hari.networks import INTENTIONS, RecurrentHead
 from agents.hari.policy import Choice, policy_of
-from assets.cache import write_json
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import shaped_costs
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.identity import Identity
 from embodied.interface import Ask, Episode, Move, Place, Task
-from embodied.locks import locked
 
-FORMAT = "embodied-hari-intention-1"
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
-EVERY = 20
-"""Updates per progress line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +49,7 @@ def train(
     training: Ground,
     validation: Ground,
     folder: Path,
+    identity: Identity,
     *,
     minutes: float | None = None,
     note: Note = print,
@@ -62,9 +57,10 @@ def train(
 ) -> Progress:
     """Train `agent.actor` and `critic` in place, from `folder`'s checkpoint if there is one.
 
-    Writes checkpoint.pt, best.safetensors (least validation cost), settings.json, validation.jsonl.
+    Writes best.safetensors (least validation cost) and what agents.common.session writes.
 
     Args:
+      identity: all that the run depends on.
       minutes: stop after this long in this session, as if interrupted.
       on_validation: is given the update and the episodes of each validation (to record some).
 
@@ -74,35 +70,29 @@ def train(
       CheckpointError: the folder's run has other settings or another execution policy, or is damaged.
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
-    config, folder = agent.config, Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    config = agent.config
     agent.executor.network.eval()
     run = IntentionRun(agent, critic)
-    progress = run.restore(folder / "checkpoint.pt")
-    write_json(folder / "settings.json", as_dict(config), indent=1)
-    seen: list[dict[str, float]] = []
-    with (
-        locked(folder),
-        Session(
-            progress,
-            config.updates,
-            lambda p: run.save(folder / "checkpoint.pt", p),
-            minutes=minutes,
-            checkpoint_minutes=config.checkpoint_minutes,
-            note=note,
-        ) as session,
-    ):
+    with Session(
+        folder,
+        identity,
+        run.parts,
+        config.updates,
+        may_change=MAY_CHANGE,
+        minutes=minutes,
+        checkpoint_minutes=config.checkpoint_minutes,
+        note=note,
+    ) as session:
         for update in session:
-            seen.append(learn_once(run, training, update))
-            done, last = update + 1, update + 1 == config.updates
-            if done % EVERY == 0 or last:
-                note(_line(done, session.progress.seconds, config.updates, seen))
-                seen = []
-            if done % config.validate_every == 0 or last:
+            session.add(learn_once(run, training, update))
+            if session.due(config.validate_every):
                 episodes = _validation_of(agent, validation)
-                session.progress = _kept(agent, episodes, validation, session.progress, done, folder, note)
+                cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
+                session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.places)})
+                if session.improved(-cost):  # what is optimised: the mean cost, task errors included
+                    save_agent(agent, session.folder / "best.safetensors", identity)
                 if on_validation:
-                    on_validation(done, episodes)
+                    on_validation(session.done, episodes)
     return session.progress
 
 
@@ -117,32 +107,10 @@ class IntentionRun:
         self.critic_optimizer = torch.optim.Adam(critic.parameters(), rate)
 
     @property
-    def _settings(self) -> dict[str, object]:
-        frozen = sum(float(p.detach().double().sum()) for p in self.agent.executor.network.parameters())
-        return as_dict(self.agent.config) | {"execution policy": round(frozen, 6)}
-
-    def save(self, path: Path, progress: Progress) -> None:
-        parts: dict[str, torch.nn.Module | torch.optim.Optimizer] = {
-            "actor": self.agent.actor,
-            "critic": self.critic,
-            "actor optimizer": self.actor_optimizer,
-            "critic optimizer": self.critic_optimizer,
-        }
-        states = {name: part.state_dict() for name, part in parts.items()}
-        write_checkpoint(path, FORMAT, {"settings": self._settings, "progress": vars(progress), **states})
-
-    def restore(self, path: Path) -> Progress:
-        """Where the run of `path` is; the beginning where there is none."""
-        if not path.exists():
-            return Progress(best=-math.inf)
-        parts = ("actor", "critic", "actor optimizer", "critic optimizer")
-        body = read_checkpoint(path, FORMAT, ("settings", "progress", *parts))
-        refuse_changes(path, body["settings"], self._settings, MAY_CHANGE)
-        self.agent.actor.load_state_dict(body["actor"])
-        self.critic.load_state_dict(body["critic"])
-        self.actor_optimizer.load_state_dict(body["actor optimizer"])
-        self.critic_optimizer.load_state_dict(body["critic optimizer"])
-        return Progress(**body["progress"])
+    def parts(self) -> dict[str, Stateful]:
+        """What is in its checkpoints."""
+        heads = {"actor": self.agent.actor, "critic": self.critic}
+        return {**heads, "actor optimizer": self.actor_optimizer, "critic optimizer": self.critic_optimizer}
 
 
 def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, float]:
@@ -156,10 +124,10 @@ def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, floa
     costs, mask = padded([shaped_costs(e, ground.places[e.task.world].graph.hops) for e in episodes])
     log_p, entropy = chosen(choices, len(tasks))
     decisions = Decisions(log_p, -values(run.critic, choices, len(tasks)), -costs_to_go(costs, mask), mask)
-    descend(critic_loss(decisions), run.critic_optimizer, config.clip, f"update {update}, critic")
+    descend(critic_loss(decisions), run.critic_optimizer, f"update {update}, critic", config.clip)
     if update >= config.critic_iterations:
         bonus = config.entropy * (entropy * mask).sum() / len(tasks)
-        descend(actor_loss(decisions) - bonus, run.actor_optimizer, config.clip, f"update {update}, actor")
+        descend(actor_loss(decisions) - bonus, run.actor_optimizer, f"update {update}, actor", config.clip)
     return numbers_of(episodes, ground.places) | {
         "cost": float((costs * mask).sum() / len(tasks)),
         "critic": float(critic_loss(decisions).detach()),
@@ -225,32 +193,3 @@ def _validation_of(agent: HariAgent, ground: Ground) -> Sequence[Episode]:
     config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
     with torch.inference_mode():
         return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)
-
-
-def _kept(
-    agent: HariAgent,
-    episodes: Sequence[Episode],
-    ground: Ground,
-    progress: Progress,
-    update: int,
-    folder: Path,
-    note: Note,
-) -> Progress:
-    """Judge by what is optimised: the mean cost, task errors included; keep the cheapest agent."""
-    cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
-    numbers = {"cost": cost, **numbers_of(episodes, ground.places)}
-    with open(folder / "validation.jsonl", "a") as f:
-        f.write(json.dumps({"update": update, "episodes": len(episodes), **numbers}) + "\n")
-    kept = -cost >= progress.best
-    said = ", ".join(f"{k} {v:.2f}" for k, v in numbers.items())
-    note(f"validation on {len(episodes)} tasks after {update} updates: {said}{'; kept' * kept}")
-    if kept:
-        save_agent(agent, folder / "best.safetensors")
-        return dataclasses.replace(progress, best=-cost, best_update=update)
-    return progress
-
-
-def _line(update: int, seconds: float, updates: int, seen: Sequence[Mapping[str, float]]) -> str:
-    mean = {k: math.fsum(s[k] for s in seen) / len(seen) for k in seen[0]}
-    said = "  ".join(f"{k} {v:.2f}" for k, v in mean.items())
-    return f"{update}/{updates}  {said}  {seconds / 60:.1f} min"

@@ -19,7 +19,7 @@ from embodied.interface import Agent, Episode
 
 TEST = tuple(f"test_{c}" for c in CONDITIONS)
 COLUMNS = ("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error")
-SHARED = ("random + rules", "learned", "learned, likeliest")
+RANDOM = "random + rules"
 
 
 @torch.inference_mode()
@@ -32,7 +32,7 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
     drawn = agent.config.move_temperature
     return {
         **{name: RuleAgent(agent.executor, rule, drawn) for name, rule in RULES.items()},
-        "random + rules": RuleAgent(agent.executor, RandomWithBudgets(means), drawn),
+        RANDOM: RuleAgent(agent.executor, RandomWithBudgets(means), drawn),
         "learned": policy_of(agent),
         "learned, likeliest": policy_of(agent, sample=False),
     }
@@ -52,6 +52,7 @@ def judge(
     *,
     seed: int = 0,
     limit: int | None = None,
+    batch: int = 32,
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
@@ -76,7 +77,6 @@ def judge(
         graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):
             with torch.inference_mode():
-                batch = agent.config.batch
                 episodes = play(whole.make_env, judged[name], tasks, seed=seed, batch=batch, agent=name)
             rows.append(row(name, split, episodes, graphs, seed=seed))
             if keep:

@@ -12,8 +12,6 @@ that sees is shown the panorama at every step and told d^s at some, as if it had
 from __future__ import annotations
 
 import dataclasses
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,29 +20,24 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
-from agents.common.session import Note, Progress, Session, dropout_of, falling_rate, refuse_divergence, tasks_of_update
+from agents.common.session import Note, Progress, Session, descend, dropout_of, falling_rate, set_rate, tasks_of_update
 from agents.hari.agent import Executor, save_executor
-from agents.hari.config import ExecutionConfig, as_dict
+from agents.hari.config import ExecutionConfig
 from agents.hari.networks import Encoded
 from agents.hari.sight import hidden_channels
 from agents.hari.words import Inputs, collate, padded, percept
-from assets.cache import write_json
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST, described_subgoal
+from embodied.identity import Identity
 from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Sight, Task
-from embodied.locks import locked
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
-FORMAT = "embodied-hari-execution-1"
 MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
 """Settings that may differ on resuming."""
 REDIRECTED = 5
 """Steps after which a walk has been given its sub-goal, if it is to have one."""
-EVERY = 25
-"""Updates per progress line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,46 +70,49 @@ class Walk:
 
 
 def pretrain(
-    executor: Executor, lessons: Curriculum, folder: Path, *, minutes: float | None = None, note: Note = print
+    executor: Executor,
+    lessons: Curriculum,
+    folder: Path,
+    identity: Identity,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
 ) -> Progress:
     """Train `executor` in place, from `folder`'s checkpoint if there is one.
 
-    Writes checkpoint.pt, best.safetensors (by validation success), settings.json and validation.jsonl.
+    Writes best.safetensors (by validation success) and what agents.common.session writes.
 
     Args:
+      identity: all that the run depends on.
       minutes: stop after this long in this session, as if interrupted.
 
     Raises:
-      TrainingError: the loss or a gradient is not finite; the last checkpoint is intact.
+      DivergedError: the loss or a gradient is not finite; the last checkpoint is intact.
       LockedError: another process trains in `folder`.
       CheckpointError: the folder's run has other settings or words, or is damaged.
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
-    config, folder = executor.config, Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    optimizer = torch.optim.Adam(executor.network.parameters(), config.learning_rate)
-    progress = _restore(folder / "checkpoint.pt", executor, optimizer)
-    write_json(folder / "settings.json", as_dict(config), indent=1)
-    seen: list[dict[str, float]] = []
-
-    def save(progress: Progress) -> None:
-        _save(folder / "checkpoint.pt", executor, optimizer, progress)
-
-    with (
-        locked(folder),
-        Session(
-            progress, config.iterations, save, minutes=minutes, checkpoint_minutes=config.checkpoint_minutes, note=note
-        ) as session,
-    ):
+    config, network = executor.config, executor.network
+    optimizer = torch.optim.Adam(network.parameters(), config.learning_rate)
+    with Session(
+        folder,
+        identity,
+        {"network": network, "optimizer": optimizer},
+        config.iterations,
+        may_change=MAY_CHANGE,
+        minutes=minutes,
+        checkpoint_minutes=config.checkpoint_minutes,
+        note=note,
+    ) as session:
         for update in session:
-            seen.append(learn_once(executor, optimizer, lessons, update))
-            done, last = update + 1, update + 1 == config.iterations
-            if done % EVERY == 0 or last:
-                note(_line(done, session.progress.seconds, config, seen))
-                seen = []
-            if done % config.validate_every == 0 or last:
-                session.progress = _validate(executor, lessons, session.progress, done, folder, note)
-    executor.network.eval()
+            session.add(learn_once(executor, optimizer, lessons, update))
+            if session.due(config.validate_every):
+                tasks = lessons.validation[: config.validation_tasks]
+                success = pretraining_success(executor, lessons, tasks)
+                session.record({"success": success, "episodes": len(tasks)})
+                if session.improved(success):
+                    save_executor(executor, session.folder / "best.safetensors", identity)
+    network.eval()
     return session.progress
 
 
@@ -126,7 +122,7 @@ def learn_once(
     """One update; returns its loss per step and the share of steps at which the likeliest move was right.
 
     Raises:
-      TrainingError: not finite; no weight was changed.
+      DivergedError: not finite; no weight was changed.
     """
     config = executor.config
     tasks = tasks_of_update(lessons.training, update, config.batch, config.seed)
@@ -147,13 +143,8 @@ def learn_once(
     with dropout_of(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
-    for group in optimizer.param_groups:
-        group["lr"] = falling_rate(config.learning_rate, update, config.iterations, config.cooldown)
-    optimizer.zero_grad(set_to_none=True)
-    loss.backward()
-    norm = torch.nn.utils.clip_grad_norm_(executor.network.parameters(), config.clip)
-    refuse_divergence(update, loss, norm)
-    optimizer.step()
+    set_rate(optimizer, falling_rate(config.learning_rate, update, config.iterations, config.cooldown))
+    descend(loss, optimizer, f"update {update}", config.clip)
     steps = torch.cat(right)
     return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}
 
@@ -286,51 +277,3 @@ def _play_greedily(executor: Executor, lessons: Curriculum, walks: Sequence[Walk
         beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
         for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
             _go(walks[i], column, poses, log_moves.shape[1] - 1)
-
-
-def _validate(
-    executor: Executor, lessons: Curriculum, progress: Progress, update: int, folder: Path, note: Note
-) -> Progress:
-    tasks = lessons.validation[: executor.config.validation_tasks]
-    success = pretraining_success(executor, lessons, tasks)
-    with open(folder / "validation.jsonl", "a") as f:
-        f.write(json.dumps({"update": update, "success": success, "episodes": len(tasks)}) + "\n")
-    kept = success >= progress.best
-    note(f"validation on {len(tasks)} tasks after {update} updates: success {100 * success:.1f} %" + "; kept" * kept)
-    if kept:
-        save_executor(executor, folder / "best.safetensors")
-        return dataclasses.replace(progress, best=success, best_update=update)
-    return progress
-
-
-def _settings_of(executor: Executor) -> dict[str, object]:
-    seeing = dataclasses.asdict(executor.seeing) if executor.seeing else None
-    return as_dict(executor.config) | {"names": list(executor.words.names), "sight": seeing}
-
-
-def _save(path: Path, executor: Executor, optimizer: torch.optim.Optimizer, progress: Progress) -> None:
-    body = {
-        "settings": _settings_of(executor),
-        "network": executor.network.state_dict(),
-        "optimizer": optimizer.state_dict(),
-        "progress": vars(progress),
-    }
-    write_checkpoint(path, FORMAT, body)
-
-
-def _restore(path: Path, executor: Executor, optimizer: torch.optim.Optimizer) -> Progress:
-    if not path.exists():
-        return Progress()
-    body = read_checkpoint(path, FORMAT, ("settings", "network", "optimizer", "progress"))
-    refuse_changes(path, body["settings"], _settings_of(executor), MAY_CHANGE)
-    executor.network.load_state_dict(body["network"])
-    optimizer.load_state_dict(body["optimizer"])
-    return Progress(**body["progress"])
-
-
-def _line(update: int, seconds: float, config: ExecutionConfig, seen: Sequence[Mapping[str, float]]) -> str:
-    mean = {k: math.fsum(s[k] for s in seen) / len(seen) for k in seen[0]}
-    return (
-        f"{update}/{config.iterations}  loss {mean['loss']:.3f}  right moves {100 * mean['right moves']:.0f} %"
-        f"  {seconds / 60:.1f} min"
-    )

@@ -5,18 +5,22 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from agents.common.session import Note, Progress
+from agents.common.tensor_file import checksum_of
+from agents.common.weights import weights_digest
 from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, train
 from agents.hari.pretraining import Curriculum, pretrain
-from agents.hari.sight import eyes_of
+from agents.hari.sight import Seeing, eyes_of
 from agents.hari.words import feature_words
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
+from embodied.identity import identity_of
 from embodied.interface import Episode, Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
@@ -108,7 +112,17 @@ def train_execution(
         executor = begun_with(executor, load_executor(begin))
     size = sum(p.numel() for p in executor.network.parameters())
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(words)} names, {size:,} parameters")
-    return pretrain(executor, lessons, folder, minutes=minutes, note=note)
+    identity = execution_identity(data, config, seeing, begin)
+    return pretrain(executor, lessons, folder, identity, minutes=minutes, note=note)
+
+
+def execution_identity(
+    data: Dataset, config: ExecutionConfig, seeing: Seeing | None, begin: Path | None = None
+) -> dict[str, Any]:
+    """All that an execution policy depends on; `begin` as of train_execution."""
+    more: dict[str, object] = {} if seeing is None else {"sight": seeing}
+    more |= {} if begin is None else {"begin": weights_digest(begin)}
+    return identity_of("agents.hari.run", settings=config, data=data.digest, **more)
 
 
 def train_intention(
@@ -129,4 +143,11 @@ def train_intention(
     size = sum(p.numel() for p in actor.parameters())
     note(f"{len(training.tasks)} tasks in {len(training.places)} houses, {size:,} parameters of each head")
     agent, watch = HariAgent(executor, actor, config), on_validation
-    return train(agent, critic, training, validation, folder, minutes=minutes, note=note, on_validation=watch)
+    identity = intention_identity(data, executor, config)
+    return train(agent, critic, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+
+
+def intention_identity(data: Dataset, executor: Executor, config: IntentionConfig) -> dict[str, Any]:
+    """All that an intention policy depends on."""
+    begin = checksum_of(executor.network.state_dict(), {})
+    return identity_of("agents.hari.run", settings=config, data=data.digest, begin=begin)

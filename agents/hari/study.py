@@ -1,222 +1,239 @@
-"""Tables 4.7 and 4.8 and Figures 4.5 and 4.6: train what is missing, judge it, print it beside the dissertation's.
-
-A study is a folder: `execution` holds the execution policy, `VARIANT/seed_N` an intention policy
-and what it did in `episodes`. Variants that tables share are trained once, and everything goes on
-where it stopped.
-"""
+"""Tables 4.7 and 4.8, Figures 4.5 and 4.6, and what seeing is worth, as data; HARI as a learner of the engine."""
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import torch
 
 from agents.common.session import Note
-from agents.common.studies import refuse_unknown, run_all, table, write_all, write_markdown
-from agents.hari.agent import load_agent, load_executor
-from agents.hari.figures import costs_figure, requests_figure, times_figure
-from agents.hari.judging import TEST, judge
+from agents.common.weights import weights_digest
+from agents.hari.agent import Executor, HariAgent, load_agent, load_executor
+from agents.hari.config import ExecutionConfig, IntentionConfig
+from agents.hari.judging import RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
-from agents.hari.run import CONDITIONS, hari_data, train_execution, train_intention, with_eyes
-from agents.hari.sight_study import KINDS, train_and_judge, write_sight
-from agents.hari.study_setting import HariStudySetting, estimates
-from assets.cache import digest, write_bytes, write_json
-from embodied.evaluation.tables import as_json, save, shown
-from embodied.interface import Ask, Episode, Move
-from embodied.records import load_lines, read_json, save_lines
+from agents.hari.rules import RULES, RuleAgent
+from agents.hari.run import CONDITIONS, hari_data, rules_of, train_execution, train_intention, with_eyes
+from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.episodes import JUDGES, EpisodeStudy
+from embodied.datasets.store import SplitData
+from embodied.evaluation.tables import Samples
+from embodied.identity import identity_of, key_of
+from embodied.interface import Agent, Ask, Episode, Move, Sight
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
-COSTS = (0.01, 0.05, 0.1, 0.2, 0.5)
-HORIZONS = (10, 20, 30)
-"""Figure 4.6."""
-VARIANTS: Mapping[str, Mapping[str, object]] = {
-    "learned": {},
-    "uncooperative": {"cooperative": False},
-    "skyline": {"perfect": True},
-    "moves drawn": {"move_temperature": 0.5},
-    "stack 1": {"stack": 1},
-    "stack 3": {"stack": 3},
-    **{f"cost {c:g}, H {h}": {"cost": c, "horizon": h} for c in COSTS for h in HORIZONS if (c, h) != (0.01, 30)},
+ACTIONS = ("CUR", "GOAL", "SUB", "DO")
+RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", RANDOM)
+EXECUTION, TIMES = "execution", "times"
+"""In a row: what an execution policy alone is trained to know its place by; whether intentions are counted by time."""
+
+
+def _learned(label: str, played: str = "learned", **train: Any) -> StudyRow:
+    return StudyRow(label, train, {"played": played})
+
+
+def _moves() -> tuple[StudyRow, ...]:
+    """What drawing DO's moves instead of taking the likeliest is worth; not in the dissertation."""
+    shown = ("no assistance", "dense goal and state", RANDOM, "learned")
+    ways: tuple[tuple[str, dict[str, Any]], ...] = (("likeliest moves", {}), ("moves drawn", {"move_temperature": 0.5}))
+    return tuple(_learned(f"{played}, {how}", played, **train) for played in shown for how, train in ways)
+
+
+def _sight(label: str, sees: str, states: str, rule: str = "no assistance", covered: bool = False) -> StudyRow:
+    """An execution policy alone: what it learned to know its place by, what it is told unasked, and what it asks."""
+    return StudyRow(label, {EXECUTION: sees}, {"played": rule, "states": states, "covered": covered})
+
+
+def _costs() -> tuple[StudyRow, ...]:
+    pairs = [(c, h) for h in (10, 20, 30) for c in (0.01, 0.05, 0.1, 0.2, 0.5)]
+    return tuple(
+        StudyRow(f"cost {c:g}, H {h}", {"cost": c, "horizon": h}, {"played": "learned"}, None, c, f"H = {h}")
+        for c, h in pairs
+    )
+
+
+TABLES: Mapping[str, Table] = {
+    "4.7": Table(
+        "Asking by learning and by rules",
+        (
+            *(_learned(rule, rule) for rule in RULE_ROWS),
+            _learned("learned"),
+            _learned("uncooperative", cooperative=False),
+            _learned("skyline", perfect=True),
+        ),
+        ("success",),
+        TEST,
+        ((_learned("learned"), _learned(RANDOM, RANDOM)),),
+        pooled=ACTIONS,
+    ),
+    "4.8": Table(
+        "Goals on the stack",
+        (_learned("stack 1", stack=1), _learned("stack 2"), _learned("stack 3", stack=3)),
+        ("success",),
+        VALIDATION,
+        pooled=ACTIONS,
+    ),
+    "moves": Table(
+        "Moves, likeliest or drawn (no counterpart in the dissertation)", _moves(), ("success",), TEST, pooled=ACTIONS
+    ),
+    "sight": Table(
+        "What seeing is worth (no counterpart in the dissertation)",
+        (
+            _sight("no assistance, d^s of nothing", "words", "none"),
+            _sight("no assistance, d^s of sparse words", "words", "sparse"),
+            _sight("no assistance, sight", "features", "none"),
+            _sight("no assistance, sight covered", "features", "none", covered=True),
+            _sight("no assistance, sight and sparse words", "features", "sparse"),
+            _sight("dense goal, d^s of sparse words", "words", "sparse", "dense goal"),
+            _sight("dense goal, sight", "features", "none", "dense goal"),
+            _sight("dense goal and state", "words", "sparse", "dense goal and state"),
+            _sight("dense goal and state, sight beside them", "features", "none", "dense goal and state"),
+        ),
+        ("success",),
+        TEST,
+        pooled=("DO",),
+    ),
+    "figure 4.5": Table("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
+    "figure 4.5b": Table(
+        "Intentions by time step",
+        (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
+        splits=("val_unseen_env",),
+        figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes"),
+    ),
+    "figure 4.6": Table(
+        "What costs change",
+        _costs(),
+        ("success", *ACTIONS),
+        VALIDATION,
+        figure=Figure(("success",), "cost of an action", "success (%)", log=True),
+    ),
 }
-"""Name of a variant to what differs from the settings of the study."""
-BESIDE_RULES = ("learned", "moves drawn")
-"""Variants that are judged beside rules, whose moves are drawn as theirs are."""
-RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", "random + rules")
-PRINTED: Mapping[str, str] = {
-    "no assistance": "43.4 / 16.4 / 3.0 (–, –, –, 13.1)",
-    "dense goal": "67.2 / 56.6 / 9.7 (–, 1.0, –, 12.6)",
-    "dense state": "77.9 / 30.6 / 4.1 (12.0, –, –, 12.0)",
-    "dense goal and state": "97.8 / 81.7 / 9.4 (11.0, 1.0, –, 11.0)",
-    "random + rules": "78.8 / 68.5 / 12.7 (2.0, 1.0, 1.7, 11.3)",
-    "learned": "85.8 / 78.2 / 19.8 (2.1, 1.0, 1.7, 11.1)",
-    "uncooperative": "81.1 / 71.2 / 16.1 (2.7, 2.7, 1.5, 9.6)",
-    "skyline": "94.3 / 95.1 / 92.6 (0.0, 0.0, 6.3, 7.3)",
-    "stack 1": "92.2 / 78.4 / 12.5 (5.1, 1.9, 0.0, 10.7)",
-    "stack 2": "86.9 / 77.6 / 21.6 (2.1, 1.0, 1.7, 11.2)",
-    "stack 3": "83.2 / 78.6 / 33.5 (1.3, 1.0, 5.0, 8.2)",
-}
-"""Success on unseen starts, objects and environments, and CUR, GOAL, SUB, DO, of Tables 4.7 and 4.8."""
 
 
-TABLES: Mapping[str, Sequence[str]] = {
-    "4.7": ("learned", "uncooperative", "skyline"),
-    "4.8": ("stack 1", "learned", "stack 3"),
-    "moves": ("learned", "moves drawn"),
-    "sight": tuple(KINDS),
-    "figure 4.5": ("learned",),
-    "figure 4.6": tuple(v for v in VARIANTS if v.startswith("cost ")) + ("learned",),
-}
-"""Table or figure to the variants it needs."""
+class Covered:
+    """Eyes that are shut: a FeatureSource of zeros, the mean of whitened features."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+    def features(self, sight: Sight) -> np.ndarray:
+        """(36, D) float32."""
+        return np.zeros((36, self.size), dtype=np.float32)
 
 
-def run_study(
-    setting: HariStudySetting, names: Sequence[str], *, workers: int = 1, note: Note = print
-) -> dict[str, Path]:
-    """Train and judge what is missing and write tables and figures; returns the Markdown files.
+@dataclass(frozen=True, kw_only=True)
+class HariStudy(EpisodeStudy):
+    """Tables 4.7 and 4.8, Figures 4.5 and 4.6."""
 
-    Results do not depend on `workers`.
+    execution: ExecutionConfig
+    intention: IntentionConfig
+    """Where the rows start from."""
+    executor: Path | None = None
+    """A trained execution policy that stands for all of its kind; None trains one in the study's folder."""
+    encoder: str = ""
+    """Digest of the encoder whose features a policy sees."""
+    quality: str | None = None
+    """Of the pictures that they come from, as in agents.vision.drawn.pictures_of."""
 
-    Raises:
-      ValueError: an unknown table.
-    """
-    refuse_unknown(names, TABLES)
-    executor = setting.executor or setting.out / "execution" / "best.safetensors"
-    variants = [v for n in names for v in TABLES[n]]
-    if setting.executor is None and set(variants) - set(KINDS):
-        torch.set_num_threads(setting.threads)
-        train_execution(hari_data(setting.data), setting.execution, setting.out / "execution", note=note)
-    work = functools.partial(_run, setting, executor, note=note)
-    run_all(variants, setting.repeats, work, workers=workers, note=note)
-    writers: Mapping[str, Callable[[], Path]] = {
-        "4.7": lambda: _write_table(setting, "4.7", [*BY_RULES, *map(_learned, TABLES["4.7"])], "test"),
-        "4.8": lambda: _write_table(setting, "4.8", [_stacked(v) for v in TABLES["4.8"]], "val"),
-        "moves": lambda: _write_table(setting, "moves", MOVES, "test"),
-        "sight": lambda: write_sight(setting),
-        "figure 4.5": lambda: _write_behaviour(setting),
-        "figure 4.6": lambda: _write_costs(setting),
-    }
-    return write_all(names, writers)
+    name = "hari"
+    makers = ("agents.hari.run",)
+    judges = (*JUDGES, "agents.hari.judging")
 
+    def tables(self) -> Mapping[str, Table]:
+        """The splits out of distribution that there are come beside those of the tests."""
+        ood = hari_data(self.data).ood
+        extended = lambda t: dataclasses.replace(t, splits=(*t.splits, *ood)) if t.splits == TEST else t
+        return {name: extended(table) for name, table in TABLES.items()}
 
-def _run(setting: HariStudySetting, executor: Path, seed: int, variant: str, *, note: Note) -> str:
-    """Train one policy and judge it on validation and test splits, unless that is done."""
-    if variant in KINDS:
-        return train_and_judge(setting, seed, KINDS[variant], note)
-    torch.set_num_threads(setting.threads)
-    data, folder = hari_data(setting.data), setting.folder(variant, seed)
-    config = dataclasses.replace(setting.intention, seed=seed, **VARIANTS[variant])  # type: ignore[arg-type]
-    walking = with_eyes(load_executor(executor), data, setting.quality)
-    quiet: Note = lambda line: None
-    train_intention(data, walking, config, folder, note=note if seed == setting.repeats[0] else quiet)
-    agent = load_agent(folder / "best.safetensors")
-    agent = dataclasses.replace(agent, executor=dataclasses.replace(agent.executor, eyes=walking.eyes))
-    mark, of_what = folder / "judged.json", digest(folder / "best.safetensors", setting.tasks)
-    if mark.exists() and read_json(mark) == {"of": of_what}:
-        return f"{variant}, seed {seed}: judged before"
+    def settings(self, train: Mapping[str, Any], seed: int) -> ExecutionConfig | IntentionConfig:
+        if EXECUTION in train:
+            return dataclasses.replace(self.execution, seed=seed, sees=train[EXECUTION])
+        return dataclasses.replace(self.intention, seed=seed, **train)
 
-    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
-        if name == "learned":
-            save_lines(folder / "episodes" / f"{split}.jsonl", episodes)
+    def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
+        data = hari_data(self.data).digest
+        more: dict[str, object] = {"sight": [self.encoder, self.quality]} if train.get(EXECUTION) == "features" else {}
+        if EXECUTION not in train or self._given(train):
+            walking = self._walking(folder)
+            more["begin"] = weights_digest(walking) if walking.exists() else None
+        return identity_of(*self.makers, settings=self.settings(train, seed), data=data, **more)
 
-    only = ("learned", *(RULE_ROWS if variant in BESIDE_RULES else ()))
-    rows = judge(data, agent, (*VALIDATION, *TEST, *data.ood), seed=seed, limit=setting.tasks, only=only, keep=keep)
-    save(rows, folder, "table")
-    write_bytes(folder / "rows.json", as_json(rows).encode())
-    write_json(mark, {"of": of_what})
-    return f"{variant}, seed {seed}: trained and judged"
+    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
+        """Train the execution policy that intention policies use."""
+        if self.executor is None and any(EXECUTION not in (r.train or {}) for r in rows):
+            train_execution(hari_data(self.data), self.execution, self._walking(folder).parent, note=note)
 
+    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+        data, config = hari_data(self.data), self.settings(train, seed)
+        if isinstance(config, IntentionConfig):
+            train_intention(data, self._eyes(load_executor(self._walking(folder))), config, home, note=note)
+        elif self.executor is not None and self._given(train):
+            return self.executor
+        else:
+            train_execution(data, config, home, encoder=self.encoder, quality=self.quality, note=note)
+        return home / "best.safetensors"
 
-@dataclass(frozen=True)
-class TableLine:
-    """A line of a table: a row of what was judged of the agents of a variant."""
+    def load(self, weights: Path) -> Executor | HariAgent:
+        executor = self._eyes(load_executor(weights))
+        try:
+            return dataclasses.replace(load_agent(weights), executor=executor)
+        except ValueError:  # an execution policy alone
+            return executor
 
-    variant: str
-    row: str
-    shown: str
-    printed: str = ""
-    """What the dissertation has there."""
+    def policies(self, agent: Executor | HariAgent, judge: Mapping[str, Any], split: str) -> Agent:
+        if isinstance(agent, HariAgent):
+            means = validation_means(
+                hari_data(self.data), agent, seed=self.judging[0], tasks=agent.config.validation_tasks
+            ) if judge["played"] == RANDOM else {"cur": 0.0, "goal": 0.0, "sub": 0.0, "do": 0.0}  # fmt: skip
+            return policies(agent, means)[judge["played"]]
+        if judge["covered"] and agent.seeing:
+            agent = dataclasses.replace(agent, eyes=Covered(agent.seeing.size))
+        return RuleAgent(agent, RULES[judge["played"]])
 
+    def where(self, agent: Executor | HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
+        config = (
+            agent.config
+            if isinstance(agent, HariAgent)
+            else dataclasses.replace(self.intention, states=judge["states"])
+        )
+        return hari_data(self.data).split(split, hari=rules_of(config))
 
-def _learned(variant: str) -> TableLine:
-    return TableLine(variant, "learned", variant, PRINTED[variant])
+    def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
+        if judge.get(TIMES):
+            return intentions_by_time(episodes, self.intention.horizon)
+        return super().count(episodes, split, judge)
 
+    def _given(self, train: Mapping[str, Any]) -> bool:
+        """Whether the study was given the execution policy of a row."""
+        return self.executor is not None and load_executor(self.executor).config.sees == train.get(EXECUTION)
 
-def _stacked(variant: str) -> TableLine:
-    name = "stack 2" if variant == "learned" else variant
-    return TableLine(variant, "learned", name, PRINTED[name])
+    def _walking(self, folder: Path) -> Path:
+        """The execution policy that intention policies use."""
+        if self.executor is not None:
+            return self.executor
+        mine = identity_of(settings=self.execution, data=hari_data(self.data).digest)
+        return folder / f"execution_{key_of(mine)}" / "best.safetensors"
 
-
-BY_RULES = [TableLine("learned", row, row, PRINTED[row]) for row in RULE_ROWS]
-MOVES = [
-    TableLine(variant, row, f"{row}, {how}", PRINTED[row] if variant == "learned" else "")
-    for row in ("no assistance", "dense goal and state", "random + rules", "learned")
-    for variant, how in (("learned", "likeliest moves"), ("moves drawn", "moves drawn"))
-]
-"""What drawing DO's moves instead of taking the likeliest is worth; not in the dissertation."""
-
-
-def _write_table(setting: HariStudySetting, name: str, rows: Sequence[TableLine], when: str) -> Path:
-    """Success per condition and, where there are such, in houses out of distribution; actions over the conditions,
-    beside what the dissertation prints."""
-    splits = [*(f"{when}_{c}" for c in CONDITIONS), *(hari_data(setting.data).ood if when == "test" else ())]
-    heads = ["agent", *(s.replace("_", " ") for s in splits), "CUR", "GOAL", "SUB", "DO", "dissertation"]
-    lines = []
-    for line in rows:
-        number = lambda split, column, line=line: estimates(setting, line.variant, split, column, line.row)
-        successes = [shown("success", number(s, "success")) for s in splits]
-        actions = [f"{np.mean([number(s, a).mean for s in splits[:3]]):.1f}" for a in ("CUR", "GOAL", "SUB", "DO")]
-        lines.append([line.shown, *successes, *actions, line.printed])
-    return write_markdown(setting.out / f"table_{name}.md", f"Table {name}", table(heads, lines), _seeds(setting))
+    def _eyes(self, executor: Executor) -> Executor:
+        return with_eyes(executor, hari_data(self.data), self.quality)
 
 
-def _write_behaviour(setting: HariStudySetting) -> Path:
-    """Figure 4.5: which requests are made in which condition, and when."""
-    per_condition = {
-        c: {a: estimates(setting, "learned", f"val_{c}", a) for a in ("CUR", "GOAL", "SUB")} for c in CONDITIONS
-    }
-    episodes = [
-        e
-        for seed in setting.repeats
-        for e in load_lines(setting.folder("learned", seed) / "episodes" / "val_unseen_env.jsonl", Episode)
-    ]
-    requests_figure(per_condition, setting.out / "figure_4_5a.png")
-    times_figure(intentions_by_time(episodes, setting.intention.horizon), setting.out / "figure_4_5b.png")
-    pictures = ["![Requests per condition](figure_4_5a.png)", "![Intentions by time](figure_4_5b.png)"]
-    return write_markdown(setting.out / "figure_4_5.md", "Figure 4.5", pictures, _seeds(setting))
-
-
-def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> np.ndarray:
-    """(horizon, 5): how many of the episodes chose each intention at each time step."""
-    counts = np.zeros((horizon, len(INTENTIONS)))
+def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, Samples]:
+    """'cur at 3': the share of the episodes that run at time step 3 that choose CUR; of each intention and step."""
+    found: dict[str, tuple[list[float], list[float]]] = {}
     for episode in episodes:
-        for t, step in enumerate(episode.steps[:horizon]):
-            action = step.action
-            name = action.intention.value if isinstance(action, Ask) else "do" if isinstance(action, Move) else "done"
-            counts[t, INTENTIONS.index(name)] += 1
-    return counts
-
-
-def _write_costs(setting: HariStudySetting) -> Path:
-    """Figure 4.6: success and actions against the cost of an action, for several horizons."""
-    variant = lambda c, h: "learned" if (c, h) == (0.01, 30) else f"cost {c:g}, H {h}"
-    success = {
-        (condition, h): [estimates(setting, variant(c, h), f"val_{condition}", "success") for c in COSTS]
-        for condition in CONDITIONS
-        for h in HORIZONS
-    }
-    actions = {
-        a: [float(np.mean([estimates(setting, variant(c, 30), f"val_{k}", a).mean for k in CONDITIONS])) for c in COSTS]
-        for a in ("CUR", "GOAL", "SUB", "DO")
-    }
-    costs_figure(COSTS, success, actions, setting.out / "figure_4_6.png")
-    pictures = ["![Success and actions against cost](figure_4_6.png)"]
-    return write_markdown(setting.out / "figure_4_6.md", "Figure 4.6", pictures, _seeds(setting))
-
-
-def _seeds(setting: HariStudySetting) -> str:
-    return f"{setting.seeds} training seeds; intervals are Student's, 95 %, over them."
+        chosen = [
+            s.action.intention.value if isinstance(s.action, Ask) else "do" if isinstance(s.action, Move) else "done"
+            for s in episode.steps[:horizon]
+        ]
+        for t in range(horizon):
+            for name in INTENTIONS:
+                some, all_ = found.setdefault(f"{name} at {t + 1}", ([], []))
+                some.append(float(t < len(chosen) and chosen[t] == name))
+                all_.append(float(t < len(chosen)))
+    houses = tuple(e.task.world for e in episodes)
+    return {name: Samples(tuple(some), houses, tuple(all_)) for name, (some, all_) in found.items()}

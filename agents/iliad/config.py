@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
+
 LEARNERS = ("adel", "dagger", "binary", "continuous")
 """ADEL (Algorithm 9), DAgger, and REINFORCE with a reward of success or of nearness (C.1, C.2)."""
 
@@ -46,19 +48,11 @@ class LearnerConfig:
     """Of everything that is drawn while learning."""
 
     def __post_init__(self) -> None:
-        if self.learner not in LEARNERS:
-            raise ValueError(f"learner must be one of {LEARNERS}, got {self.learner!r}")
-        for name in ("iterations", "batch", "validate_every"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("learning_rate", "clip", "checkpoint_minutes"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("mixing", "anneal_rate", "least_mixing", "cooldown", "threshold"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} must lie in [0, 1], got {getattr(self, name)}")
-        if self.anneal_every < 0 or self.entropy < 0:
-            raise ValueError(f"anneal_every {self.anneal_every} and entropy {self.entropy} must not be negative")
+        require_word(self, "learner", LEARNERS)
+        require(self, AT_LEAST_ONE, "iterations", "batch", "validate_every")
+        require(self, POSITIVE, "learning_rate", "clip", "checkpoint_minutes")
+        require(self, SHARE, "mixing", "anneal_rate", "least_mixing", "cooldown", "threshold")
+        require(self, NOT_NEGATIVE, "anneal_every", "entropy")
 
     @property
     def rate(self) -> float:

@@ -14,7 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.actor_critic import Decisions, actor_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss
+from agents.common.session import descend
 from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
 
 
@@ -47,7 +48,7 @@ def adel(
     said = teacher.describe(tasks, done, rng=rng)  # line 7
     unlabeled = marginal.draw(tasks, rng=rng)  # line 8
     loss = adel_loss(tasks, done, said, unlabeled, explorer, student, mixing)  # lines 9 and 10
-    descend(loss, optimizer, clip, "ADEL")  # line 11
+    descend(loss, optimizer, "ADEL", clip)  # line 11
     return IliadLesson(float(loss.detach()), done, said)
 
 
@@ -92,7 +93,7 @@ def dagger(
     done = student.greedy(tasks, requests)
     shown = [world.demonstrate(q, e) for q, e in zip(tasks, done, strict=True)]
     loss = -student.scores(tasks, requests, done, shown).log_probabilities.sum() / len(tasks)
-    descend(loss, optimizer, clip, "DAgger")
+    descend(loss, optimizer, "DAgger", clip)
     return IliadLesson(float(loss.detach()), done)
 
 
@@ -113,7 +114,7 @@ def reinforce(
     rewards = rewards_of(tasks, done)
     mean.add(rewards)
     loss = reinforce_loss(student.scores(tasks, requests, done), rewards, mean.value, entropy)
-    descend(loss, optimizer, clip, "REINFORCE")
+    descend(loss, optimizer, "REINFORCE", clip)
     return IliadLesson(float(loss.detach()), done)
 
 

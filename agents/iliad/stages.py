@@ -14,18 +14,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.actor_critic import descend
-from agents.common.runs import Run
-from agents.common.session import Note, falling_rate
-from embodied.locks import locked
+from agents.common.checkpoint import Stateful
+from agents.common.session import Note, Session, descend, falling_rate, set_rate
+from agents.common.tensor_file import put, read_weights
+from agents.common.weights import origin_of, save_weights
+from embodied.identity import Identity, differences
 from embodied.seeds import stream
 
-FORMAT = "embodied-iliad-stage-1"
 COOLDOWN = 0.4
 """Share of the updates, the last ones, over which the rate of these stages falls (docs/sources.md, S92)."""
 CLIP = 5.0
 REPORT = 250
-"""Updates between notes."""
+"""Updates between judgings."""
 Network = TypeVar("Network", bound=nn.Module)
 
 
@@ -41,35 +41,37 @@ class TeachingStage:
     rate: float
     """Adam's learning rate."""
     seed: int
-    identity: Mapping[str, object]
-    """What the run depends on besides."""
+    identity: Identity
+    """All that the network depends on."""
+    about: object
+    """Stands beside its weights (agents.common.weights)."""
 
     def train(
         self,
         network: Network,
         loss_of: Callable[[np.random.Generator], Tensor],
         judge: Callable[[], Mapping[str, float]],
-        keep: Callable[[Path], None],
         note: Note,
     ) -> Network:
-        """Train `network` or go on, unless that is done; `keep` writes it as NAME.safetensors into the folder."""
-        optimizer = torch.optim.Adam(network.parameters(), self.rate, fused=True)
-        identity = {"stage": self.name, "updates": self.updates, "seed": self.seed, **self.identity}
-        run = Run(self.folder / self.name, identity, {"network": network}, {"adam": optimizer}, FORMAT)
-        if run.progress.update >= self.updates:
+        """Train `network` or go on, unless NAME.safetensors in the folder is what would come of it."""
+        path = self.folder / f"{self.name}.safetensors"
+        if path.exists() and not differences(origin_of(path) or {}, self.identity):
+            put(network, read_weights(path), path)
             return network.eval()
+        optimizer = torch.optim.Adam(network.parameters(), self.rate, fused=True)
         network.train()
-        with locked(run.folder), run.session(self.updates, 2.0, note) as session:
+        parts: dict[str, Stateful] = {"network": network, "adam": optimizer}
+        with Session(
+            self.folder / self.name, self.identity, parts, self.updates, checkpoint_minutes=2.0, every=REPORT, note=note
+        ) as session:
             for update in session:
-                for group in optimizer.param_groups:
-                    group["lr"] = falling_rate(self.rate, update, self.updates, COOLDOWN)
+                set_rate(optimizer, falling_rate(self.rate, update, self.updates, COOLDOWN))
                 loss = loss_of(stream(self.seed, self.world, self.name, update))
-                descend(loss, optimizer, CLIP, f"{self.name}, update {update}")
-                run.add({"loss": float(loss.detach()), "updates": 1.0})
-                if (update + 1) % REPORT == 0 or update + 1 == self.updates:
-                    found = {"update": update + 1.0, "loss": run.sums["loss"] / run.sums["updates"], **judge()}
-                    run.history.append(found)
-                    run.sums = {}
-                    note(f"{run.folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
-        keep(self.folder / f"{self.name}.safetensors")
+                descend(loss, optimizer, f"{self.name}, update {update}", CLIP)
+                session.add({"loss": float(loss.detach()), "updates": 1.0})
+                if session.due(REPORT):
+                    session.record({"loss": session.sums["loss"] / session.sums["updates"], **judge()})
+                    session.sums = {}
+            if session.progress.update >= self.updates:
+                save_weights(path, self.world, network.state_dict(), self.about, self.identity)
         return network.eval()

@@ -10,15 +10,13 @@ from typing import Generic
 import numpy as np
 import torch
 
-from agents.common.runs import Run
-from agents.common.session import Note, falling_rate, tasks_of_update
+from agents.common.session import Note, Session, falling_rate, set_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
 from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
-from embodied.locks import locked
+from embodied.identity import Identity
 from embodied.seeds import stream
 
-FORMAT = "embodied-iliad-run-1"
 BATCH = 256
 """Tasks that are validated side by side; no influence on results."""
 
@@ -36,7 +34,7 @@ class IliadProblem(Generic[Q, E]):
     """pi_beta, which only ADEL has."""
     training: Sequence[Q]
     validation: Sequence[Q]
-    identity: Mapping[str, object]
+    identity: Identity
     """What a run depends on besides the learner's settings."""
 
 
@@ -44,7 +42,7 @@ def train(
     problem: IliadProblem[Q, E],
     config: LearnerConfig,
     folder: Path,
-    keep: Callable[[Path], None],
+    keep: Callable[[Path, Identity], None],
     *,
     minutes: float | None = None,
     note: Note = print,
@@ -55,39 +53,49 @@ def train(
     (of all episodes so far), and since the last one 'loss' and 'described', the share of episodes with a description.
 
     Args:
-      keep: writes the student's weights to a path; called when validation success is the best so far.
+      keep: writes the student's weights, with an identity, to a path; called when validation success is the best.
 
     Raises:
       CheckpointError, KeyboardInterrupt, DivergedError: see agents.common.
     """
     learner = _Learner(problem, config)
-    identity = {**problem.identity, **as_dict(config)}
-    run = Run(folder, identity, learner.modules, {"all": learner.optimizer}, FORMAT)
-    learner.restore(run.sums)
-    with locked(run.folder), run.session(config.iterations, config.checkpoint_minutes, note, minutes) as session:
+    identity = {**problem.identity, "settings": as_dict(config)}
+    with Session(
+        folder,
+        identity,
+        {**learner.modules, "optimizer": learner.optimizer},
+        config.iterations,
+        minutes=minutes,
+        checkpoint_minutes=config.checkpoint_minutes,
+        every=config.validate_every,
+        note=note,
+    ) as session:
+        learner.restore(session.sums)
         for update in session:
-            run.add(learner.update(update))
-            done = update + 1
-            if done % config.validate_every == 0 or done == config.iterations:
+            session.add(learner.update(update))
+            if session.due(config.validate_every):
                 found = success_rate(problem.world, problem.student, problem.validation)
-                best = max((h["success"] for h in run.history), default=-1.0)
-                run.history.append(_entry(done, found, config, run.sums))
-                if found > best:
-                    keep(folder / "best.safetensors")
-                run.sums = {k: v for k, v in run.sums.items() if k in ("episodes", "fulfilled", "reward")}
-                note(f"{folder}: " + ", ".join(f"{k} {v:.4g}" for k, v in run.history[-1].items()))
-    return run.history
+                session.record(_found(session.done, found, config, session.sums))
+                if found > session.progress.best and session.improved(found):
+                    keep(session.folder / "best.safetensors", identity)
+                session.sums = {k: v for k, v in session.sums.items() if k in ("episodes", "fulfilled", "reward")}
+    return session.history
 
 
 def success_rate(world: RequestWorld[Q, E], student: Student[Q, E], tasks: Sequence[Q]) -> float:
-    """Share of tasks that the student fulfils, acting greedily on their first (for held-out tasks, only) request."""
-    good = 0
+    """Share of tasks that the student fulfils; see `successes`."""
+    return sum(successes(world, student, tasks)) / len(tasks)
+
+
+def successes(world: RequestWorld[Q, E], student: Student[Q, E], tasks: Sequence[Q]) -> list[bool]:
+    """Which tasks the student fulfils, acting greedily on their first (for held-out tasks, only) request."""
+    good: list[bool] = []
     for at in range(0, len(tasks), BATCH):
         some = tasks[at : at + BATCH]
         rng = np.random.Generator(np.random.PCG64(0))  # held-out tasks have one request: nothing is drawn
         requests = [world.request(q, rng=rng) for q in some]
-        good += sum(world.success(q, e) for q, e in zip(some, student.greedy(some, requests), strict=True))
-    return good / len(tasks)
+        good += [world.success(q, e) for q, e in zip(some, student.greedy(some, requests), strict=True)]
+    return good
 
 
 def episodes_to(history: Sequence[Mapping[str, float]], threshold: float) -> float:
@@ -115,8 +123,7 @@ class _Learner(Generic[Q, E]):
     def update(self, update: int) -> dict[str, float]:
         """One update; returns numbers to add up."""
         c, world = self.config, self.problem.world
-        for group in self.optimizer.param_groups:
-            group["lr"] = falling_rate(c.rate, update, c.iterations, c.cooldown)
+        set_rate(self.optimizer, falling_rate(c.rate, update, c.iterations, c.cooldown))
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
         requests = [world.request(q, rng=rng) for q in tasks]
@@ -142,9 +149,8 @@ class _Learner(Generic[Q, E]):
         return reinforce(tasks, requests, self.rewards, self.mean, p.student, optimizer, c.entropy, c.clip, rng=rng)
 
 
-def _entry(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:
+def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:
     found = {
-        "update": float(done),
         "episodes": float(done * config.batch),
         "success": success,
         "training success": sums["fulfilled"] / sums["episodes"],

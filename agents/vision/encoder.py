@@ -14,19 +14,31 @@ import torch
 from torch import Tensor
 
 from agents.common.shipped import SHIPPED_ENCODER
-from agents.common.tensor_file import load_tensors, put, read_weights, save_tensors
+from agents.common.tensor_file import put, read_weights
+from agents.common.weights import load_weights, save_weights
 from agents.vision.designs import DESIGNS, build
 from agents.vision.network import Network
 from agents.vision.resnet import load_torchvision
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
+from embodied.identity import Identity
 
-FORMAT, OLD_FORMAT = "embodied-encoder-2", "embodied-encoder-1"
-"""The older one has no checksum, but its digest covers weights and settings, too."""
+DIGESTED = "embodied-encoder-1"
+"""What digests of encoders begin with."""
 SHARINGS = ("strip", "views")
 SHIPPED = SHIPPED_ENCODER
 """The encoder of this repository, trained on our own renders; see agents/weights/README.md."""
 MARGIN = 3 * CELL
 """Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""
+
+
+@dataclass(frozen=True)
+class EncoderAbout:
+    """What stands beside the weights in an encoder's file."""
+
+    name: str
+    sharing: str
+    digest: str
+    like: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +71,7 @@ class Encoder:
     @functools.cached_property
     def digest(self) -> str:
         """Hex SHA-256 over weights and settings: two encoders with one digest give the same features."""
-        # begins with the first format's name, so that features of its encoders stay theirs
-        h = hashlib.sha256(json.dumps([OLD_FORMAT, self.name, self.sharing]).encode())
+        h = hashlib.sha256(json.dumps([DIGESTED, self.name, self.sharing]).encode())
         for name, tensor in sorted(_tensors(self).items()):
             h.update(name.encode() + tensor.detach().cpu().half().contiguous().numpy().tobytes())
         return h.hexdigest()
@@ -147,12 +158,10 @@ def imagenet_encoder(name: str, weights: Path) -> Encoder:
     return Encoder(load_torchvision(name, read_weights(weights)), name, "views")
 
 
-def save_encoder(encoder: Encoder, path: Path) -> None:
-    """Write half-precision weights and settings atomically."""
-    settings = {"format": FORMAT, "name": encoder.name, "sharing": encoder.sharing, "digest": encoder.digest}
-    if encoder.like:
-        settings["like"] = encoder.like
-    save_tensors(Path(path), {k: v.detach().half() for k, v in _tensors(encoder).items()}, settings)
+def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
+    """Write half-precision weights, settings and what they were trained with, atomically."""
+    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest, encoder.like)
+    save_weights(path, "encoder", {k: v.detach().half() for k, v in _tensors(encoder).items()}, about, identity)
 
 
 def load_encoder(path: Path = SHIPPED) -> Encoder:
@@ -161,17 +170,18 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     Raises:
       ValueError: truncated, of another format, or not the weights its digest names.
     """
-    tensors, settings = load_tensors(path, (FORMAT, OLD_FORMAT), "train the encoder again with `embodied train vision`")
-    if settings.get("name") not in DESIGNS or settings.get("sharing") not in SHARINGS:
-        raise ValueError(f"{path}: unknown settings {settings}; train the encoder again with `embodied train vision`")
+    remedy = "train the encoder again with `embodied train vision`"
+    tensors, told = load_weights(path, "encoder", EncoderAbout, remedy)
+    if told.name not in DESIGNS or told.sharing not in SHARINGS:
+        raise ValueError(f"{path}: unknown settings {told}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = build(settings["name"])
+    network = build(told.name)
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     put(network, {**counters, **tensors}, path)
-    encoder = Encoder(network.eval(), settings["name"], settings["sharing"], mean, mix, settings.get("like", ""))
-    if encoder.digest != settings.get("digest"):
-        raise ValueError(f"{path}: contents do not fit the digest {settings.get('digest', '')[:12]}; it was changed")
+    encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix, told.like)
+    if encoder.digest != told.digest:
+        raise ValueError(f"{path}: contents do not fit the digest {told.digest[:12]}; it was changed")
     return encoder
 
 

@@ -5,21 +5,19 @@ What belongs to viz, such as recordings, is passed in from the console command a
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import torch
-
-from agents.common.device import check_device
+from agents.common.device import check_device, use_threads
+from agents.common.session import Note
 from agents.vision.config import VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
 from agents.vision.labels import HouseStrips
-from agents.vision.occasions import OCCASIONS, Occasion, make_shown
+from agents.vision.occasions import Occasion, make_shown
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
 from agents.vision.training import Example, matched, save_training, train_encoder, trained_classes, whitened
@@ -31,33 +29,41 @@ from embodied.light import lightings_of
 from embodied.locks import locked
 from embodied.render.pictures import TRACED, PictureSettings
 
-Note = Callable[[str], None]
 
-
-def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note = print) -> int:
+def train_vision(
+    source: StripSource,
+    config: VisionConfig,
+    out: Path,
+    *,
+    like: Path | None = None,
+    device: str = "cpu",
+    workers: int = 1,
+    note: Note = print,
+) -> None:
     """Cut strips from the pictures of all houses, train on the training houses, judge on validation houses, save.
 
     What is there already, strips or an encoder of the same settings, is not made again; training goes on from the
     last epoch that was finished.
 
+    Args:
+      like: an encoder to begin with and to see alike.
+
     Raises:
-      LockedError: another process writes to args.out.
+      LockedError: another process writes to `out`.
     """
-    torch.set_num_threads(args.threads)
-    check_device(args.device)
-    data = Dataset(args.data)
-    source = StripSource(data.folder, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
-    other = None if args.example is None else load_encoder(args.example)
+    check_device(device)
+    data = Dataset(source.data)
+    other = None if like is None else load_encoder(like)
     if other is not None:
         config = dataclasses.replace(config, like=other.digest)
-    with locked(args.out):
-        seen = source.strips(training_houses(data, config), workers=args.workers, note=note)
+    with locked(out):
+        seen = source.strips(training_houses(data, config), workers=workers, note=note)
         example = None
         if other is not None:
-            example = example_of(other, source, training_houses(data, config), workers=args.workers, note=note)
-        unseen = source.strips(houses_of(data, ("val_unseen",)), workers=args.workers, note=note)
+            example = example_of(other, source, training_houses(data, config), workers=workers, note=note)
+        unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         shown = seen if example is None else [*seen, *example.strips.values()]  # plain ones as one more lighting
-        encoder, classes = taught(shown, config, args.out, note, example=example, device=args.device)
+        encoder, classes = taught(shown, config, out, note, example=example, device=device)
         untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (
@@ -68,8 +74,7 @@ def run_train_vision(args: argparse.Namespace, config: VisionConfig, note: Note 
             halves = [labelled(data, houses, who, classes, alone=alone) for houses in (seen, unseen)]
             numbers[name] = as_numbers(read(halves[0], halves[1], seed=config.seed), classes)
             note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
-        write_json(args.out / "readings.json", numbers, indent=1)
-    return 0
+        write_json(out / "readings.json", numbers, indent=1)
 
 
 def example_of(
@@ -92,11 +97,11 @@ def taught(
     """The encoder that `config` makes of strips, from `folder` if it is there, and the classes it was taught."""
     classes = trained_classes(folder, config)
     if classes is None:
-        checkpoint = folder / "checkpoint.pt"
-        encoder, heads, classes = train_encoder(seen, config, checkpoint, example=example, device=device, note=note)
+        home = folder / "training"
+        encoder, heads, classes = train_encoder(seen, config, home, example=example, device=device, note=note)
         encoder = matched(encoder, seen, example) if example else whitened(encoder, seen)
         save_training(encoder, heads, classes, config, folder)
-        (folder / "checkpoint.pt").unlink(missing_ok=True)
+        (home / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes
 
 
@@ -108,25 +113,45 @@ def training_houses(data: Dataset, config: VisionConfig) -> list[str]:
 # Features ----------------------------------------------------------------------------------------
 
 
-def encoder_of(args: argparse.Namespace) -> Encoder:
-    """The encoder that --encoder and --network describe."""
-    if args.network == "random":
+def encoder_of(path: Path, network: str | None = None) -> Encoder:
+    """The encoder of a file; of torchvision's weights, where `network` names one; an untrained one for 'random'."""
+    if network == "random":
         return random_encoder(seed=0)
-    return imagenet_encoder(args.network, args.encoder) if args.network else load_encoder(args.encoder)
+    return imagenet_encoder(network, path) if network else load_encoder(path)
 
 
-def run_features(args: argparse.Namespace, note: Note = print) -> int:
+def make_features(
+    folder: Path,
+    encoder: Encoder,
+    cache: Path,
+    *,
+    quality: str | None = None,
+    splits: Sequence[str] = (),
+    first: int | None = None,
+    lights: int = 1,
+    threads: int = 1,
+    workers: int = 1,
+    ray: str | None = None,
+    shown: Sequence[Occasion] = (),
+    note: Note = print,
+) -> None:
     """Features of every house of a data set, in so many lightings; houses that have them, from pictures drawn so, are
     skipped.
+
+    Args:
+      quality: as agents.vision.drawn.pictures_of takes it.
+      splits: of whose houses; none for all.
+      first: so many houses of each split.
+      ray: address of a Ray cluster to use instead of `workers`.
+      shown: when the pictures that helpers show were taken, of which there are to be features, too.
 
     Raises:
       ValueError: several lightings of pictures without light.
     """
-    check_device(args.device)
-    data, encoder = Dataset(args.data), encoder_of(args).to(args.device)
-    names = houses_of(data, args.split or data.splits, args.houses)
-    wanted = {n: pictures_of(data, n, args.quality) for n in names}
-    houses = {n: lightings_of(data.place(n).house, args.lights) for n in names}
+    data = Dataset(folder)
+    names = houses_of(data, splits or data.splits, first)
+    wanted = {n: pictures_of(data, n, quality) for n in names}
+    houses = {n: lightings_of(data.place(n).house, lights) for n in names}
     missing = [
         (n, pictures)
         for n, pictures in wanted.items()
@@ -138,14 +163,13 @@ def run_features(args: argparse.Namespace, note: Note = print) -> int:
             note(line)
             yield line
 
-    arguments = (args.data.resolve(), encoder, args.cache, args.threads, args.lights)
-    for_each_unit(_make_features, missing, arguments, workers=args.workers, watch=watch, ray_address=args.ray)
-    shown = [OCCASIONS[word] for word in args.shown if OCCASIONS[word] != Occasion()]
-    for name in names if shown else ():
-        made = make_shown(data, name, shown, encoder, args.cache, wanted[name])
-        note(f"{name}: {len(made)} of {len(shown)} kinds of pictures made that are shown")
+    arguments = (data.folder.resolve(), encoder, cache, threads, lights)
+    for_each_unit(_make_features, missing, arguments, workers=workers, watch=watch, ray_address=ray)
+    others = [at for at in shown if at != Occasion()]
+    for name in names if others else ():
+        made = make_shown(data, name, others, encoder, cache, wanted[name])
+        note(f"{name}: {len(made)} of {len(others)} kinds of pictures made that are shown")
     note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
-    return 0
 
 
 def _ways(pictures: Iterable[PictureSettings]) -> str:
@@ -170,7 +194,7 @@ def _make_features(
     unit: tuple[str, PictureSettings], folder: Path, encoder: Encoder, cache: Path, threads: int, lights: int
 ) -> str:
     """The features of one house (name, how it is drawn) into the data set's folder; returns what was done."""
-    torch.set_num_threads(threads)
+    use_threads(threads)
     (name, pictures), data, nodes = unit, Dataset(folder), 0
     for k, lit in enumerate(baked_lightings(data, name, lights, cache, pictures)):
         if _has_features(data, name, k, lit, encoder, pictures):

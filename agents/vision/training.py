@@ -21,7 +21,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.common.checkpoint_file import read_checkpoint, refuse_changes, write_checkpoint
+from agents.common.checkpoint import Stateful
+from agents.common.session import Session, descend
 from agents.common.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
 from agents.vision.designs import begin_as_imagenet, body_of, build
@@ -29,15 +30,12 @@ from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, 
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.network import Network
 from agents.vision.strip import CELL, COLUMNS
-from assets.cache import write_json
+from assets.cache import digest, write_json
 from assets.records import ROOM_KINDS
-from embodied.records import from_plain, load_json
+from embodied.identity import identity_of
+from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
-
-CHECKPOINT = "embodied-vision-checkpoint-1"
-STATEFUL = ("network", "heads", "_optimizer", "_schedule")
-"""What of a training is in its checkpoints."""
 
 
 class Heads(nn.Module):
@@ -227,7 +225,7 @@ def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
 def train_encoder(
     houses: Sequence[HouseStrips],
     config: VisionConfig,
-    checkpoint: Path | None = None,
+    folder: Path | None = None,
     *,
     example: Example | None = None,
     device: str = "cpu",
@@ -238,11 +236,11 @@ def train_encoder(
     Args:
       example: what it is to see alike; `config.like` names it.
       device: where PyTorch computes.
-      checkpoint: where the state after each epoch is kept; training goes on from it.
+      folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
 
     Raises:
       ValueError: no strips, or strips with different classes.
-      FloatingPointError: the loss is no longer a number.
+      DivergedError: the loss is no longer a number.
       CheckpointError: damaged, or of other settings.
       UnableError: it should begin as ImageNet taught, and the package of weights is not installed.
     """
@@ -252,19 +250,25 @@ def train_encoder(
     classes = frequent_classes(houses, config.least_views)
     strips = strips_of(houses)
     training = _Training(config, len(classes), strips // config.batch, device, example)
-    if checkpoint is not None and checkpoint.exists():
-        training.load(checkpoint)
-        note(f"going on after epoch {training.epoch} of {config.epochs}")
     note(f"{strips} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
-    while training.epoch < config.epochs:
-        training.pass_over(houses, classes, note)
-        if checkpoint is not None:
-            training.save(checkpoint)
+    if folder is None:
+        for epoch in range(config.epochs):
+            training.pass_over(houses, classes, epoch, note)
+    else:
+        identity = identity_of("agents.vision.training", settings=config, strips=_digest_of(houses))
+        with Session(folder, identity, training.parts, config.epochs, checkpoint_minutes=0.0, note=note) as session:
+            for epoch in session:
+                session.add(training.pass_over(houses, classes, epoch, note))
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
     names = [houses[0].classes[i] for i in classes]
     if example is None:
         return Encoder(network, config.network), heads, names
     return dataclasses.replace(example.encoder, network=network, like=example.encoder.speaks), heads, names
+
+
+def _digest_of(houses: Sequence[HouseStrips]) -> str:
+    """Of the pictures and labels of some houses."""
+    return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
 
 
 def _refuse_example(houses: Sequence[HouseStrips], config: VisionConfig, example: Example | None) -> None:
@@ -291,7 +295,7 @@ class _Training:
         """Args:
         updates: per epoch.
         """
-        self.config, self.epoch, self._device, self._example = config, 0, device, example
+        self.config, self._device, self._example = config, device, example
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
             self.network = build(config.network)
@@ -311,14 +315,22 @@ class _Training:
         )
         self._updates = updates
 
-    def pass_over(self, houses: Sequence[HouseStrips], classes: Sequence[int], note: Callable[[str], None]) -> None:
-        """Learn once from every strip."""
+    @property
+    def parts(self) -> dict[str, Stateful]:
+        """What is in its checkpoints."""
+        modules = {"network": self.network, "heads": self.heads}
+        return {**modules, "optimizer": self._optimizer, "schedule": self._schedule}
+
+    def pass_over(
+        self, houses: Sequence[HouseStrips], classes: Sequence[int], epoch: int, note: Callable[[str], None]
+    ) -> dict[str, float]:
+        """Learn once from every strip; returns the losses, smoothed."""
         # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
         self.network.train()
         if self.config.frozen:
             body_of(self.network).eval()
         began, smooth = time.monotonic(), dict[str, float]()
-        rng = stream(self.config.seed, "vision", "epoch", self.epoch)
+        rng = stream(self.config.seed, "vision", "epoch", epoch)
         example = None if self._example is None else self._example.encoder.to(self._device)
         plain = None if self._example is None else self._example.strips
         drawn = batches(
@@ -330,36 +342,14 @@ class _Training:
                 loss, parts = vision_loss(self.network, self.heads, batch)
             else:
                 loss, parts = alike_loss(self.network, self.heads, batch, example)
-            if not torch.isfinite(loss):
-                raise FloatingPointError(
-                    f"vision loss became {float(loss)} in epoch {self.epoch + 1}; lower the learning rate"
-                )
-            self._optimizer.zero_grad(set_to_none=True)
-            loss.backward()
-            self._optimizer.step()
+            descend(loss, self._optimizer, f"epoch {epoch + 1}, update {done}")
             self._schedule.step()
             smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
             if done % 25 == 0 or done == self._updates:
                 rate = done * self.config.batch / (time.monotonic() - began)
                 terms = ", ".join(f"{k} {v:.3f}" for k, v in smooth.items())
-                note(f"epoch {self.epoch + 1}, update {done}/{self._updates}, {rate:.1f} strips/s: {terms}")
-        self.epoch += 1
-
-    def save(self, path: Path) -> None:
-        owners = {name: getattr(self, name).state_dict() for name in STATEFUL}
-        settings = {k: list(v) if isinstance(v, tuple) else v for k, v in dataclasses.asdict(self.config).items()}
-        write_checkpoint(path, CHECKPOINT, {"config": settings, "epoch": self.epoch, **owners})
-
-    def load(self, path: Path) -> None:
-        """
-        Raises:
-          CheckpointError: damaged, or of other settings.
-        """
-        body = read_checkpoint(path, CHECKPOINT, ("config", "epoch", *STATEFUL))
-        refuse_changes(path, vars(from_plain(VisionConfig, body["config"], f"{path}: config")), vars(self.config))
-        for name in STATEFUL:
-            getattr(self, name).load_state_dict(body[name])
-        self.epoch = int(body["epoch"])
+                note(f"epoch {epoch + 1}, update {done}/{self._updates}, {rate:.1f} strips/s: {terms}")
+        return smooth
 
 
 def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Encoder:

@@ -7,18 +7,33 @@ from pathlib import Path
 
 import torch
 
-from agents.common.agent_file import read_agent, refuse_features, write_agent
 from agents.common.choosing import choose_at
+from agents.common.settings import EvaluationSettings
 from agents.common.tensor_file import put
 from agents.common.vocabulary import Vocabulary
+from agents.common.weights import halved, load_weights, refuse_features, save_weights
 from agents.vision.bank import FeatureBank
 from agents.vnla.config import ASK_RULES, VnlaSettings
 from agents.vnla.network import VnlaNetwork
 from agents.vnla.policy import SupervisedVnla, VnlaPolicy
+from embodied.identity import Identity
 from embodied.interface import Agent
 from embodied.teachers.vnla import AskRules
 
-FORMAT = "embodied-vnla-1"
+LIKELIEST = EvaluationSettings()
+
+
+@dataclass(frozen=True)
+class VnlaAbout:
+    """What stands beside the weights in an agent's file."""
+
+    config: VnlaSettings
+    evaluation: EvaluationSettings
+    encoder: str
+    """Digest of the encoder whose features it learned from."""
+    feature_size: int
+    words: tuple[str, ...]
+    pictures: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +46,8 @@ class VnlaAgent:
     feature_size: int
     pictures: str = ""
     """How the pictures were drawn that it learned from: 'fast_256', 'unlit_192'."""
+    evaluation: EvaluationSettings = LIKELIEST
+    """How it is judged, if nobody says otherwise."""
 
     def policy(self, bank: FeatureBank, asker: str | None = None) -> VnlaPolicy:
         """The networks acting as they are judged.
@@ -48,8 +65,8 @@ class VnlaAgent:
             self.vocabulary,
             bank,
             asker=asker or config.asker,
-            ask_threshold=config.ask_threshold,
-            choose=choose_at(config.evaluation_temperature),
+            ask_threshold=self.evaluation.ask_threshold,
+            choose=choose_at(self.evaluation.evaluation_temperature),
             instruction_length=config.instruction_length,
         )
 
@@ -65,18 +82,25 @@ def rules_of(config: VnlaSettings) -> AskRules:
 
 
 def new_agent(
-    config: VnlaSettings, vocabulary: Vocabulary, encoder_digest: str, feature_size: int, pictures: str = ""
+    config: VnlaSettings,
+    vocabulary: Vocabulary,
+    encoder_digest: str,
+    feature_size: int,
+    pictures: str = "",
+    evaluation: EvaluationSettings = LIKELIEST,
 ) -> VnlaAgent:
     """An untrained agent; its weights follow from config.seed."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         network = VnlaNetwork(config, len(vocabulary), feature_size)
-    return VnlaAgent(network, vocabulary, config, encoder_digest, feature_size, pictures)
+    return VnlaAgent(network, vocabulary, config, encoder_digest, feature_size, pictures, evaluation)
 
 
-def save_agent(agent: VnlaAgent, path: Path) -> None:
-    """Write weights in half precision, with settings, words and what it looked at, atomically."""
-    write_agent(agent, path, FORMAT, agent.pictures)
+def save_agent(agent: VnlaAgent, path: Path, identity: Identity | None = None) -> None:
+    """Write weights in half precision, with settings, words and what it was trained with, atomically."""
+    words = agent.vocabulary.words
+    about = VnlaAbout(agent.config, agent.evaluation, agent.encoder_digest, agent.feature_size, words, agent.pictures)
+    save_weights(path, "vnla", halved(agent.network), about, identity)
 
 
 def load_agent(path: Path) -> VnlaAgent:
@@ -86,9 +110,9 @@ def load_agent(path: Path) -> VnlaAgent:
       FileNotFoundError, OSError.
       ValueError: truncated, changed, or of another format.
     """
-    file = read_agent(path, (FORMAT,), "train the agent again with `embodied train vnla`")
-    config, words = VnlaSettings.from_json(file.config), Vocabulary(file.words)
-    agent = new_agent(config, words, file.encoder, file.feature_size, file.pictures)
-    put(agent.network, file.tensors, path)
+    tensors, told = load_weights(path, "vnla", VnlaAbout, "train the agent again with `embodied train vnla`")
+    words = Vocabulary(told.words)
+    agent = new_agent(told.config, words, told.encoder, told.feature_size, told.pictures, told.evaluation)
+    put(agent.network, tensors, path)
     agent.network.eval()
     return agent

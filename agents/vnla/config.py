@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
-from embodied.records import from_json
 
 ASKERS = ("none", "first", "random", "teacher", "learned")
 """Who decides when to ask (docs/sources.md, S51)."""
@@ -68,14 +65,6 @@ class VnlaSettings(ImitationSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
         require(self, AT_LEAST_ONE, "budget_embedding", "coverage")
         require(self, NOT_ALL, "dropout")
-
-    def to_json(self) -> str:
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
-
-    @staticmethod
-    def from_json(text: str) -> VnlaSettings:
-        """Read what `to_json` wrote; unknown fields are refused."""
-        return from_json(VnlaSettings, text)
 
 
 SCALES: dict[str, VnlaSettings] = {

@@ -36,6 +36,11 @@ def row_names(agent: VnlaAgent) -> tuple[str, ...]:
     return (LEARNED, *ASKED, *direct, *WITHOUT_LEARNING)
 
 
+def rules_of_row(agent: VnlaAgent, name: str) -> str:
+    """The rule of play that the row `name` is judged under."""
+    return "direct" if name == DIRECT else agent.config.rules
+
+
 def player(agent: VnlaAgent, bank: FeatureBank, name: str) -> Agent:
     """Who plays the row `name`."""
     if name in WITHOUT_LEARNING:
@@ -49,19 +54,20 @@ def judge(
     agent: VnlaAgent,
     splits: Sequence[str],
     *,
-    seeds: Sequence[int] = (0,),
+    seed: int = 0,
     limit: int | None = None,
+    batch: int = 32,
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
 ) -> list[Row]:
-    """One row per player, split and seed, over the same tasks, under the rule of play that the agent is judged under.
+    """One row per player and split, over the same tasks, under the rule of play that the agent is judged under.
 
     Args:
-      seeds: of everything that is drawn, budgets included.
+      seed: of everything that is drawn, budgets included.
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for all.
-      keep: is given split, name and episodes of the first seed (to save them).
+      keep: is given split, name and episodes (to save them).
       watch: wraps the iterator over rows (a progress bar).
 
     Raises:
@@ -72,11 +78,9 @@ def judge(
     rows = []
     for split in splits:
         bank = lessons.split(split).bank
+        kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         for name in watch(only or row_names(agent)):
-            rules = "direct" if name == DIRECT else agent.config.rules
             players: Mapping[str, Agent] = {name: player(agent, bank, name)}
-            kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
-            whole, batch = lessons.data.split(split, vnla=rules), agent.config.evaluation_batch
-            for k, seed in enumerate(seeds):
-                rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=None if k else kept)
+            whole = lessons.data.split(split, vnla=rules_of_row(agent, name))
+            rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=kept)
     return rows

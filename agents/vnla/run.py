@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from agents.common.lessons import Lessons
 from agents.common.parallel import one_voice
-from agents.common.session import Progress
+from agents.common.session import Note, Progress
+from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.vnla.agent import new_agent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
@@ -15,10 +17,9 @@ from agents.vnla.training import train
 from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset, dataset_of
+from embodied.identity import identity_of
 from embodied.interface import Episode
 from embodied.language.plain import PlainLanguage
-
-Note = Callable[[str], None]
 
 
 def vnla_data(folder: Path) -> Dataset:
@@ -41,6 +42,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
 def train_agent(
     lessons: Lessons,
     config: VnlaSettings,
+    evaluation: EvaluationSettings,
     folder: Path,
     *,
     minutes: float | None = None,
@@ -52,7 +54,7 @@ def train_agent(
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
-    agent = new_agent(config, words, encoder.speaks, encoder.size, lessons.pictures("train"))
+    agent = new_agent(config, words, encoder.speaks, encoder.size, lessons.pictures("train"), evaluation)
     agent.network.to(lessons.device)
     size = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})
@@ -60,4 +62,10 @@ def train_agent(
         f"{len(training.tasks)} tasks in {count} houses, {len(words)} words, {size:,} parameters, "
         f"pictures: {agent.pictures}"
     )
-    return train(agent, training, validation, folder, minutes=minutes, note=note, on_validation=on_validation)
+    identity, watch = training_identity(lessons, config), on_validation
+    return train(agent, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+
+
+def training_identity(lessons: Lessons, config: VnlaSettings) -> dict[str, Any]:
+    """All that a trained agent depends on."""
+    return identity_of("agents.vnla.run", settings=config, **lessons.identity())

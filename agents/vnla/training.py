@@ -16,21 +16,18 @@ import torch
 from torch import Tensor
 
 from agents.common import parallel, spine
-from agents.common.checkpoint import load_run, save_run
 from agents.common.lessons import Split
 from agents.common.losses import negative_log_likelihood
 from agents.common.playing import play_remembering
 from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
-from agents.common.settings import MAY_CHANGE
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training
 from embodied.envs.vnla import teacher_of
 from embodied.evaluation import metrics
+from embodied.identity import Identity
 from embodied.interface import Agent, Episode, Place, Task
 from embodied.seeds import stream
-
-FORMAT = "embodied-vnla-checkpoint-1"
 
 
 def train(
@@ -38,6 +35,7 @@ def train(
     training: Split,
     validation: Split,
     folder: Path,
+    identity: Identity,
     *,
     minutes: float | None = None,
     note: Note = print,
@@ -49,14 +47,14 @@ def train(
       training: played under TRAINED_UNDER[config.rules], `validation` under config.rules itself.
     """
     learner = VnlaLearner(agent, training)
-    return spine.train(learner, validation, folder, minutes=minutes, note=note, on_validation=on_validation)
+    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=on_validation)
 
 
 class VnlaLearner:
     """A VNLA agent in training: its optimizer, and how it plays."""
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
-        self.agent, self.config, self.network = agent, agent.config, agent.network
+        self.agent, self.config, self.evaluation, self.network = agent, agent.config, agent.evaluation, agent.network
         config = agent.config
         self.optimizer = torch.optim.Adam(
             agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
@@ -90,14 +88,8 @@ class VnlaLearner:
     def task(self, task: Task) -> Task:
         return task  # its own time limit belongs to it
 
-    def keep(self, path: Path) -> None:
-        save_agent(self.agent, path)
-
-    def save(self, path: Path, progress: Progress) -> None:
-        save_run(path, FORMAT, self.agent, self.optimizer, progress, self.agent.pictures)
-
-    def load(self, path: Path) -> Progress:
-        return load_run(path, FORMAT, self.agent, self.optimizer, MAY_CHANGE, self.agent.pictures)
+    def keep(self, path: Path, identity: Identity) -> None:
+        save_agent(self.agent, path, identity)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from embodied.datasets.scale import KINDS
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
     from embodied.envs.hari import HariRules
-    from embodied.interface import Episode
+    from embodied.interface import Assistant, Episode
 
 COLUMNS = {
     "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
@@ -38,6 +39,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--agent", nargs="+", metavar="NAME", help="which agents (default: all of this kind)")
     add_rules(parser)
     add_hari_rules(parser)
+    parser.add_argument(
+        "--assistant", metavar="MODULE:CLASS", help="who answers requests, instead of the kind's own assistant"
+    )
     parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where to write the table and the episodes")
@@ -53,6 +57,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from embodied.datasets.store import Dataset
+    from embodied.envs.make import assistant_of
     from embodied.evaluation.evaluate import agent_names
     from embodied.locks import locked
 
@@ -64,11 +69,16 @@ def run(args: argparse.Namespace) -> int:
         data.names(split)
     if unknown := sorted(set(names) - set(agent_names(args.kind))):
         raise ValueError(f"unknown agents {unknown}; those of {args.kind!r} are {list(agent_names(args.kind))}")
+    if args.assistant:
+        sys.path.insert(0, "")  # a module in the folder one stands in
+    assistant = assistant_of(args.assistant)
     with locked(args.out) if args.out else contextlib.nullcontext():
-        return judge(args, data, names, variants)
+        return judge(args, data, names, variants, assistant)
 
 
-def judge(args: argparse.Namespace, data: Dataset, names: Sequence[str], variants: HariRules) -> int:
+def judge(
+    args: argparse.Namespace, data: Dataset, names: Sequence[str], variants: HariRules, assistant: Assistant | None
+) -> int:
     """The table, and what goes into --out."""
     import json
 
@@ -94,7 +104,7 @@ def judge(args: argparse.Namespace, data: Dataset, names: Sequence[str], variant
             catalogue = catalogue_of(args)
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
         agents = {name: agent(args.kind, name, worlds, args.rules) for name in names}
-        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants)
+        whole = data.split(split, worlds=worlds, vnla=args.rules, hari=variants, assistant=assistant)
         rows += evaluate(whole, agents, seed=args.seed, limit=args.tasks, keep=keep, watch=watch)
     if args.out:
         tables.save(rows, args.out, "table")
@@ -108,6 +118,7 @@ def judge(args: argparse.Namespace, data: Dataset, names: Sequence[str], variant
             tasks=args.tasks,
             rules=args.rules,
             hari=dataclasses.asdict(variants),
+            assistant=args.assistant,
         )
         write_bytes(args.out / "run.json", (json.dumps(facts, indent=1) + "\n").encode())
     columns = COLUMNS.get(args.kind, ("success", "spl", "navigation error", "steps"))

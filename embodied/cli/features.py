@@ -18,6 +18,24 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.vision import run as vision
+    from agents.common.device import check_device
+    from agents.vision.occasions import OCCASIONS
+    from agents.vision.run import encoder_of, make_features
 
-    return vision.run_features(args, note)
+    check_device(args.device)
+    encoder = encoder_of(args.encoder, args.network).to(args.device)
+    make_features(
+        args.data,
+        encoder,
+        args.cache,
+        quality=args.quality,
+        splits=args.split or (),
+        first=args.houses,
+        lights=args.lights,
+        threads=args.threads,
+        workers=args.workers,
+        ray=args.ray,
+        shown=[OCCASIONS[word] for word in args.shown],
+        note=note,
+    )
+    return 0

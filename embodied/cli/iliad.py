@@ -115,7 +115,7 @@ def walks(args: argparse.Namespace) -> int:
         raise ValueError(
             "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
         )
-    source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
+    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
     config: NavConfig = config_of(args.student)
     teacher = args.teacher or config.teacher
     if teacher == "learned" and args.shared is None:

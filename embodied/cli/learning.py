@@ -14,8 +14,9 @@ from pathlib import Path
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import DECISIONS, RatingConfig
+from agents.common.settings import EvaluationSettings
 from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER
-from agents.hanna.training_config import SCALES, TrainingConfig
+from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
@@ -27,14 +28,14 @@ from embodied.cli.common import add_cache, add_json
 from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
 
 
-def add_common(parser: argparse.ArgumentParser) -> None:
+def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
     """Options that all of them share."""
     parser.add_argument(
         "--data", type=any_path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built"
     )
     add_cache(parser)
     parser.add_argument(
-        "--threads", type=whole(), default=2, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+        "--threads", type=whole(), default=threads, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
     )
 
 
@@ -92,9 +93,51 @@ def add_judged_tasks(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_agents_side_by_side(parser: argparse.ArgumentParser) -> None:
+def add_study(
+    parser: argparse.ArgumentParser, tables: str, *, seeds: int = 3, data: str | None = None, threads: bool = True
+) -> None:
+    """Options of every study.
+
+    Args:
+      tables: what there are, for the help; '' for a study of one table.
+      seeds: how many by default; 0 for a study that trains nothing.
+      data: help of --data, where the study has one of another kind.
+    """
+    if tables:
+        parser.add_argument("tables", nargs="+", metavar="TABLE", help=f"tables to make: {tables}")
+    if data:
+        parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help=data)
     parser.add_argument(
-        "--workers", type=whole(), default=2, metavar="N", help="agents trained side by side (default: %(default)s)"
+        "--out",
+        type=folder_to_write,
+        required=True,
+        metavar="DIR",
+        help="folder of the study: runs, episodes and tables; the same command goes on",
+    )
+    if seeds:
+        parser.add_argument(
+            "--seeds",
+            type=whole(1, REPEATS),
+            default=seeds,
+            metavar="N",
+            help="training seeds of each row, from --seed on (default: %(default)s)",
+        )
+    parser.add_argument(
+        "--rows", nargs="+", metavar="LABEL", help="run only the rows of these labels; tables say which they lack"
+    )
+    parser.add_argument(
+        "--workers", type=whole(), default=1, metavar="N", help="runs side by side (default: %(default)s)"
+    )
+    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
+    if threads:
+        parser.add_argument(
+            "--threads", type=whole(), default=1, metavar="N", help="of PyTorch, per run (default: %(default)s)"
+        )
+
+
+def add_judge_seed(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
     )
 
 
@@ -122,10 +165,14 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
         "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
     )
     _add_lights(parser)
+    _add_strips_folder(parser)
+    add_quality(parser)
+
+
+def _add_strips_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strips", type=folder_to_write, metavar="DIR", help="where strips go, to share them (default: OUT/strips)"
     )
-    add_quality(parser)
 
 
 def _add_lights(parser: argparse.ArgumentParser) -> None:
@@ -140,21 +187,16 @@ def _add_lights(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_vision(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "tables", nargs="+", choices=("encoders", "pictures"), metavar="TABLE", help="encoders, pictures"
-    )
-    add_common(parser)
-    parser.set_defaults(threads=1)  # per encoder; they are trained side by side
-    _add_strips(parser)
-    parser.add_argument(
-        "--rows",
-        nargs="+",
-        metavar="NAME",
-        help="train and judge these encoders only (default: all, or none where --encoders are given)",
-    )
+    add_common(parser, threads=1)
+    add_study(parser, "encoders, pictures", seeds=1, threads=False)
+    add_device(parser)
+    _add_lights(parser)
+    _add_strips_folder(parser)
+    add_quality(parser)
     _add_named_encoders(
         parser,
-        "encoders that are there already, to be judged as well; those of one name are training seeds of one kind",
+        "encoders that are there already, to be judged instead of those that --rows names; those of one name are "
+        "training seeds of one kind",
     )
     parser.add_argument(
         "--pictures",
@@ -166,16 +208,6 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--split", default="val_unseen", help="whose houses encoders are judged on (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--seeds",
-        type=whole(1, REPEATS),
-        default=1,
-        metavar="N",
-        help="encoders per row, from --seed on (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="encoders trained side by side (default: %(default)s)"
     )
     add_fields(parser, VisionConfig, skip=("network", "begin", "frozen", "like"))
 
@@ -219,6 +251,7 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     add_begin(parser)
     add_fields(parser, TrainingConfig, scales=SCALES)
+    add_fields(parser, HannaEvaluation, scales=EVALUATIONS)
 
 
 def add_begin(parser: argparse.ArgumentParser) -> None:
@@ -236,40 +269,26 @@ def add_train_vnla(parser: argparse.ArgumentParser) -> None:
     add_run(parser, VNLA_SCALES)
     add_device(parser)
     add_fields(parser, VnlaSettings, words=VNLA_WORDS, scales=VNLA_SCALES)
+    add_fields(parser, EvaluationSettings)
 
 
 def add_study_vnla(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="askers, interventions, rooms or rules")
-    add_common(parser)
+    add_common(parser, threads=1)
     add_encoder(parser)
-    parser.set_defaults(threads=1)  # per agent; they are trained side by side
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="agents, episodes and tables; the same command goes on",
-    )
+    add_study(parser, "askers, interventions, rooms or rules", threads=False)
     parser.add_argument(
         "--without-rooms", type=any_path, metavar="DIR", help="a data set of --no-rooms, for the table 'rooms'"
     )
     add_scale(parser, VNLA_SCALES)
     parser.add_argument(
-        "--seeds",
-        type=whole(1, REPEATS),
-        default=3,
+        "--others",
+        type=whole(),
         metavar="N",
-        help="agents of the learned asker, from --seed on (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--others", type=whole(), metavar="N", help="agents of every other row (default: as many as --seeds)"
-    )
-    parser.add_argument(
-        "--rows", nargs="+", metavar="NAME", help="train and judge these only; tables say which rows they lack"
+        help="training seeds of every row but the learned asker's (default: --seeds)",
     )
     add_judged_tasks(parser)
-    add_agents_side_by_side(parser)
     add_fields(parser, VnlaSettings, skip=("asker", "ask_rules", "rules"), scales=VNLA_SCALES)
+    add_fields(parser, EvaluationSettings)
 
 
 def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
@@ -300,41 +319,29 @@ def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 
 def _add_hari(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> None:
-    add_common(parser)
-    parser.set_defaults(threads=1)
+    add_common(parser, threads=1)
     add_run(parser, scales)
 
 
 def add_study_hari(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "tables", nargs="+", metavar="TABLE", help="4.7, 4.8, moves, sight, 'figure 4.5' or 'figure 4.6'"
-    )
-    _add_hari(parser, INTENTION_SCALES)
+    add_common(parser, threads=1)
+    add_study(parser, "4.7, 4.8, moves, sight, 'figure 4.5', 'figure 4.5b' or 'figure 4.6'", threads=False)
+    add_scale(parser, INTENTION_SCALES)
     parser.add_argument(
         "--execution",
         type=any_path,
         metavar="FILE",
         help="a trained execution policy (default: trained in --out first)",
     )
-    parser.add_argument(
-        "--seeds",
-        type=whole(1, REPEATS),
-        default=3,
-        metavar="N",
-        help="agents per row, from --seed on (default: %(default)s)",
-    )
     add_judged_tasks(parser)
-    add_agents_side_by_side(parser)
     add_encoder(parser)
     skip = ("stack", "cooperative", "perfect")
     add_fields(parser, IntentionConfig, scales=INTENTION_SCALES, skip=skip, words={"states": STATES})
 
 
-def add_study(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "tables", nargs="+", metavar="TABLE", help="4.3, 4.4, 4.5, 4.6, D.2, houses, lights, departures or requests"
-    )
-    add_common(parser)
+def add_study_hanna(parser: argparse.ArgumentParser) -> None:
+    add_common(parser, threads=1)
+    add_study(parser, "4.3, 4.4, 4.5, 4.6, D.1, D.2, houses, lights, departures or requests", seeds=1, threads=False)
     parser.add_argument(
         "--encoder",
         type=any_path,
@@ -342,56 +349,25 @@ def add_study(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="an encoder of `embodied train vision` (default: shipped)",
     )
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="agents, episodes and tables; the same command goes on",
-    )
     add_scale(parser, SCALES)
     add_judged_tasks(parser)
-    parser.add_argument(
-        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--seeds",
-        type=whole(1, REPEATS),
-        default=1,
-        metavar="N",
-        help="agents per row, from --seed on (default: %(default)s)",
-    )
+    add_judge_seed(parser)
     parser.add_argument(
         "--judged-in",
         type=any_path,
         metavar="DIR",
-        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data); "
-        "its tables go into a folder of their own in --out",
-    )
-    parser.add_argument(
-        "--rows",
-        nargs="+",
-        metavar="NAME",
-        help="train and judge these agents only, such as 'final' or '8 houses'; tables are written anew with these and "
-        "say which agents they lack",
+        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
     )
     add_quality(parser)
-    add_agents_side_by_side(parser)
     add_device(parser)
     add_begin(parser)
-    parser.set_defaults(threads=1)  # per agent; they are trained side by side
     add_fields(parser, TrainingConfig, skip=("training_houses", "lights"), scales=SCALES)
+    add_fields(parser, HannaEvaluation, scales=EVALUATIONS)
 
 
 def add_study_realism(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="episodes, table and figure; the same command goes on",
-    )
+    add_study(parser, "", seeds=0, threads=False)
     parser.add_argument(
         "--agents",
         type=_named_file,
@@ -419,9 +395,7 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         "--houses", type=whole(), metavar="N", help="only those in its first so many houses (default: all)"
     )
     add_judged_tasks(parser)
-    parser.add_argument(
-        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
-    )
+    add_judge_seed(parser)
 
 
 def _add_named_encoders(parser: argparse.ArgumentParser, what: str) -> None:
@@ -439,7 +413,10 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
     parser.add_argument(
-        "--agent", type=any_path, default=SHIPPED_AGENT, metavar="FILE", help="a trained agent (default: shipped)"
+        "--agent",
+        type=any_path,
+        metavar="FILE",
+        help="a trained agent (default: the shipped one of the data set's kind)",
     )
     parser.add_argument("--split", nargs="+", help="which splits (default: test_unseen; HARI: all three of test)")
     parser.add_argument(
@@ -463,32 +440,8 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "tables",
-        nargs="+",
-        choices=("3.2", "3.4", "3.5", "held-out"),
-        metavar="TABLE",
-        help="3.2, 3.4, 3.5 or held-out",
-    )
-    parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help="corpus of `embodied corpus`")
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="runs, tables and figures; the same command goes on",
-    )
-    parser.add_argument(
-        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
-    )
+    add_study(parser, "3.2, 3.4, 3.5 or held-out", data="corpus that `embodied corpus` made")
     add_scale(parser, BANDIT_SCALES)
-    parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="runs side by side (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--threads", type=whole(), default=1, metavar="N", help="of PyTorch, per run (default: %(default)s)"
-    )
-    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
 
 
@@ -515,22 +468,11 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("tables", nargs="+", metavar="TABLE", help="3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
+    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
-    _add_iliad(parser)
+    add_scale(parser, REGEX_SCALES)
     _add_regex_files(parser)
     add_nav_data(parser, required=False)
-    parser.add_argument(
-        "--seeds",
-        type=whole(1, REPEATS),
-        default=3,
-        metavar="N",
-        help="students per row, from --seed on (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="students side by side (default: %(default)s)"
-    )
-    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
     add_fields(parser, LearnerConfig, scales=LEARNER_SCALES, skip=("learner", "mixing", "anneal_every"))
     add_fields(parser, RegexConfig, scales=REGEX_SCALES, skip=("wrong", "unheard"))
     add_fields(parser, NavConfig, scales=NAV_SCALES, skip=SHARED_SETTINGS)
@@ -576,21 +518,11 @@ def _add_regex_files(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_stars(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
+    add_common(parser, threads=1)
     add_encoder(parser)
+    add_study(parser, "", threads=False)
     parser.add_argument(
         "--agent", type=any_path, default=SHIPPED_AGENT, metavar="FILE", help="agent to begin with (default: shipped)"
-    )
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        required=True,
-        metavar="DIR",
-        help="agents, episodes, table and figure; the same command goes on",
-    )
-    parser.add_argument("--only", nargs="+", metavar="RATER", help="which raters, such as 'skew 4' (default: all)")
-    parser.add_argument(
-        "--seeds", type=whole(1, REPEATS), default=3, metavar="N", help="repeats, from --seed on (default: %(default)s)"
     )
     parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
     parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")
@@ -611,5 +543,4 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="judge every task so often, each time with another seed (default: %(default)s)",
     )
-    parser.set_defaults(threads=1)
     add_fields(parser, RatingConfig)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from embodied.cli.common import note
 
 if TYPE_CHECKING:
+    from agents.common.lessons import Lessons
     from embodied.interface import Episode
 
 WATCHED = 2
@@ -57,44 +58,62 @@ def run(args: argparse.Namespace) -> int:
 
 def run_vision(args: argparse.Namespace) -> int:
     """Draw the houses of a data set, teach an encoder to name and place what is in them, and read how well it sees."""
+    from agents.common.device import use_threads
     from agents.vision.config import VisionConfig
-    from agents.vision.run import run_train_vision
+    from agents.vision.drawn import StripSource
+    from agents.vision.run import train_vision
     from embodied.cli.options import chosen
 
-    return run_train_vision(args, chosen(args, VisionConfig()), note)
+    use_threads(args.threads)
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
+    how = {"like": args.example, "device": args.device, "workers": args.workers}
+    train_vision(source, chosen(args, VisionConfig()), args.out, **how, note=note)
+    return 0
 
 
 def run_hanna(args: argparse.Namespace) -> int:
     """Teach an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`."""
-    from agents.hanna.run import run_train_hanna
-    from agents.hanna.training_config import SCALES
+    from agents.hanna.run import train_agent
+    from agents.hanna.training_config import EVALUATIONS, SCALES
     from embodied.cli.options import chosen
 
-    return run_train_hanna(
-        args, chosen(args, SCALES[args.scale]), note, on_validation=_recorder(args) if args.rrd else None
-    )
+    config, evaluation = chosen(args, SCALES[args.scale]), chosen(args, EVALUATIONS[args.scale])
+    watch = _recorder(args) if args.rrd else None
+    how = {"minutes": args.minutes, "begin": args.begin, "note": note, "on_validation": watch}
+    train_agent(_lessons(args, "hanna"), config, evaluation, args.out, **how)
+    return 0
 
 
 def run_vnla(args: argparse.Namespace) -> int:
     """Teach an agent by imitation to navigate by one view, to ask an advisor within a budget and to do what it says."""
-    from agents.common.lessons import Lessons
-    from agents.common.parallel import join_launcher, use_threads
-    from agents.vision.run import encoder_of
+    from agents.common.settings import EvaluationSettings
     from agents.vnla.config import SCALES
-    from agents.vnla.run import train_agent, vnla_data
+    from agents.vnla.run import train_agent
     from embodied.cli.options import chosen
 
-    use_threads(args.threads)
-    config = chosen(args, SCALES[args.scale])
-    lessons = Lessons(vnla_data(args.data), encoder_of(args), args.quality, join_launcher(args.device))
+    config, evaluation = chosen(args, SCALES[args.scale]), chosen(args, EvaluationSettings())
     watch = _recorder(args) if args.rrd else None
-    train_agent(lessons, config, args.out, minutes=args.minutes, note=note, on_validation=watch)
+    how = {"minutes": args.minutes, "note": note, "on_validation": watch}
+    train_agent(_lessons(args, "vnla"), config, evaluation, args.out, **how)
     return 0
+
+
+def _lessons(args: argparse.Namespace, kind: str) -> Lessons:
+    """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
+    from agents.common.device import use_threads
+    from agents.common.lessons import Lessons
+    from agents.common.parallel import join_launcher
+    from agents.vision.run import encoder_of
+    from embodied.datasets.store import dataset_of
+
+    use_threads(args.threads)
+    encoder = encoder_of(args.encoder, args.network)
+    return Lessons(dataset_of(args.data, kind), encoder, args.quality, join_launcher(args.device))
 
 
 def run_hari(args: argparse.Namespace) -> int:
     """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
-    from agents.common.parallel import use_threads
+    from agents.common.device import use_threads
     from agents.hari.agent import load_executor
     from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
     from agents.hari.run import hari_data, train_execution, train_intention, with_eyes
@@ -105,7 +124,7 @@ def run_hari(args: argparse.Namespace) -> int:
     data = hari_data(args.data)
     if args.phase == "execution":
         config = chosen(args, EXECUTION_SCALES[args.scale])
-        encoder = encoder_of(args).digest if config.sees == "features" else ""
+        encoder = encoder_of(args.encoder, args.network).digest if config.sees == "features" else ""
         how = {"quality": args.quality, "begin": args.begin, "minutes": args.minutes}
         train_execution(data, config, args.out, encoder=encoder, note=note, **how)
     else:
@@ -119,33 +138,37 @@ def run_hari(args: argparse.Namespace) -> int:
 def run_iliad(args: argparse.Namespace) -> int:
     """Teach a student to change words or to follow routes as a request says, by descriptions (ADEL), demonstrations or
     rewards."""
-    from agents.common.parallel import use_threads
+    from agents.common.device import use_threads
 
     use_threads(args.threads)
     return {"regex": run_regex, "nav": run_nav}[args.world](args)
 
 
 def run_regex(args: argparse.Namespace) -> int:
+    from agents.iliad.config import folder_name
     from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, students_of
     from agents.iliad.regex.run import learn, prepare
     from embodied.cli.options import chosen
 
     regex, learner = chosen(args, REGEX_SCALES[args.scale]), chosen(args, LEARNER_SCALES[args.scale])
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
-    learn(grounds, learner, args.out / "students" / students_of(regex), minutes=args.minutes, note=note)
+    home = args.out / "students" / students_of(regex) / f"seed_{learner.seed}"
+    learn(grounds, learner, home / folder_name(learner), home / "pretraining", minutes=args.minutes, note=note)
     return 0
 
 
 def run_nav(args: argparse.Namespace) -> int:
-    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, nav_students_of
+    from agents.iliad.config import folder_name
+    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES
     from agents.iliad.nav.run import NavSource, learn, prepare
     from agents.vision.run import encoder_of
     from embodied.cli.options import chosen
 
     nav, learner = chosen(args, NAV_SCALES[args.scale]), chosen(args, NAV_LEARNER_SCALES[args.scale])
-    source = NavSource(args.data, encoder_of(args).digest, args.quality, args.cache)
+    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
     grounds = prepare(nav, source, args.out / "shared", note=note)
-    learn(grounds, learner, args.out / "students" / nav_students_of(nav), minutes=args.minutes, note=note)
+    home = args.out / "students" / nav.teacher / f"seed_{learner.seed}" / folder_name(learner)
+    learn(grounds, learner, home, minutes=args.minutes, note=note)
     return 0
 
 

@@ -12,7 +12,7 @@ import shapely
 from assets.cache import digest
 from embodied.datasets.build import VERSION, DatasetConfig
 from embodied.house.house import House
-from embodied.interface import Episode, FindObject, Place, Route, Task
+from embodied.interface import Episode, FindObject, FollowRoute, Place, Route, Task
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError, from_plain, read_json
 
@@ -177,6 +177,8 @@ def _wrong_task(task: Task, kind: str, house: House, graph: NavGraph) -> str | N
 def _wrong_goal(task: Task, house: House, graph: NavGraph, edges: Edges) -> str | None:
     if isinstance(task.goal, FindObject):
         return _wrong_object(task.goal, house)
+    if not isinstance(task.goal, FollowRoute):
+        return f"a data set holds no goals of kind {type(task.goal).__name__}"
     ends = (task.goal.path[0], (task.goal.path[-1],))
     if ends != (task.start.node, task.goal_nodes):
         return f"it starts at {task.start.node} and ends at {task.goal_nodes}, its route at {ends}"

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from embodied.envs.make import look_of
 from embodied.interface import Language, Place, Route, Task
 from embodied.seeds import stream
+from embodied.tasks.ask import ask_pool, ask_tasks
 from embodied.tasks.find import Pool, find_pool, find_task
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
@@ -40,6 +42,9 @@ def part_tasks(
     """
     if kind == "vln":
         return {part: _vln(world, routes, part, n) for part, n in parts}
+    if kind == "ask":
+        asked = ask_pool(world, look_of(getattr(world, "catalogue", None)), seed=seed)
+        return {part: ask_tasks(asked, n, seed=seed) for part, n in parts}
     if kind == "hari":
         return {part: _hari(world, part, n, seed=seed, language=language) for part, n in parts}
     if kind == "find":

@@ -7,6 +7,7 @@ does, what stopping does, and what may be asked.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import TypeVar
 
@@ -16,7 +17,9 @@ from embodied.interface import (
     Ask,
     Assistant,
     Description,
+    Detection,
     Episode,
+    FindDescribed,
     FindObject,
     Intention,
     Mode,
@@ -110,7 +113,8 @@ class HelpEnv:
             self._moved()
         elif isinstance(action, Ask):
             rng = stream(self.seed, "assistant", self.task.id, self.time)
-            reply = required(self.assistant, "assistant").answer(situation, action.intention, rng=rng)
+            asked = dataclasses.replace(situation, question=action.question or "")
+            reply = required(self.assistant, "assistant").answer(asked, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)
         else:
@@ -208,6 +212,15 @@ class HelpEnv:
     def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
         return (), ()
 
+    def _possible(self) -> tuple[str, ...]:
+        return ()
+
+    def _detections(self) -> tuple[Detection, ...]:
+        return ()
+
+    def _advised(self) -> Move | Stop | None:
+        return None
+
     # Looking -------------------------------------------------------------------------------------
 
     def _budget(self) -> int | None:
@@ -240,6 +253,7 @@ class HelpEnv:
             requests_left=left,
             trail=tuple(self._trail),
             goals=self._stack(),
+            possible=self._possible(),
         )
         state, goals = self._descriptions()
         self.observation = Observation(
@@ -256,6 +270,8 @@ class HelpEnv:
             time_on_task=self.time_on_task,
             state_description=state,
             goal_descriptions=goals,
+            detections=self._detections(),
+            advised=self._advised(),
             moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
         )
         return self.observation
@@ -305,8 +321,10 @@ def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
         raise TaskError(
             f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again"
         )
-    if isinstance(task.goal, FindObject):
-        gone = [p for p in task.goal.placements if p not in world.house.placement_by_id]
+    if isinstance(task.goal, FindObject | FindDescribed):
+        goal = task.goal
+        sought = goal.placements if isinstance(goal, FindObject) else (goal.placement, *goal.fitting, *goal.similar)
+        gone = [p for p in sought if p not in world.house.placement_by_id]
         if gone:
             raise TaskError(f"task {task.id!r} looks for {gone}, not in the house {task.world!r}; sample it again")
     if task.horizon < 1 or (task.budget is not None and task.budget < 0):

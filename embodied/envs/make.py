@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 import importlib
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
 from embodied.assistants.anna import Anna
+from embodied.assistants.ask import AskAssistant
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
+from embodied.envs.ask import AskEnv, AskRules
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
@@ -18,6 +21,12 @@ from embodied.envs.vnla import RULES, check_rules, fitted, teacher_of
 from embodied.interface import Assistant, Language, Place, Route, Task
 from embodied.language.plain import PlainLanguage
 
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.house.house import Placement
+    from embodied.tasks.ask import Look
+
+ASK_RULES = AskRules()
 AS_PUBLISHED = "indirect"
 """VNLA as its program plays it: help is put into words."""
 
@@ -68,7 +77,34 @@ def environment_maker(
         asked = assistant or (willing if hari.cooperative else Uncooperative(willing))
         moves = PanoramicMoves()
         return lambda: HariEnv(worlds, asked, say, costs=hari.costs, moves=moves, states=hari.states)
+    if kind == "ask":
+        catalogues = (getattr(w, "catalogue", None) for w in worlds.values())
+        return ask_environment_maker(worlds, look_of(next(catalogues, None)), assistant=assistant)
     raise ValueError(f"unknown kind of task {kind!r}")
+
+
+def ask_environment_maker(
+    worlds: Mapping[str, Place], look: Look, rules: AskRules = ASK_RULES, assistant: Assistant | None = None
+) -> Callable[[], HelpEnv]:
+    """A maker of Ask-v0's environments.
+
+    Args:
+      look: words of colour and material of things.
+      assistant: who answers, instead of AskAssistant.
+    """
+    answering, moves, describer = assistant or AskAssistant(look), PanoramicMoves(), Describer(())
+    return lambda: AskEnv(worlds, answering, moves, rules, describer)
+
+
+def look_of(catalogue: Catalogue | None) -> Look:
+    """The first word of colour and of material that a catalogue has for a thing; none without a catalogue."""
+    assets = {} if catalogue is None else catalogue.assets
+
+    def look(p: Placement) -> tuple[str, ...]:
+        asset = assets.get(p.asset)
+        return () if asset is None else (*asset.colours[:1], *asset.materials[:1])
+
+    return look
 
 
 def assistant_of(named: Assistant | str | None) -> Assistant | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from embodied.datasets.matterport import REGIONS
 from embodied.evaluation.metrics import navigation_error
-from embodied.evaluation.tables import Estimate, Row, estimate, ratio
+from embodied.evaluation.tables import Estimate, Row, estimate
 from embodied.interface import Ask, Episode, Mode, Place, Stop
 
 if TYPE_CHECKING:
@@ -81,14 +81,15 @@ def row(agent: str, split: str, episodes: Sequence[Episode], places: Mapping[str
     graphs = {name: place.graph for name, place in places.items()}
     values: dict[str, Estimate]
     if kind == "hanna":
-        pairs = [hanna_targets(e, graphs[e.task.world]) for e in episodes]
-        values = {"target success (HANNA)": ratio(pairs, groups)}
+        near, left = zip(*[hanna_targets(e, graphs[e.task.world]) for e in episodes], strict=True)
+        values = {"target success (HANNA)": estimate(near, groups, weights=left)}
     elif kind == "vnla":
         rooms = [vnla_room_success(e, places[e.task.world]) for e in episodes]
-        values = {"room success (VNLA)": estimate(rooms, groups)}
+        values = {"room success (VNLA)": estimate(rooms, groups, share=True)}
     elif kind == "vln":
         judges = {"success (R2R)": r2r_success, "oracle success (R2R)": r2r_oracle_success}
-        values = {n: estimate([f(e, graphs[e.task.world]) for e in episodes], groups) for n, f in judges.items()}
+        of = lambda f: [f(e, graphs[e.task.world]) for e in episodes]
+        values = {n: estimate(of(f), groups, share=True) for n, f in judges.items()}
     else:
         raise ValueError(f"no published program judges {kind!r} tasks otherwise than we do; leave --as-programs out")
     return Row(agent, split, seed, len(episodes), len(set(groups)), values)

@@ -12,10 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Ask, Episode, FollowRoute, Intention, Mode, Move, Stop
+from embodied.interface import Ask, Episode, FollowRoute, Intention, Mode, Move, Stop, Usage
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
+
+
+ASK_QUESTIONS = (
+    Intention.CONFIRM,
+    Intention.APPEARANCE,
+    Intention.REGION,
+    Intention.ROUTE,
+    Intention.DISAMBIGUATE,
+    Intention.FREE,
+)
 
 
 def navigation_error(episode: Episode, graph: NavGraph) -> float:
@@ -177,6 +187,29 @@ def moves(episode: Episode, graph: NavGraph) -> float:
     return float(sum(isinstance(s.action, Move) for s in episode.steps))
 
 
+def price(episode: Episode, graph: NavGraph) -> float:
+    """Ask-v0: what the questions cost."""
+    return float(sum(s.cost for s in episode.steps))
+
+
+def weighted_success(episode: Episode, graph: NavGraph) -> float:
+    """Ask-v0: success less the price of the questions, never below 0."""
+    return success(episode, graph) * max(0.0, 1.0 - price(episode, graph))
+
+
+QUESTION_LIMITS = range(1, 6)
+
+
+def success_progress(episode: Episode, graph: NavGraph) -> float:
+    """Ask-v0: mean over the limits of 1 to 5 questions of succeeding within the limit.
+
+    After the Mean Success Progress of VL-LN Bench, which runs every limit by itself; here the questions that were
+    asked are counted.
+    """
+    kept = sum(episode.requests <= limit for limit in QUESTION_LIMITS)
+    return success(episode, graph) * kept / len(QUESTION_LIMITS)
+
+
 PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
     "success": success,
     "spl": spl,
@@ -187,10 +220,34 @@ PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
     "steps": steps,
 }
 """The numbers every task reports, by name, in the order of their columns."""
+USAGE: dict[str, Callable[[Usage], float]] = {
+    "model calls": lambda u: u.calls,
+    "tokens in": lambda u: u.tokens_in,
+    "tokens out": lambda u: u.tokens_out,
+    "model price": lambda u: u.price,
+    "invalid answers": lambda u: u.invalid,
+    "refusals": lambda u: u.refusals,
+}
+"""What episodes with a language model report besides, per episode."""
+
+
+def usage(episode: Episode) -> Usage | None:
+    """What language models were asked in an episode, as agent and as assistant; None where there was none."""
+    asked = [s.action.thought.usage for s in episode.steps if s.action.thought and s.action.thought.usage]
+    asked += [s.reply.usage for s in episode.steps if s.reply and s.reply.usage]
+    return sum(asked, Usage()) if asked else None
+
+
 PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {
     "hanna": {"subtask success": subtask_success},
     "vnla": {"room success": room_success},
     "vln": {"nDTW": route_ndtw, "SDTW": route_sdtw},
     "hari": {"CUR": asked(Intention.CUR), "GOAL": asked(Intention.GOAL), "SUB": asked(Intention.SUB), "DO": moves},
+    "ask": {
+        "weighted success": weighted_success,
+        "success progress": success_progress,
+        "price": price,
+        **{f"asks {q.value}": asked(q) for q in ASK_QUESTIONS},
+    },
 }
 """What only some kinds of task report."""

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.stats
 from scipy.special import stdtrit
 
 from assets.cache import write_bytes
@@ -28,6 +27,8 @@ PERCENT = (
     "oracle success",
     "room success",
     "subtask success",
+    "weighted success",
+    "success progress",
     "mistake repeat",
     "request repeat",
     "target success (HANNA)",
@@ -36,6 +37,8 @@ PERCENT = (
     "oracle success (R2R)",
 )
 """Columns shown in per cent."""
+SHARES = ("success", "oracle success", "room success")
+"""Those that are 0 or 1 of an episode."""
 
 
 @dataclass(frozen=True)
@@ -59,37 +62,108 @@ class Row:
     values: Mapping[str, Estimate]
 
 
-def estimate(values: Sequence[float], groups: Sequence[str], repeats: Sequence[int] | None = None) -> Estimate:
-    """Mean with a 95 % interval by Student's t, whose standard error is clustered by house.
+@dataclass(frozen=True)
+class Samples:
+    """What was counted, once per episode, sentence or run, and is to be averaged."""
 
-    The t of k houses has k - 1 degrees of freedom (2.09 for 20 houses, 3.18 for 4): the standard
-    error is itself estimated from so many independent values (Cameron and Miller 2015, section VI).
-    Episodes of one house share its rooms and its routes, so they are not independent; with a
-    single house the interval treats them as if they were. NaN values do not count.
+    values: tuple[float, ...]
+    groups: tuple[str, ...] = ()
+    """What each value belongs to, such as its house; values of one group are not independent. (): each stands alone."""
+    weights: tuple[float, ...] = ()
+    """What each value is out of; the mean is then the ratio of both sums. (): out of one."""
+    share: bool = False
+    """Whether each value is 0 or 1."""
+
+
+def interval(runs: Sequence[Samples]) -> Estimate:
+    """The estimate of what was counted in one run per training seed; see `estimate`."""
+    each = [(v, g, w, k) for k, run in enumerate(runs) for v, g, w in _rows(run)]
+    if not each:
+        return Estimate(math.nan, math.nan, 0)
+    values, groups, weights, repeats = zip(*each, strict=True)
+    ratio = weights if any(run.weights for run in runs) else None
+    return estimate(values, groups, repeats, weights=ratio, share=all(run.share for run in runs))
+
+
+def less(first: Samples, second: Samples) -> Samples:
+    """How far `first` lies above `second`, value by value, which stand for the same tasks in the same order.
+
+    Raises:
+      ValueError: they do not.
+    """
+    if first.groups != second.groups or len(first.values) != len(second.values):
+        raise ValueError("only agents that were given the same tasks in the same order can be compared task by task")
+    pairs = zip(_linear(first), _linear(second), strict=True)
+    return Samples(tuple(a - b for a, b in pairs), first.groups)
+
+
+def _linear(run: Samples) -> tuple[float, ...]:
+    """The values; of a ratio what varies about as it does, with its mean (the delta method)."""
+    total = math.fsum(run.weights)
+    if not run.weights:
+        return run.values
+    if not total:
+        return (math.nan,) * len(run.values)
+    ratio, scale = math.fsum(run.values) / total, len(run.values) / total
+    return tuple(ratio + (v - ratio * w) * scale for v, w in zip(run.values, run.weights, strict=True))
+
+
+def _rows(run: Samples) -> list[tuple[float, str, float]]:
+    n = len(run.values)
+    return [*zip(run.values, run.groups or map(str, range(n)), run.weights or (1.0,) * n, strict=True)]
+
+
+def estimate(
+    values: Sequence[float],
+    groups: Sequence[str],
+    repeats: Sequence[int] | None = None,
+    *,
+    weights: Sequence[float] | None = None,
+    share: bool = False,
+) -> Estimate:
+    """Mean with a 95 % interval by Student's t: tasks nested in houses, crossed with training seeds.
+
+    Episodes of one house share its rooms and its routes, so they are not independent: the standard error is clustered
+    by house, and the t of k houses has k - 1 degrees of freedom (2.09 for 20 houses, 3.18 for 4), since it is itself
+    estimated from so many independent values (Cameron and Miller 2015, section VI). With a single house the interval
+    treats episodes as if they were independent. Episodes of one training seed are not independent either: the variances
+    of both clusterings are added and that of their crossing subtracted (Cameron, Gelbach and Miller 2011), never below
+    the larger of the two; degrees of freedom by Satterthwaite. Where each house (or value) has one seed alone, the
+    seeds are the clusters. NaN values do not count; of a single value there is no interval.
 
     Args:
-      repeats: the training seed behind each value. Where there are several, values of one seed are not independent
-        either: the variances of both clusterings are added and that of their crossing subtracted (Cameron, Gelbach
-        and Miller 2011), never below the larger of the two; degrees of freedom by Satterthwaite.
+      repeats: the training seed behind each value.
+      weights: what each value is out of; the mean is then the ratio of both sums (Table 4.6).
+      share: values are 0 or 1. Where all are alike, such as 40 of 40, the interval reaches to the exact bound of
+        Clopper and Pearson (1934), 91.2 %, each task counted once however many seeds were judged on it.
     """
     seeds = repeats if repeats is not None else [0] * len(groups)
-    kept = [(v, g, r) for v, g, r in zip(values, groups, seeds, strict=True) if not math.isnan(v)]
-    n = len(kept)
-    if n == 0:
-        return Estimate(float("nan"), float("nan"), 0)
-    mean = math.fsum(v for v, _, _ in kept) / n
-    alone = len(set(groups)) == 1
-    houses = [str(i) if alone else g for i, (_, g, _) in enumerate(kept)]
-    off = [v - mean for v, _, _ in kept]
+    outs = weights if weights is not None else [1.0] * len(groups)
+    kept = [(v, g, r, w) for v, g, r, w in zip(values, groups, seeds, outs, strict=True) if not math.isnan(v)]
+    total = math.fsum(w for *_, w in kept)
+    if not total:
+        return Estimate(math.nan, math.nan, 0)
+    n, mean = len(kept), math.fsum(v for v, *_ in kept) / total
+    count = round(total) if weights is not None else n
+    alone = len({g for _, g, *_ in kept}) == 1
+    houses = [str(i) if alone else g for i, (_, g, *_) in enumerate(kept)]
+    off = [(v - mean * w) * n / total for v, _, _, w in kept]
+    runs = [str(r) for _, _, r, _ in kept]
+    if share and mean in (0.0, 1.0):
+        return Estimate(mean, 1 - 0.025 ** (len(set(runs)) / n), count)
+    if n == 1:
+        return Estimate(mean, math.nan, count)
     by_house, k = _clustered(off, houses)
-    if len(set(seeds)) == 1:
-        return Estimate(mean, _t(k - 1) * math.sqrt(by_house), n)
-    by_seed, m = _clustered(off, [str(r) for _, _, r in kept])
-    crossed, _ = _clustered(off, [f"{h} {r}" for h, (_, _, r) in zip(houses, kept, strict=True)])
+    if len(set(runs)) == 1:
+        return Estimate(mean, _t(k - 1) * math.sqrt(by_house), count)
+    by_seed, m = _clustered(off, runs)
+    crossed, cells = _clustered(off, [f"{h} {r}" for h, r in zip(houses, runs, strict=True)])
+    if cells == k:  # no house was seen by two seeds
+        return Estimate(mean, _t(m - 1) * math.sqrt(by_seed), count)
     variance = max(by_house + by_seed - crossed, by_house, by_seed)
     parts = by_house**2 / max(k - 1, 1) + by_seed**2 / max(m - 1, 1)
     freedom = (by_house + by_seed) ** 2 / parts if parts else 1.0
-    return Estimate(mean, _t(freedom) * math.sqrt(variance), n)
+    return Estimate(mean, _t(freedom) * math.sqrt(variance), count)
 
 
 def _clustered(off: Sequence[float], clusters: Sequence[str]) -> tuple[float, int]:
@@ -105,77 +179,40 @@ def _t(freedom: float) -> float:
     return float(stdtrit(freedom, 0.975)) if freedom > 0 else 0.0
 
 
-def difference(
-    first: Sequence[Episode], second: Sequence[Episode], name: str, graphs: Mapping[str, NavGraph]
-) -> Estimate:
-    """How far the metric `name` of `first` lies above that of `second`, task by task, clustered by house and seed.
-
-    Args:
-      first, second: the same tasks as often, by agents that were trained from as many seeds: each seed's episodes
-        follow each other.
-
-    Raises:
-      ValueError: the tasks are not the same.
-    """
-    if [e.task.id for e in first] != [e.task.id for e in second]:
-        raise ValueError("only agents that were given the same tasks in the same order can be compared task by task")
-    metric = {**metrics.PER_EPISODE, **metrics.PER_KIND.get(first[0].task.kind, {})}[name]
-    off = [
-        metric(a, graphs[a.task.world]) - metric(b, graphs[b.task.world]) for a, b in zip(first, second, strict=True)
-    ]
-    return estimate(off, [e.task.world for e in first], repeats_of(first))
-
-
-def repeats_of(episodes: Sequence[Episode]) -> list[int]:
-    """Which pass over the tasks each episode belongs to: a task that comes again begins another seed's."""
-    seen: dict[str, int] = {}
-    out = []
-    for e in episodes:
-        out.append(seen.get(e.task.id, 0))
-        seen[e.task.id] = out[-1] + 1
-    return out
-
-
-def across_seeds(values: Sequence[float]) -> Estimate:
-    """Mean over repeats with Student's 95 % interval; NaN half width for a single one."""
-    n = len(values)
-    half = math.nan if n < 2 else float(scipy.stats.t.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
-    return Estimate(float(np.mean(values)), half, n)
-
-
-def ratio(pairs: Sequence[tuple[int, int]], groups: Sequence[str], repeats: Sequence[int] | None = None) -> Estimate:
-    """Sum of firsts over sum of seconds (the repeat rates of Table 4.6), clustered likewise."""
-    total = sum(b for _, b in pairs)
-    if total == 0:
-        return Estimate(float("nan"), float("nan"), 0)
-    mean = sum(a for a, _ in pairs) / total
-    scale = len(pairs) / total
-    residuals = estimate([(a - mean * b) * scale for a, b in pairs], groups, repeats)
-    return Estimate(mean, residuals.half, total)
+def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dict[str, Samples]:
+    """Every metric of the kind of task and the repeat rates, one value per episode."""
+    houses, kind = tuple(e.task.world for e in episodes), episodes[0].task.kind
+    of = lambda f: [f(e, graphs[e.task.world]) for e in episodes]
+    found = {
+        name: Samples(tuple(of(f)), houses, share=name in SHARES)
+        for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(kind, {})}.items()
+    }
+    if kind == "ask":
+        prices, arrived = tuple(of(metrics.price)), tuple(of(metrics.success))
+        found["price per success"] = Samples(prices, houses, arrived)
+    used = [metrics.usage(e) for e in episodes]
+    if any(used):
+        for name, count in metrics.USAGE.items():
+            found[name] = Samples(tuple(float(count(u)) if u else 0.0 for u in used), houses)
+    repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
+    if kind == "vnla":  # where turning on the spot is no mistake
+        del repeats["mistake repeat"]
+    for name, f in repeats.items():
+        again, total = zip(*of(f), strict=True)
+        found[name] = Samples(tuple(map(float, again)), houses, tuple(map(float, total)))
+    return found
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
-    """Every metric of the kind of task and the repeat rates, over the episodes of one agent.
-
-    Args:
-      episodes: those of several training seeds follow each other, over the same tasks.
+    """The metrics of `measured` over the episodes of one agent.
 
     Raises:
       ValueError: no episodes.
     """
     if not episodes:
         raise ValueError(f"{agent!r} played no episodes of {split!r}; a table needs at least one")
-    groups, passes = [e.task.world for e in episodes], repeats_of(episodes)
-    values = {
-        name: estimate([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
-        for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(episodes[0].task.kind, {})}.items()
-    }
-    repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
-    if episodes[0].task.kind == "vnla":  # where turning on the spot is no mistake
-        del repeats["mistake repeat"]
-    for name, f in repeats.items():
-        values[name] = ratio([f(e, graphs[e.task.world]) for e in episodes], groups, passes)
-    return Row(agent, split, seed, len(episodes), len(set(groups)), values)
+    values = {name: interval([samples]) for name, samples in measured(episodes, graphs).items()}
+    return Row(agent, split, seed, len(episodes), len({e.task.world for e in episodes}), values)
 
 
 def shown(name: str, value: Estimate) -> str:
@@ -184,7 +221,8 @@ def shown(name: str, value: Estimate) -> str:
         return "–"
     k = 100.0 if name in PERCENT else 1.0
     digits = 1 if name in PERCENT else 2
-    return f"{k * value.mean:.{digits}f} ± {k * value.half:.{digits}f}"
+    mean = f"{k * value.mean:.{digits}f}"
+    return mean if math.isnan(value.half) else f"{mean} ± {k * value.half:.{digits}f}"
 
 
 def heading(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0 and HARI-v0, registered by `import embodied`.
+"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, registered by `import embodied`.
 
     env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", sees=("rgb", "depth"))
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
@@ -26,6 +26,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
 from assets.cache import default_cache
+from embodied.assistants.ask import QUESTIONS
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.make import AS_PUBLISHED, assistant_of
@@ -55,6 +56,8 @@ from embodied.seeds import checked_seed
 from embodied.world import World
 
 STEP_COST = 0.01
+DETECTIONS = 16
+"""Most detections that Ask-v0 shows; the best."""
 LAYOUT = SpaceLayout()
 OWN = ("shaping", "strict", "patience", "needs_stop")
 """Options of HelpGymEnv that `make` and `make_vec` hand on."""
@@ -71,8 +74,8 @@ VIEW_ANGLE = np.radians(78.0)
 class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     """A HelpEnv as a Gymnasium environment: numbers in, numbers out, text as text.
 
-    Reward: 1 on success at the end, minus 0.01 per step; HARI: minus the cost of the step. With
-    `shaping`, minus the change of the distance to the nearest goal in metres / 10 (in HARI, in
+    Reward: 1 on success at the end, minus 0.01 per step and the price of a question (Ask-v0); HARI: minus the cost
+    of the step. With `shaping`, minus the change of the distance to the nearest goal in metres / 10 (in HARI, in
     edges, Eq 4.20), which leaves the best policy as it is. The last info of an episode, however it
     ends, holds success, is_success (for Stable-Baselines3), spl and the other metrics of every task.
 
@@ -185,7 +188,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         ended = self._env.ended
         info = {} if ended is None else self._judged()
         hari = self._env.task.kind == "hari"
-        reward = -self._env.last_step.cost if hari else info.get("success", 0.0) - STEP_COST
+        reward = -self._env.last_step.cost if hari else info.get("success", 0.0) - STEP_COST - self._env.last_step.cost
         if self._shaping:
             reward += before - (0.0 if ended is not None and hari else self._potential())
         self._o = o if o is not None else self._o
@@ -203,6 +206,11 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         """Close what draws, and the files, of the worlds that were opened for this; a later use opens them again."""
         for world in self._opened:
             world.close()
+
+    @property
+    def layout(self) -> SpaceLayout:
+        """The sizes of the spaces."""
+        return self._layout
 
     @property
     def observed(self) -> Observation:
@@ -447,9 +455,16 @@ def set_stage(kind: str, **settings: Any) -> Stage:
     else:
         play = flat_playground(kind, wanted.seed, **asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
-    layout = wanted.layout or SpaceLayout(descriptions=kind == "hari", stack=max(SpaceLayout.stack, wanted.hari.stack))
+    layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
     return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout, opened)
+
+
+def layout_of(kind: str, stack: int = SpaceLayout.stack) -> SpaceLayout:
+    """The sizes of a kind of task's spaces."""
+    if kind == "ask":
+        return SpaceLayout(descriptions=True, intentions=QUESTIONS, detections=DETECTIONS)
+    return SpaceLayout(descriptions=kind == "hari", stack=stack)
 
 
 def _eyes_of(play: Playground, seen: Sequence[str], wanted: StageSettings) -> Eyes:

@@ -9,7 +9,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-IDS = {"find": "Find", "vln": "VLN", "vnla": "VNLA", "hanna": "HANNA", "hari": "HARI"}
+IDS = {"find": "Find", "vln": "VLN", "vnla": "VNLA", "hanna": "HANNA", "hari": "HARI", "ask": "Ask"}
 """Kind of task to the name of its environment: embodied/HANNA-v0."""
 
 

@@ -18,7 +18,8 @@ from embodied.envs.base import ActionError
 from embodied.gym.eyes import Eyes
 from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
 
-INTENTIONS = tuple(Intention)
+INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
+"""What may be asked where the layout does not say otherwise."""
 KINDS = ("object", "room", "action")
 ACTION_WORDS = ("go", "stop")
 """Names of HARI's features of kind 'action'."""
@@ -43,12 +44,16 @@ class SpaceLayout:
     stack: int = 3
     """HARI: most goals on the stack."""
     descriptions: bool = False
-    """HARI: whether descriptions are part of the observation."""
+    """HARI and Ask-v0: whether descriptions are part of the observation."""
+    intentions: tuple[Intention, ...] = INTENTIONS
+    """What may be asked, in the order of the actions."""
+    detections: int = 0
+    """Ask-v0: most detections of an observation; 0 leaves them out."""
 
     @property
     def actions(self) -> int:
         """Moves, then stop, then one request per intention."""
-        return self.candidates + 1 + len(INTENTIONS)
+        return self.candidates + 1 + len(self.intentions)
 
 
 def action_space(layout: SpaceLayout) -> spaces.Discrete:
@@ -68,6 +73,9 @@ def observation_space(layout: SpaceLayout, eyes: Eyes) -> spaces.Dict:
         "mode": spaces.Discrete(2),
         "clock": spaces.Box(-1.0, LARGE, (3,), np.float32),
     }
+    if layout.detections:
+        whole["detections"] = spaces.Box(-1.0, LARGE, (layout.detections, 4), np.float32)
+        whole["advised"] = spaces.Discrete(layout.candidates + 2)
     if layout.descriptions:
         whole["state"] = _description_space(layout)
         whole["goals"] = spaces.Box(0, LARGE, (layout.stack, layout.features, 5), np.float32)
@@ -79,7 +87,8 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
     one (0 is padding); 'clock' is time and time on task in hundreds of steps, and requests left in tens (-1 when
-    there is no budget). Words of descriptions are numbered by `word_number`.
+    there is no budget); 'detections' sin and cos of bearing, metres and score; 'advised' the number of an action
+    plus one, 0 for none. Words of descriptions are numbered by `word_number`.
 
     Raises:
       ValueError: more candidates than the layout has room for.
@@ -107,6 +116,12 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
         "mode": np.int64(o.mode is Mode.SUB),
         "clock": np.array([o.time / LONG, o.time_on_task / LONG, left], dtype=np.float32),
     }
+    if layout.detections:
+        rows = np.zeros((layout.detections, 4), dtype=np.float32)
+        for i, seen in enumerate(o.detections[: layout.detections]):
+            rows[i] = np.sin(seen.bearing), np.cos(seen.bearing), seen.distance, seen.score
+        whole["detections"] = rows
+        whole["advised"] = np.int64(0 if o.advised is None else 1 + number(o.advised, layout))
     if layout.descriptions:
         whole["state"] = _description(o.state_description, layout)
         goals = np.zeros((layout.stack, layout.features, 5), dtype=np.float32)
@@ -140,7 +155,7 @@ def action_mask(o: Observation, layout: SpaceLayout) -> np.ndarray:
     mask[: len(o.candidates)] = o.candidates.allowed
     mask[layout.candidates] = 1
     for intention in o.can_ask:
-        mask[layout.candidates + 1 + INTENTIONS.index(intention)] = 1
+        mask[layout.candidates + 1 + layout.intentions.index(intention)] = 1
     return mask
 
 
@@ -155,16 +170,16 @@ def decode(action: int, layout: SpaceLayout) -> Action:
         action = operator.index(action)
     except TypeError:
         raise TypeError(f"an action is a whole number, got {action!r:.60} ({type(action).__name__})") from None
-    if not 0 <= action <= layout.candidates + len(INTENTIONS):
+    if not 0 <= action < layout.actions:
         raise ActionError(
-            f"action {action} does not exist; use 0 to {layout.candidates + len(INTENTIONS)}: "
-            f"{layout.candidates} candidates, stop, and the {len(INTENTIONS)} ways to ask"
+            f"action {action} does not exist; use 0 to {layout.actions - 1}: "
+            f"{layout.candidates} candidates, stop, and the {len(layout.intentions)} ways to ask"
         )
     if action < layout.candidates:
         return Move(action)
     if action == layout.candidates:
         return Stop()
-    return Ask(INTENTIONS[action - layout.candidates - 1])
+    return Ask(layout.intentions[action - layout.candidates - 1])
 
 
 def number(action: Action, layout: SpaceLayout) -> int:
@@ -173,7 +188,7 @@ def number(action: Action, layout: SpaceLayout) -> int:
         return action.candidate
     if isinstance(action, Stop):
         return layout.candidates
-    return layout.candidates + 1 + INTENTIONS.index(action.intention)
+    return layout.candidates + 1 + layout.intentions.index(action.intention)
 
 
 class Numbers(gym.ObservationWrapper):

@@ -72,8 +72,3 @@ NAV_LEARNER_SCALES: dict[str, LearnerConfig] = {
     "paper": LearnerConfig(iterations=25_000, learning_rate=1e-4, threshold=0.3),
 }
 """'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""
-
-
-def nav_students_of(config: NavConfig) -> str:
-    """Folder of a teacher's students."""
-    return config.teacher

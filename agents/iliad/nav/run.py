@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.common.session import Note
-from agents.iliad.config import LearnerConfig, as_dict, folder_name
+from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import UNSEEN, NavData, nav_data
 from agents.iliad.nav.network import Follower
@@ -18,6 +18,7 @@ from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
+from embodied.identity import identity_of
 from embodied.interface import SeenPlace
 from embodied.language.voice import RouteDescriber
 
@@ -92,9 +93,10 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     student = NavStudent(new_walker(Follower, c, eyes, seed, "student"), eyes)
     explorer = LoopFree(new_walker(Follower, c, eyes, seed, "student"), eyes)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
+    identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, teacher=c)
     return IliadProblem(
         NavWorld(eyes.places), grounds.teacher, NavMarginal(eyes.places), student, explorer,
-        splits["train"], validation, {"world": "nav", "data": data.digest, **as_dict(c)},
+        splits["train"], validation, identity,
     )  # fmt: skip
 
 
@@ -105,6 +107,5 @@ def learn(
     problem = problem_of(grounds, learner.seed)
     student = problem.student
     assert isinstance(student, NavStudent)
-    keep = lambda path: save_walker(path, student.follower, grounds.config, student.eyes, as_dict(learner))
-    home = Path(folder) / f"seed_{learner.seed}" / folder_name(learner)
-    return train(problem, learner, home, keep, minutes=minutes, note=note)
+    keep = lambda path, identity: save_walker(path, student.follower, grounds.config, student.eyes, identity)
+    return train(problem, learner, folder, keep, minutes=minutes, note=note)

@@ -10,7 +10,7 @@ from itertools import groupby
 
 import torch
 
-from agents.common.actor_critic import descend
+from agents.common.session import descend
 from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
@@ -62,7 +62,7 @@ def tell(
         before = _probability(student, trip, said, done)
         learner = NavStudent(copy.deepcopy(student.follower).train(), student.eyes)
         optimizer = torch.optim.Adam(learner.follower.parameters(), RATE)
-        descend(-learner.scores([trip], [said], [done]).log_probabilities.sum(), optimizer, CLIP, "shown episode")
+        descend(-learner.scores([trip], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
         after = _probability(learner, trip, said, done)
     missed = float(world.graph(trip).distance[done.nodes[-1], trip.path[-1]])
     told = NavTold(

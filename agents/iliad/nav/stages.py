@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,9 @@ from torch import Tensor, nn
 
 from agents.common.decoding import likeliest
 from agents.common.session import Note
-from agents.common.tensor_file import load_tensors, put, save_tensors
+from agents.common.tensor_file import put
 from agents.common.vocabulary import Vocabulary
+from agents.common.weights import load_weights, save_weights
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.network import Follower, WalkDescriber
@@ -23,12 +24,23 @@ from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
 from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.training import success_rate
 from agents.iliad.writing import log_likelihood
+from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
-WEIGHTS = ("embodied-nav-1",)
 REMEDY = "train it again with `embodied train iliad nav`"
 JUDGED = 128
 """Trips that a stage is judged on between its updates."""
+
+
+@dataclass(frozen=True)
+class NavAbout:
+    """What stands beside the weights in a file."""
+
+    config: NavConfig
+    words: tuple[str, ...]
+    """Of requests."""
+    encoder: str
+    """Digest of the encoder whose features it wants."""
 
 
 def new_walker(kind: Callable[..., Network], config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Network:
@@ -53,7 +65,7 @@ def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note
 
     judge = lambda: {"success": success_rate(world, executor, _sample(data))}
     stage = _stage("executor", folder, config.executor_iterations, config, data)
-    stage.train(executor.follower, loss_of, judge, _keep(executor.follower, config, eyes, stage), note)
+    stage.train(executor.follower, loss_of, judge, note)
     return executor
 
 
@@ -73,7 +85,7 @@ def teach_describer(
 
     judge = lambda: {"followed": followed(world, describer, executor, _sample(data))}
     stage = _stage("describer", folder, config.describer_iterations, config, data)
-    return stage.train(describer, loss_of, judge, _keep(describer, config, eyes, stage), note)
+    return stage.train(describer, loss_of, judge, note)
 
 
 def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
@@ -84,16 +96,9 @@ def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, tr
     return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
 
-def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes, about: Mapping[str, object]) -> None:
-    """Write weights, settings, words and whose features they want, atomically."""
-    facts = {
-        "format": WEIGHTS[0],
-        "config": json.dumps(vars(config), sort_keys=True),
-        "words": json.dumps(list(eyes.vocabulary.words)),
-        "encoder": eyes.bank.digest,
-        "about": json.dumps(dict(about), sort_keys=True),
-    }
-    save_tensors(path, network.state_dict(), facts)
+def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes, identity: Identity) -> None:
+    """Write weights, settings, words, whose features they want and what they were trained with, atomically."""
+    save_weights(path, "nav", network.state_dict(), _about(config, eyes), identity)
 
 
 def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
@@ -105,17 +110,16 @@ def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or taught with features of another encoder.
     """
-    tensors, about = load_tensors(path, WEIGHTS, REMEDY)
-    theirs, ours = about["encoder"], eyes.bank.digest
-    if theirs != ours:
+    tensors, about = load_weights(path, "nav", NavAbout, REMEDY)
+    if about.encoder != eyes.bank.digest:
         raise ValueError(
-            f"{path} was taught with features of encoder {theirs[:12]}, these are of {ours[:12]}; name it by --encoder"
+            f"{path} was taught with features of encoder {about.encoder[:12]}, these are of {eyes.bank.digest[:12]}; "
+            "name it by --encoder"
         )
-    config = config_of(path)
-    own = NavEyes(eyes.places, eyes.bank, Vocabulary(tuple(json.loads(about["words"]))))
-    follower = new_walker(Follower, config, own, 0, "loaded")
+    own = NavEyes(eyes.places, eyes.bank, Vocabulary(about.words))
+    follower = new_walker(Follower, about.config, own, 0, "loaded")
     put(follower, tensors, path)
-    return NavStudent(follower.eval(), own), config
+    return NavStudent(follower.eval(), own), about.config
 
 
 def config_of(path: Path) -> NavConfig:
@@ -124,18 +128,19 @@ def config_of(path: Path) -> NavConfig:
     Raises:
       FileNotFoundError, ValueError: as load_follower.
     """
-    return NavConfig(**json.loads(load_tensors(path, WEIGHTS, REMEDY)[1]["config"]))
+    return load_weights(path, "nav", NavAbout, REMEDY)[1].config
+
+
+def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:
+    return NavAbout(config, eyes.vocabulary.words, eyes.bank.digest)
 
 
 def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
-    names = ("hidden_size", "heads", "teacher_batch", "teacher_rate")
-    identity = {"data": data.digest, **{k: getattr(config, k) for k in names}}
-    return TeachingStage("nav", name, Path(folder), updates, config.teacher_rate, config.data_seed, identity)
-
-
-def _keep(network: nn.Module, config: NavConfig, eyes: NavEyes, stage: TeachingStage) -> Callable[[Path], None]:
-    about = {"stage": stage.name, "updates": stage.updates, **stage.identity}
-    return lambda path: save_walker(path, network, config, eyes, about)
+    settings = {k: getattr(config, k) for k in ("hidden_size", "heads", "teacher_batch", "teacher_rate")}
+    parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
+    identity, rate = identity_of("agents.iliad.nav.stages", **parts), config.teacher_rate
+    about = _about(config, data.eyes)
+    return TeachingStage("nav", name, Path(folder), updates, rate, config.data_seed, identity, about)
 
 
 def _batch(trips: Sequence[Trip], count: int, rng: np.random.Generator) -> tuple[list[Trip], list[str]]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from agents.iliad.regex.rules import (
     random_shape,
 )
 from agents.iliad.regex.words import made_up
+from embodied.records import parse_file
 from embodied.seeds import stream
 
 REQUESTS = 3
@@ -58,7 +59,8 @@ class RegexData:
     """All that worlds and teachers are made of."""
 
     words: tuple[str, ...]
-    templates: Mapping[str, Sequence[RequestTemplate]]
+    templates: Mapping[str, Sequence[Any]]
+    """RequestTemplate of each part; their texts where they were read again."""
     splits: Mapping[str, Sequence[WordTask]]
     """Of 'train', 'validation' and 'test'; with speakers, of 'test MANNER' too."""
 
@@ -101,10 +103,7 @@ def read_templates(path: Path) -> dict[str, list[str]]:
     Raises:
       ValueError: not such a file, or a rule that cannot be carried out (with its name).
     """
-    try:
-        body = json.loads(Path(path).read_text(encoding="utf-8"))
-    except ValueError as e:
-        raise ValueError(f"{path}: not JSON ({e}); it should be an object from rules to lists of texts") from e
+    body = parse_file(path)
     if not isinstance(body, dict) or not body:
         raise ValueError(f"{path}: expected an object from rules to lists of texts, got {type(body).__name__}")
     for rule, texts in body.items():

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.common.session import Note
-from agents.iliad.config import LearnerConfig, as_dict, folder_name
+from agents.iliad.config import LearnerConfig
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.regex.coding import Requests, request_words
 from agents.iliad.regex.config import RegexConfig, data_of
@@ -27,7 +27,9 @@ from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
 from agents.iliad.regex.words import read_words
 from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
 from agents.iliad.training import IliadProblem, train
-from assets.cache import digest, write_json
+from assets.cache import digest
+from embodied.identity import differences, identity_of, read_finished, write_finished
+from embodied.records import from_plain, to_json
 from embodied.seeds import stream
 
 VALIDATION = 500
@@ -83,7 +85,7 @@ def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print)
     rng = stream(c.data_seed, "regex", "unlabeled")
     rules = tuple(rules_without_requests(grounds.data, c, c.unlabeled, rng=rng))
     splits = grounds.data.splits
-    identity = {"world": "regex", "data": grounds.digest, **as_dict(c)}
+    identity = identity_of("agents.iliad.regex.run", world="regex", data=grounds.digest, teacher=c)
     return IliadProblem(
         RegexWorld(), grounds.teacher, RegexMarginal(rules), student(), student(),
         splits["train"], splits["validation"][:VALIDATION], identity,
@@ -91,15 +93,24 @@ def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print)
 
 
 def learn(
-    grounds: Grounds, learner: LearnerConfig, folder: Path, *, minutes: float | None = None, note: Note = print
+    grounds: Grounds,
+    learner: LearnerConfig,
+    folder: Path,
+    pretraining: Path,
+    *,
+    minutes: float | None = None,
+    note: Note = print,
 ) -> list[dict[str, float]]:
-    """Train, or go on training, the student of a run folder; keeps the best one as best.safetensors."""
-    home = Path(folder) / f"seed_{learner.seed}"
-    problem = problem_of(grounds, learner.seed, home / "pretraining", note=note)
+    """Train, or go on training, the student of a run folder; keeps the best one as best.safetensors.
+
+    Args:
+      pretraining: where the student is that all learners of a seed begin with; made there if it is missing.
+    """
+    problem = problem_of(grounds, learner.seed, pretraining, note=note)
     student = problem.student
     assert isinstance(student, RegexStudent)
-    keep = lambda path: save_network(path, student.speller, grounds.config, grounds.requests, as_dict(learner))
-    return train(problem, learner, home / folder_name(learner), keep, minutes=minutes, note=note)
+    keep = lambda path, identity: save_network(path, student.speller, grounds.config, grounds.requests, identity)
+    return train(problem, learner, folder, keep, minutes=minutes, note=note)
 
 
 def load_student(path: Path) -> tuple[RegexStudent, RegexConfig]:
@@ -117,25 +128,25 @@ def _data(config: RegexConfig, path: Path, words: Path | None, templates: Path |
     own = {name: p.read_text(encoding="utf-8") for name, p in (("words", words), ("templates", templates)) if p}
     identity = {**data_of(config), **{k: digest(v) for k, v in own.items()}}
     if path.exists():
-        body = json.loads(path.read_text(encoding="utf-8"))
-        if body["made of"] != identity:
-            raise ValueError(f"{path} was made with {body['made of']}, now it is {identity}; use another folder")
-        splits = {part: [_item(row) for row in rows] for part, rows in body["splits"].items()}
-        return RegexData(tuple(body["words"]), body["templates"], splits)
+        made_of, body = read_finished(path)
+        found = from_plain(_Kept, body, str(path))
+        if changed := differences(made_of, identity):
+            raise ValueError(f"{path} was made with other settings ({', '.join(changed)}); use another folder")
+        return RegexData(found.words, found.templates, found.splits)
     data = make_data(config, read_words(words) if words else (), read_templates(templates) if templates else None)
-    body = {
-        "made of": identity,
-        "words": data.words,
-        "templates": {part: [t.text for t in many] for part, many in data.templates.items()},
-        "splits": {part: [dataclasses.astuple(q) for q in items] for part, items in data.splits.items()},
-    }
-    write_json(path, body)
+    templates_of = {part: tuple(t.text for t in many) for part, many in data.templates.items()}
+    splits = {part: tuple(items) for part, items in data.splits.items()}
+    write_finished(path, identity, json.loads(to_json(_Kept(tuple(data.words), templates_of, splits))))
     return data
 
 
-def _item(row: Sequence) -> WordTask:
-    requests, rule, words, made = row
-    return WordTask(tuple(requests), rule, tuple(words), tuple(made))
+@dataclass(frozen=True)
+class _Kept:
+    """data.json of a study, beside its identity."""
+
+    words: tuple[str, ...]
+    templates: Mapping[str, tuple[str, ...]]
+    splits: Mapping[str, tuple[WordTask, ...]]
 
 
 def _digest(data: RegexData) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from agents.common.actor_critic import descend
+from agents.common.session import descend
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def tell(
         learner = copy.copy(student)
         learner.speller = copy.deepcopy(student.speller).train()
         optimizer = torch.optim.Adam(learner.speller.parameters(), RATE)
-        descend(-learner.scores([item], [said], [done]).log_probabilities.sum(), optimizer, CLIP, "shown episode")
+        descend(-learner.scores([item], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
         after = _probability(learner, item, said, done)
     success = done.outputs is not None and done.outputs[0] == item.outputs[0]
     return Told(request, item.words, item.outputs, done.rule, done.outputs, success, said, before, after)

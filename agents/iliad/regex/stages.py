@@ -5,8 +5,8 @@ All three are maximum likelihood on batches drawn by (seed, update).
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from torch import Tensor, nn
 
 from agents.common.decoding import likeliest
 from agents.common.session import Note
-from agents.common.tensor_file import load_tensors, put, save_tensors
+from agents.common.tensor_file import put
 from agents.common.vocabulary import Vocabulary
+from agents.common.weights import load_weights, save_weights
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import Requests, changes, characters, texts
 from agents.iliad.regex.config import RegexConfig
@@ -25,10 +26,20 @@ from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import outputs
 from agents.iliad.stages import Network, TeachingStage
 from agents.iliad.writing import log_likelihood
+from assets.cache import digest
+from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
-WEIGHTS = ("embodied-regex-1",)
 REMEDY = "delete it and train it again with `embodied train iliad regex`"
+
+
+@dataclass(frozen=True)
+class RegexAbout:
+    """What stands beside the weights in a file."""
+
+    config: RegexConfig
+    words: tuple[str, ...]
+    """Of requests."""
 
 
 def new_network(kind: Callable[..., Network], config: RegexConfig, requests: Requests, seed: int, name: str) -> Network:
@@ -52,7 +63,7 @@ def teach_executor(data: RegexData, config: RegexConfig, requests: Requests, fol
 
     stage = _stage("executor", folder, config.executor_iterations, config, requests, config.data_seed)
     judge = lambda: executor_success(network, requests, _sample(data))
-    return stage.train(network, loss_of, judge, _keep(network, config, requests, stage), note)
+    return stage.train(network, loss_of, judge, note)
 
 
 def teach_describer(
@@ -69,7 +80,7 @@ def teach_describer(
         return _likelihood(network(changed, wanted), wanted)
 
     stage = _stage("describer", folder, config.describer_iterations, config, requests, config.data_seed)
-    return stage.train(network, loss_of, dict, _keep(network, config, requests, stage), note)
+    return stage.train(network, loss_of, dict, note)
 
 
 def pretrain_student(
@@ -84,7 +95,7 @@ def pretrain_student(
         return _likelihood(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
 
     stage = _stage("student", folder, config.pretraining_iterations, config, requests, seed)
-    return stage.train(network, loss_of, dict, _keep(network, config, requests, stage), note)
+    return stage.train(network, loss_of, dict, note)
 
 
 def changing_rules(
@@ -110,17 +121,9 @@ def executor_success(executor: Speller, requests: Requests, items: Sequence[Word
     return {"success": float(np.mean([w == q.outputs[0] for w, q in zip(written, items, strict=True)]))}
 
 
-def save_network(
-    path: Path, network: nn.Module, config: RegexConfig, requests: Requests, about: Mapping[str, object]
-) -> None:
-    """Write weights, settings and words, atomically."""
-    facts = {
-        "format": WEIGHTS[0],
-        "config": json.dumps(vars(config), sort_keys=True),
-        "words": json.dumps(list(requests.vocabulary.words)),
-        "about": json.dumps(dict(about), sort_keys=True),
-    }
-    save_tensors(path, network.state_dict(), facts)
+def save_network(path: Path, network: nn.Module, config: RegexConfig, requests: Requests, identity: Identity) -> None:
+    """Write weights, settings, words and what they were trained with, atomically."""
+    save_weights(path, "regex", network.state_dict(), RegexAbout(config, requests.vocabulary.words), identity)
 
 
 def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Requests, RegexConfig]:
@@ -129,24 +132,23 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, about = load_tensors(path, WEIGHTS, REMEDY)
-    config = RegexConfig(**json.loads(about["config"]))
-    requests = Requests(Vocabulary(tuple(json.loads(about["words"]))))
-    network = new_network(kind, config, requests, 0, "loaded")
+    tensors, about = load_weights(path, "regex", RegexAbout, REMEDY)
+    requests = Requests(Vocabulary(about.words))
+    network = new_network(kind, about.config, requests, 0, "loaded")
     put(network, tensors, path)
-    return network.eval(), requests, config
+    return network.eval(), requests, about.config
 
 
 def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> TeachingStage:
-    identity = {"words": len(requests.vocabulary), **{k: v for k, v in vars(config).items() if k in _DECIDE}}
+    settings = {k: v for k, v in vars(config).items() if k in _DECIDE}
     if name == "student" and config.marginal != "asked":
-        identity["marginal"] = config.marginal
-    return TeachingStage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity)
-
-
-def _keep(network: nn.Module, config: RegexConfig, requests: Requests, stage: TeachingStage) -> Callable[[Path], None]:
-    about = {"stage": stage.name, "updates": stage.updates, "seed": stage.seed, **stage.identity}
-    return lambda path: save_network(path, network, config, requests, about)
+        settings["marginal"] = config.marginal
+    words = requests.vocabulary.words
+    identity = identity_of(
+        "agents.iliad.regex.stages", stage=name, updates=updates, seed=seed, settings=settings, words=digest(words)
+    )
+    about = RegexAbout(config, words)
+    return TeachingStage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity, about)
 
 
 _DECIDE = (

@@ -1,0 +1,110 @@
+"""The oracle of asking: it plays every question to the end in its head, and asks what pays most.
+
+It is privileged: it knows the true answers. It does not know the way: between questions it explores like the baselines.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from embodied.envs.ask import AskEnv
+from embodied.envs.base import HelpEnv
+from embodied.evaluation.metrics import weighted_success
+from embodied.interface import Action, Actions, Ask, Intention, Observation, Observations, Situations, Stop
+from embodied.policies.ask import Asker, Trail, confirm_on_sight, onward, reached
+
+EVERY = 4
+"""Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
+SLOW = 0.003
+"""What a step is worth: of two ways that succeed alike, the shorter one."""
+Choice = Intention | str
+"""A question, 'go' or 'stop'."""
+CHOICES: tuple[Choice, ...] = (
+    "go",
+    "stop",
+    Intention.CONFIRM,
+    Intention.APPEARANCE,
+    Intention.REGION,
+    Intention.ROUTE,
+    Intention.DISAMBIGUATE,
+)
+
+
+def thinks(o: Observation, trail: Trail) -> bool:
+    """Whether this is a moment to decide; between them, and on a route, one goes on."""
+    return o.advised is None and (reached(o) is not None or o.time % EVERY == 0)
+
+
+class Foresight:
+    """Asks what pays most in the end, if afterwards one only confirms on sight."""
+
+    def __init__(
+        self, make_env: Callable[[], HelpEnv], note: Callable[[Observation, Trail, int], None] | None = None
+    ) -> None:
+        """
+        Args:
+          make_env: of the same houses and rules, to play in the head.
+          note: is told every decision, as an index into CHOICES.
+        """
+        self._make_env, self._note = make_env, note
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        if memory is None:
+            memory = []
+            for s in situations:
+                assert s is not None, "episodes of a batch begin together"
+                env = self._make_env()
+                env.reset(s.task)
+                memory.append((env, Trail()))
+        actions: Actions = [None] * len(observations)
+        for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
+            if o is not None and s is not None:
+                env, trail = memory[i]
+                actions[i] = self._one(env, o, trail, rngs[i])
+                env.step(actions[i])
+        return actions, memory
+
+    def _one(self, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+        choice = 0
+        if thinks(o, trail):
+            can = [k for k, c in enumerate(CHOICES) if isinstance(c, str) or c in o.can_ask]
+            choice = max(can, key=lambda k: (self._value(env, o, trail, CHOICES[k], rng), -k))
+            if self._note:
+                self._note(o, trail, choice)
+        return carried_out(CHOICES[choice], env, o, trail, rng)
+
+    def _value(self, env: HelpEnv, o: Observation, trail: Trail, choice: Choice, rng: np.random.Generator) -> float:
+        """Weighted success in the end, after this choice, with the draws that will come."""
+        ahead, mind, rng = _copy(env), copy.deepcopy(trail), copy.deepcopy(rng)
+        seen = ahead.step(carried_out(choice, ahead, o, mind, rng))
+        asker = Asker(confirm_on_sight)
+        while seen is not None:
+            seen = ahead.step(asker.one(seen, ahead.situation, mind, rng))
+        episode = ahead.episode()
+        return weighted_success(episode, env.world.graph) - SLOW * len(episode.steps)
+
+
+def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+    """The action of a choice; notes it in the trail."""
+    if choice == "stop":
+        return Stop()
+    if isinstance(choice, Intention):
+        trail.asked[choice] = trail.asked.get(choice, 0) + 1
+        return Ask(choice)
+    trail.visits[env.pose.node] = trail.visits.get(env.pose.node, 0) + 1
+    return onward(o, env.situation, trail, rng)
+
+
+def _copy(env: HelpEnv) -> HelpEnv:
+    """The environment as it is; what happens in the copy stays there."""
+    other = copy.copy(env)
+    other._steps, other._trail = list(env._steps), list(env._trail)
+    if isinstance(other, AskEnv) and isinstance(env, AskEnv):
+        other._denied = set(env._denied)
+    return other

@@ -1,0 +1,81 @@
+"""Weights on disk, one format for all that is trained: tensors, what is needed to use them, and what they came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from torch import Tensor, nn
+
+from agents.common.tensor_file import checksum_of, load_tensors, save_tensors
+from embodied.identity import Identity
+from embodied.records import from_json, parse, to_json
+
+FORMAT = "embodied-weights-1"
+T = TypeVar("T")
+
+
+def save_weights(
+    path: Path, kind: str, tensors: Mapping[str, Tensor], about: object, identity: Identity | None = None
+) -> None:
+    """Write weights, atomically; equal weights are equal files.
+
+    Args:
+      kind: what it is, 'hanna' or 'encoder'.
+      about: a record of what is needed to use them: settings, words, whose features they know.
+      identity: what they were trained with.
+    """
+    body = {"format": FORMAT, "kind": kind, "about": to_json(about)}
+    save_tensors(path, tensors, body | ({"identity": to_json(identity)} if identity else {}))
+
+
+def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[dict[str, Tensor], T]:
+    """What `save_weights` wrote: the tensors, and the record of type `about`.
+
+    Args:
+      remedy: how such a file is made, for messages.
+
+    Raises:
+      FileNotFoundError, OSError.
+      ValueError: truncated, changed, of another format or kind.
+    """
+    tensors, found = load_tensors(Path(path), (FORMAT,), remedy)
+    if found.get("kind") != kind:
+        raise ValueError(f"{path}: holds {found.get('kind')!r}, {kind!r} is wanted; {remedy}")
+    try:
+        return tensors, from_json(about, found.get("about", ""))
+    except ValueError as e:
+        raise ValueError(f"{path}: {e}; {remedy}") from e
+
+
+def kind_of(path: Path) -> str:
+    """What a file of weights holds: 'hanna', 'encoder'."""
+    return load_tensors(Path(path), (FORMAT,), "train it again")[1].get("kind", "")
+
+
+def origin_of(path: Path) -> dict[str, Any] | None:
+    """The identity of what a file of weights was trained with; None where that was not written down."""
+    text = load_tensors(Path(path), (FORMAT,), "train it again")[1].get("identity")
+    found = None if text is None else parse(text, "an identity")
+    return found if isinstance(found, dict) else None
+
+
+def weights_digest(path: Path) -> str:
+    """Of the weights in a file and of what is needed to use them; not of what they were trained with."""
+    tensors, found = load_tensors(Path(path), (FORMAT,), "train it again")
+    return checksum_of(tensors, {k: v for k, v in found.items() if k != "identity"})
+
+
+def halved(network: nn.Module) -> dict[str, Tensor]:
+    """The weights of a network in half precision."""
+    return {k: v.detach().half() for k, v in network.state_dict().items()}
+
+
+def refuse_features(found: str, learned_from: str) -> None:
+    """Raises ValueError where features come from another encoder than the one that an agent learned from."""
+    if found != learned_from:
+        raise ValueError(
+            f"the features come from encoder {found[:12]}, the agent learned from {learned_from[:12]}; "
+            "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
+        )

@@ -1,0 +1,1 @@
+"""Language models as agents, assistants, paraphrasers and judges, through any server that speaks OpenAI's protocol."""

@@ -1,0 +1,117 @@
+"""Who words an assistant's answer: its own template, a language model, or a person; all through `Assistant`.
+
+Whoever words it is told what the assistant would say and, where it told a route, the walk in plain words; nothing else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from agents.language_models.client import Client, object_schema
+from agents.language_models.prompts import read_prompt
+from embodied.assistants.ask import AskAssistant
+from embodied.envs.make import assistant_of
+from embodied.interface import Assistant, Intention, Reply, Situation
+from embodied.language import PlainLanguage
+
+NAMES = ("facts", "question", "request")
+"""What the template of prompts/assistant.md may name."""
+SCHEMA = object_schema(answer={"type": "string", "maxLength": 600})
+QUESTIONS = {
+    Intention.HELP: "Can you help me? Where should I go?",
+    Intention.CONFIRM: "Is this the one?",
+    Intention.APPEARANCE: "What does it look like?",
+    Intention.REGION: "Which room is it in?",
+    Intention.ROUTE: "How do I get there?",
+    Intention.DISAMBIGUATE: "Which of those that I see is it?",
+}
+
+
+def facts_of(base: Assistant, s: Situation, reply: Reply, *, rng: np.random.Generator) -> tuple[str, ...]:
+    """What whoever words a reply is told: the answer of the assistant itself, and the walk that it means."""
+    if isinstance(base, AskAssistant):
+        return base.facts(s, reply.intention, rng=rng)
+    facts = (reply.text,) if reply.text else ()
+    path = reply.subtask.path if reply.subtask else ()
+    start = reply.subtask.start if reply.subtask and reply.subtask.start else s.pose
+    if len(path) < 2 or (reply.subtask and reply.subtask.words):
+        return facts
+    return (*facts, PlainLanguage().route(s.world, path, start.yaw, rng=rng))
+
+
+def question_of(s: Situation, question: Intention) -> str:
+    """A request for help in words."""
+    return s.question if question is Intention.FREE else QUESTIONS.get(question, question.value)
+
+
+class ModelAssistant:
+    """Words the replies of another assistant by a language model; where its answer is none, the template stands."""
+
+    def __init__(self, base: Assistant, client: Client, prompts: Path | None = None) -> None:
+        """
+        Args:
+          base: who knows the answer.
+          prompts: folder with an assistant.md of one's own.
+        """
+        self._base, self._client = base, client
+        self._prompt = read_prompt("assistant", NAMES, prompts)
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        return self._base.intentions(situation)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        reply = self._base.answer(situation, question, rng=rng)
+        if reply.text is None:  # HARI's descriptions are no words
+            return reply
+        facts = facts_of(self._base, situation, reply, rng=rng)
+        messages = self._prompt.messages(
+            facts="\n".join(f"- {f}" for f in facts),
+            question=question_of(situation, question),
+            request=situation.task.request,
+        )
+        answer = self._client.ask(messages, SCHEMA)
+        text = reply.text if answer.value is None else str(answer.value["answer"])
+        return dataclasses.replace(reply, text=text, usage=answer.usage(self._client.settings))
+
+
+class PersonAssistant:
+    """Somebody at the keyboard words the replies of another assistant."""
+
+    def __init__(self, base: Assistant, read: Callable[[str], str] = input) -> None:
+        """
+        Args:
+          base: who knows the answer.
+          read: shows a text and gives what was written; an empty line leaves the template's words.
+        """
+        self._base, self._read = base, read
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        return self._base.intentions(situation)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        reply = self._base.answer(situation, question, rng=rng)
+        if reply.text is None:
+            return reply
+        facts = "\n".join(f"  - {f}" for f in facts_of(self._base, situation, reply, rng=rng))
+        said = self._read(f"\nYou know:\n{facts}\nThe agent asks: {question_of(situation, question)}\n> ").strip()
+        return dataclasses.replace(reply, text=said or reply.text)
+
+
+def assistant_maker(name: str, client: Callable[[], Client], prompts: Path | None) -> Callable[[Assistant], Assistant]:
+    """How the assistant of an environment is replaced: 'template' (not at all), 'llm', 'person', or 'module:Class'.
+
+    Raises:
+      ValueError: no such class.
+    """
+    if name == "template":
+        return lambda base: base
+    if name == "llm":
+        return lambda base: ModelAssistant(base, client(), prompts)
+    if name == "person":
+        return PersonAssistant
+    own = assistant_of(name)
+    return lambda base: own or base

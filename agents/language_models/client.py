@@ -1,0 +1,345 @@
+"""One client for all roles: asks a chat-completions server, keeps every answer, and counts what is none.
+
+The network may fail and is tried again; an answer that is none (HTML, wrong JSON, megabytes, an unknown tool) is
+counted and kept like any other. Keys come from the environment and go into the request's header, nowhere else.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from agents.language_models.cache import AnswerCache
+from assets.cache import digest
+from embodied.errors import UnableError
+from embodied.interface import Usage
+from embodied.records import RecordError, from_json, parse, to_json
+
+FORMS = ("schema", "tools", "text")
+"""How an answer of a certain form is asked for: the server's structured output, a tool, or in words alone."""
+MOST_BYTES = 1_000_000
+"""Of a response; more is not read."""
+MOST_TEXT = 20_000
+"""Characters of an answer that are kept; a longer one is invalid."""
+AGAIN = (408, 409, 425, 429, 500, 502, 503, 504, 529)
+"""Status codes after which the same request is sent again."""
+TOOL = "answer"
+"""Name of the one tool that is offered with the form 'tools'."""
+
+KINDS: Mapping[str, Any] = {"object": dict, "string": str, "integer": int, "number": (int, float), "boolean": bool}
+"""Types of JSON Schema that answers are made of."""
+
+Message = Mapping[str, Any]
+"""Of the chat-completions protocol: 'role' and 'content', a text or parts ('text', 'image_url')."""
+
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """Which model answers, and how it is asked."""
+
+    model: str
+    base_url: str = "https://api.openai.com/v1"
+    """Where the server is; not part of what answers are kept under."""
+    key_variable: str = "OPENAI_API_KEY"
+    """Environment variable that holds the key; servers of one's own need none."""
+    form: str = "schema"
+    """How JSON is asked for, one of FORMS."""
+    temperature: float = 0.0
+    most_tokens: int = 300
+    """Of an answer."""
+    price_in: float = 0.0
+    """Of a million tokens that are sent."""
+    price_out: float = 0.0
+    """Of a million tokens that are answered."""
+    timeout: float = 60.0
+    """Seconds for a whole answer."""
+    tries: int = 6
+    """Most times that one request is sent."""
+    wait: float = 1.0
+    """Seconds before the second try; doubled before each further one, up to 30."""
+    together: int = 8
+    """Most requests at a time."""
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise ValueError(f"form should be one of {FORMS}, got {self.form!r}")
+        if min(self.tries, self.together, self.most_tokens) < 1 or not self.timeout > 0 or self.wait < 0:
+            raise ValueError(f"tries, together and most_tokens should be at least 1 and times positive, got {self}")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came back for one request."""
+
+    value: Mapping[str, Any] | None
+    """The object that was wanted; None for an answer that is none."""
+    problem: str = ""
+    """Why it is none."""
+    text: str = ""
+    """What the model wrote."""
+    refused: bool = False
+    tokens_in: int = 0
+    tokens_out: int = 0
+
+    def usage(self, s: ServerSettings) -> Usage:
+        """What it cost and what was wrong with it."""
+        price = (self.tokens_in * s.price_in + self.tokens_out * s.price_out) / 1e6
+        invalid = self.value is None and not self.refused
+        return Usage(1, self.tokens_in, self.tokens_out, round(price, 9), int(invalid), int(self.refused))
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """An answer as the cache holds it."""
+
+    text: str = ""
+    problem: str = ""
+    refused: bool = False
+    tokens_in: int = 0
+    tokens_out: int = 0
+
+
+class Client:
+    """Owns the connection and the cache; threads may share it."""
+
+    def __init__(self, settings: ServerSettings, cache: AnswerCache, *, offline: bool = False) -> None:
+        """
+        Args:
+          offline: only what is kept may be answered.
+        """
+        self.settings, self.cache, self.offline = settings, cache, offline
+        self.sent = 0
+        """Requests that were answered by the server, not from the cache."""
+        self._lock, self._gate = threading.Lock(), threading.Semaphore(settings.together)
+        self._api: Any = None
+
+    def ask(self, messages: Sequence[Message], schema: Mapping[str, Any]) -> Answer:
+        """The object of `schema` that the model answers with, from the cache where it was asked before.
+
+        Raises:
+          UnableError: the server cannot be reached, or refuses the request.
+        """
+        request = self._request(messages, schema)
+        key = digest(request)
+        kept = self.cache.get(key)
+        if kept is None:
+            with self._gate:
+                said = self._send(request)
+            kept = self.cache.put(key, json.dumps(_without_pictures(request), sort_keys=True), to_json(said))
+        return understood(_read(kept), schema)
+
+    def ask_all(self, asked: Sequence[tuple[Sequence[Message], Mapping[str, Any]]]) -> list[Answer]:
+        """Several at a time, in order."""
+        if len(asked) < 2:
+            return [self.ask(*a) for a in asked]
+        with ThreadPoolExecutor(min(self.settings.together, len(asked))) as pool:
+            return list(pool.map(lambda a: self.ask(*a), asked))
+
+    def _request(self, messages: Sequence[Message], schema: Mapping[str, Any]) -> dict[str, Any]:
+        """The body of the request, which is also what its answer is kept under."""
+        s = self.settings
+        body: dict[str, Any] = {
+            "model": s.model,
+            "messages": list(messages),
+            "temperature": s.temperature,
+            "max_tokens": s.most_tokens,
+        }
+        if s.form == "schema":
+            wanted = {"name": TOOL, "schema": dict(schema), "strict": True}
+            body["response_format"] = {"type": "json_schema", "json_schema": wanted}
+        elif s.form == "tools":
+            about = {"name": TOOL, "description": "Give the answer.", "parameters": dict(schema)}
+            body["tools"] = [{"type": "function", "function": about}]
+            body["tool_choice"] = {"type": "function", "function": {"name": TOOL}}
+        else:
+            told = f"Answer with one JSON object of this schema and nothing else: {json.dumps(schema)}"
+            body["messages"] = [*body["messages"], {"role": "system", "content": told}]
+        return body
+
+    def _send(self, request: Mapping[str, Any]) -> _Kept:
+        if self.offline:
+            raise UnableError(f"{self.cache.path} does not hold the answer to this request; leave --offline out")
+        openai, s = _openai(), self.settings
+        told = 0.0
+        for attempt in range(s.tries):
+            if attempt:
+                pause = min(max(s.wait * 2 ** (attempt - 1), told), 30.0)
+                time.sleep(pause * random.uniform(0.75, 1.25))  # so that clients do not come back together
+            try:
+                with self._connection().chat.completions.with_streaming_response.create(**request) as response:
+                    body = _body(response, time.monotonic() + s.timeout)
+            except openai.APIStatusError as e:
+                if e.status_code not in AGAIN:
+                    raise UnableError(
+                        self._hidden(f"{s.base_url} refuses the request ({e.status_code}): {e}")
+                    ) from None
+                problem, told = f"status {e.status_code}", _seconds(e.response.headers.get("retry-after"))
+            except (openai.APIConnectionError, *_transport_errors()) as e:
+                problem = type(e).__name__
+            else:
+                with self._lock:
+                    self.sent += 1
+                return _said(body)
+        raise UnableError(
+            f"no answer from {s.base_url} after {s.tries} tries ({problem}); start the server and run the same command "
+            f"again: {len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
+        )
+
+    def _connection(self) -> Any:
+        with self._lock:
+            if self._api is None:
+                s = self.settings
+                key = os.environ.get(s.key_variable) or "none"
+                self._api = _openai().OpenAI(base_url=s.base_url, api_key=key, timeout=s.timeout, max_retries=0)
+        return self._api
+
+    def _hidden(self, text: str) -> str:
+        """A message without the key, however the server repeats it."""
+        key = os.environ.get(self.settings.key_variable)
+        return (text.replace(key, "***") if key else text)[:500]
+
+
+def understood(kept: _Kept, schema: Mapping[str, Any]) -> Answer:
+    """The answer as the object of a schema, or why it is none."""
+    value, problem = None, kept.problem
+    if not problem and not kept.refused:
+        try:
+            value = parse(_object_in(kept.text), "an answer")
+            problem = misfit(value, schema)
+        except RecordError as e:
+            problem = str(e)
+    value = value if isinstance(value, dict) and not problem and not kept.refused else None
+    return Answer(value, problem, kept.text, kept.refused, kept.tokens_in, kept.tokens_out)
+
+
+def misfit(value: object, schema: Mapping[str, Any], where: str = "the answer") -> str:
+    """What is wrong with a value by the part of JSON Schema that is used here; '' for nothing."""
+    kind = KINDS[schema["type"]]
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        return f"{where} should be of type {schema['type']}"
+    if "enum" in schema and value not in schema["enum"]:
+        return f"{where} should be one of {list(schema['enum'])[:20]}"
+    if isinstance(value, str) and len(value) > schema.get("maxLength", MOST_TEXT):
+        return f"{where} is too long"
+    if isinstance(value, int | float) and not schema.get("minimum", value) <= value <= schema.get("maximum", value):
+        return f"{where} is out of range"
+    if isinstance(value, dict):
+        known = schema.get("properties", {})
+        if missing := [n for n in schema.get("required", ()) if n not in value]:
+            return f"{where} lacks {missing}"
+        if unknown := [str(n)[:40] for n in value if n not in known]:
+            return f"{where} has unknown fields {unknown[:5]}"
+        return next((m for n, v in value.items() if (m := misfit(v, known[n], n))), "")
+    return ""
+
+
+def object_schema(**properties: Mapping[str, Any]) -> dict[str, Any]:
+    """A JSON schema of an object that has exactly these properties, in their order."""
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def _said(body: bytes | None) -> _Kept:
+    """What a response says; whatever it holds, it is no error of ours."""
+    if body is None:
+        return _Kept(problem=f"more than {MOST_BYTES} bytes, or too slow")
+    try:
+        whole = parse(body, "a chat completion")
+    except RecordError:
+        return _Kept(problem="the response is not JSON")
+    used = whole.get("usage") if isinstance(whole, dict) else None
+    tokens = [_count(used, "prompt_tokens"), _count(used, "completion_tokens")]
+    try:
+        message = whole["choices"][0]["message"]  # type: ignore[index]
+        text, calls, refusal = message.get("content"), message.get("tool_calls"), message.get("refusal")
+    except (KeyError, IndexError, TypeError, AttributeError):
+        return _Kept("", "the response is no chat completion", False, *tokens)
+    if refusal or _choice(whole).get("finish_reason") == "content_filter":
+        return _Kept(str(refusal or "")[:MOST_TEXT], "", True, *tokens)
+    if calls:
+        text = _called(calls)
+    if not isinstance(text, str):
+        return _Kept("", "no text, or calls of unknown tools", False, *tokens)
+    if len(text) > MOST_TEXT:
+        return _Kept("", f"more than {MOST_TEXT} characters", False, *tokens)
+    return _Kept(text, "", False, *tokens)
+
+
+def _seconds(text: str | None) -> float:
+    """What a server asks to be waited for; 0 where it does not say so in seconds."""
+    return float(text) if text and text.isdigit() and len(text) < 6 else 0.0
+
+
+def _choice(whole: Any) -> Mapping[str, Any]:
+    return whole["choices"][0]
+
+
+def _called(calls: Any) -> str | None:
+    """The arguments of the one call of the one tool; None for any other calls."""
+    try:
+        (call,) = calls
+        arguments = call["function"]["arguments"]
+        return arguments if call["function"]["name"] == TOOL and isinstance(arguments, str) else None
+    except (ValueError, KeyError, TypeError):
+        return None
+
+
+def _count(used: object, name: str) -> int:
+    value = used.get(name) if isinstance(used, dict) else None
+    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 10**9 else 0
+
+
+def _object_in(text: str) -> str:
+    """The part of a text from its first brace to its last: models like to wrap JSON in words or fences."""
+    begin, end = text.find("{"), text.rfind("}")
+    return text[begin : end + 1] if 0 <= begin < end else text
+
+
+def _body(response: Any, deadline: float) -> bytes | None:
+    """The bytes of a response; None for more than MOST_BYTES, or when the time is up."""
+    parts, size = [], 0
+    for chunk in response.iter_bytes():
+        size += len(chunk)
+        if size > MOST_BYTES or time.monotonic() > deadline:
+            return None
+        parts.append(chunk)
+    return b"".join(parts)
+
+
+def _read(kept: str) -> _Kept:
+    return from_json(_Kept, kept)
+
+
+def _without_pictures(value: Any) -> Any:
+    """A request with digests in place of pictures."""
+    if isinstance(value, dict):
+        return {k: _without_pictures(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_without_pictures(v) for v in value]
+    return f"picture {digest(value)[:32]}" if isinstance(value, str) and value.startswith("data:image/") else value
+
+
+def _openai() -> Any:
+    try:
+        import openai  # an optional extra
+    except ImportError as e:
+        raise UnableError("language models need the openai package: pip install 'embodied-houses[llm]'") from e
+    return openai
+
+
+def _transport_errors() -> tuple[type[Exception], ...]:
+    """What may be raised while a body is read, past the client's own errors."""
+    import httpx2  # comes with openai
+
+    return (httpx2.HTTPError,)

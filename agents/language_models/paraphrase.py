@@ -1,0 +1,109 @@
+"""Language as varied as people's for a data set: a model says every route again, and only what leads there is kept.
+
+python -m agents.language_models.paraphrase --data DIR --model NAME --base-url URL --answers FILE --out FILE
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from agents.language_models.checking import arrives
+from agents.language_models.client import Client, object_schema
+from agents.language_models.options import add_model, client_of
+from agents.language_models.prompts import read_prompt
+from embodied.interface import STEP, Route, SeenPlace, Usage
+
+STYLES = (
+    "a friend on the phone, chatty",
+    "very short, a few words",
+    "a polite guide",
+    "somebody who names furniture and colours",
+    "a child",
+    "a non-native speaker with simple words",
+)
+NAMES = ("text", "style")
+"""What the template of prompts/paraphrase.md may name."""
+SCHEMA = object_schema(instruction={"type": "string", "maxLength": 800})
+
+
+@dataclass(frozen=True)
+class Paraphrases:
+    """What a model said, and how much of it was dropped."""
+
+    routes: tuple[Route, ...]
+    """Those that a listener follows to their end, one or none per route that was given."""
+    asked: int
+    invalid: int
+    """Answers that were none."""
+    unchanged: int
+    """The same words again."""
+    lost: int
+    """Words with which the listener does not arrive."""
+    usage: Usage
+
+    @property
+    def failing(self) -> float:
+        """The share that was dropped."""
+        return 1.0 - len(self.routes) / self.asked if self.asked else 0.0
+
+
+def paraphrased(
+    routes: Sequence[tuple[str, Route]], worlds: Mapping[str, SeenPlace], client: Client, prompts: Path | None = None
+) -> Paraphrases:
+    """Every route in other words.
+
+    Args:
+      routes: each with the name of its house.
+      prompts: folder with a paraphrase.md of one's own.
+    """
+    prompt = read_prompt("paraphrase", NAMES, prompts)
+    asked = [
+        (prompt.messages(text=r.instruction, style=STYLES[i % len(STYLES)]), SCHEMA) for i, (_, r) in enumerate(routes)
+    ]
+    kept, invalid, unchanged, lost, usage = [], 0, 0, 0, Usage()
+    for (house, route), answer in zip(routes, client.ask_all(asked), strict=True):
+        usage += answer.usage(client.settings)
+        text = "" if answer.value is None else str(answer.value["instruction"]).strip()
+        if not text:
+            invalid += 1
+        elif text.lower() == route.instruction.lower():
+            unchanged += 1
+        elif not arrives(worlds[house], text, route.path, route.turn * STEP):
+            lost += 1
+        else:
+            kept.append(dataclasses.replace(route, id=f"{route.id}_said_again", instruction=text))
+    return Paraphrases(tuple(kept), len(routes), invalid, unchanged, lost, usage)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """The command in this file's first lines."""
+    from assets.cache import default_cache
+    from assets.catalogue import load_catalogue
+    from embodied.datasets.store import Dataset
+    from embodied.records import save_lines
+
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0] if __doc__ else None)
+    parser.add_argument("--data", type=Path, required=True, help="data set with routes (HANNA or VLN)")
+    parser.add_argument("--split", default="train", help="whose houses (default: train)")
+    parser.add_argument("--routes", type=int, help="at most so many")
+    parser.add_argument("--out", type=Path, required=True, help="JSON Lines file of the routes that are kept")
+    parser.add_argument("--cache", type=Path, default=default_cache(), help="where expensive products are kept")
+    add_model(parser)
+    args = parser.parse_args(words)
+    data, catalogue = Dataset(args.data), load_catalogue(args.cache)
+    routes = [(name, r) for name in data.names(args.split) for r in data.routes(name)][: args.routes]
+    worlds = {name: data.open_world(name, catalogue, args.cache) for name in {n for n, _ in routes}}
+    found = paraphrased(routes, worlds, client_of(args), args.prompts)
+    save_lines(args.out, found.routes)
+    print(
+        f"{len(found.routes)} of {found.asked} kept ({found.failing:.1%} dropped: {found.invalid} invalid, "
+        f"{found.unchanged} unchanged, {found.lost} with which a listener gets lost); {found.usage}"
+    )
+
+
+if __name__ == "__main__":
+    main()

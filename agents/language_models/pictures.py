@@ -1,0 +1,90 @@
+"""What a model that sees is shown: candidate views as one numbered strip, or the panorama with numbered markers."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import Protocol
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from embodied.house.floor_plan import font
+from embodied.interface import STEP, VIEW_PITCHES, Observation, Sight
+from embodied.render.panorama import Panorama
+
+VIEW = 224
+"""Height and width of a candidate's view, pixels."""
+ANGLE = np.radians(75.0)
+"""Its vertical field of view, radians."""
+HEIGHT = 384
+"""Of the panorama, pixels."""
+PICTURES = ("strip", "panorama")
+
+
+class Panoramas(Protocol):
+    """Gives the panorama of a sight; embodied.gym.eyes.PanoramaStore is one."""
+
+    def at(self, sight: Sight) -> Panorama: ...
+
+
+def shown(o: Observation, panoramas: Panoramas, how: str) -> tuple[str, ...]:
+    """The pictures of an observation as data URLs; the image that is looked for (HANNA) last.
+
+    Args:
+      how: one of PICTURES.
+
+    Raises:
+      ValueError: another word.
+    """
+    if how not in PICTURES:
+        raise ValueError(f"pictures should be one of {PICTURES}, got {how!r}")
+    here = panoramas.at(o.sight)
+    first = strip(o, here) if how == "strip" else marked_panorama(o, here)
+    target = () if o.target is None else (_url(around(panoramas.at(o.target), 0.0, HEIGHT // 2)),)
+    return (_url(first), *target)
+
+
+def strip(o: Observation, panorama: Panorama) -> Image.Image:
+    """The view towards each candidate, side by side, its number in the corner; of VNLA, the view ahead."""
+    yaw, numbers = o.turn * STEP, list(range(len(o.candidates)))
+    looks = [(yaw + float(o.candidates.bearing[i]), float(o.candidates.slope[i])) for i in numbers]
+    if o.candidates.words or not looks:
+        numbers, looks = [], [(yaw, float(VIEW_PITCHES[12 * (o.tilt + 1)]))]
+    sheet = Image.new("RGB", (VIEW * len(looks) + 4 * (len(looks) - 1), VIEW), "white")
+    pen = ImageDraw.Draw(sheet)
+    for k, (along, pitch) in enumerate(looks):
+        sheet.paste(Image.fromarray(panorama.view_rgb(along, pitch, ANGLE, size=(VIEW, VIEW))), (k * (VIEW + 4), 0))
+        if numbers:
+            _label(pen, k * (VIEW + 4) + 20, 20, numbers[k])
+    return sheet
+
+
+def marked_panorama(o: Observation, panorama: Panorama) -> Image.Image:
+    """Everything around, the gaze in the middle, a numbered marker towards each candidate."""
+    yaw = o.turn * STEP
+    sheet = around(panorama, yaw, HEIGHT)
+    pen = ImageDraw.Draw(sheet)
+    if not o.candidates.words:
+        for i, bearing in enumerate(o.candidates.bearing):
+            x = (0.5 - float(bearing) / (2 * np.pi)) * 2 * HEIGHT
+            _label(pen, round(x), round(HEIGHT * (0.62 - float(o.candidates.slope[i]) / np.pi)), i)
+    return sheet
+
+
+def around(panorama: Panorama, yaw: float, height: int) -> Image.Image:
+    """The panorama as one picture (height, 2 height) with `yaw` (radians) in its middle."""
+    whole = panorama.equirect(height)
+    return Image.fromarray(np.roll(whole, round(yaw / (2 * np.pi) * 2 * height), axis=1))
+
+
+def _label(pen: ImageDraw.ImageDraw, x: int, y: int, number: int) -> None:
+    pen.ellipse((x - 13, y - 13, x + 13, y + 13), fill="white", outline="black", width=2)
+    pen.text((x, y), str(number), font=font(18), fill="black", anchor="mm")
+
+
+def _url(picture: Image.Image) -> str:
+    """A JPEG as a data URL: the same picture gives the same bytes with one version of Pillow."""
+    out = io.BytesIO()
+    picture.save(out, "JPEG", quality=85)
+    return "data:image/jpeg;base64," + base64.b64encode(out.getvalue()).decode()

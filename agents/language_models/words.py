@@ -1,0 +1,110 @@
+"""An observation in words: what is seen, where one can go, what can be done. No word tells one place from another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from embodied.geometry import wrap
+from embodied.interface import STEP, Action, Ask, Description, Move, Observation, SeenPlace, Sight, Stop
+
+MOST_NAMES = 12
+"""Things that are named of one place."""
+SMALLEST = 20
+"""Fewest pixels of a sighting (of 24576 around) of what is named."""
+
+
+class Namer(Protocol):
+    """Names what can be seen of a sight; a stand-in for eyes, and an oracle."""
+
+    def names(self, sight: Sight) -> Sequence[tuple[str, float, float]]:
+        """(object class, yaw in radians, metres), the largest in view first."""
+        ...
+
+
+class SeenNames:
+    """The true names of what can be seen: an oracle in place of pictures."""
+
+    def __init__(self, worlds: Mapping[str, SeenPlace]) -> None:
+        self._worlds = worlds
+
+    def names(self, sight: Sight) -> list[tuple[str, float, float]]:
+        seen = self._worlds[sight._world].sightings(sight._node)
+        return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST][:MOST_NAMES]
+
+
+def actions_of(o: Observation) -> dict[str, Action]:
+    """Every possible action by the name that a model calls it by."""
+    c = o.candidates
+    moves: dict[str, Action] = {
+        (c.words[i] if c.words else f"go {i}"): Move(i) for i in range(len(c)) if bool(c.allowed[i])
+    }
+    return {**moves, **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
+
+
+def side(bearing: float) -> str:
+    """A direction relative to the gaze (radians, left positive) in words, to 30 degrees."""
+    steps = round(float(wrap(bearing)) / STEP)
+    if steps == 0:
+        return "straight ahead"
+    if abs(steps) >= 6:
+        return "behind you"
+    return f"{30 * abs(steps)} degrees to the {'left' if steps > 0 else 'right'}"
+
+
+def ways(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+    """The candidates: 'go 0: straight ahead, towards the sofa; go 1: ...'."""
+    if o.candidates.words:
+        return ", ".join(w for w, ok in zip(o.candidates.words, o.candidates.allowed) if ok)
+    yaw, said = o.turn * STEP, []
+    for i, bearing in enumerate(o.candidates.bearing):
+        off = [(abs(float(wrap(y - yaw - bearing))), name) for name, y, _ in names]
+        towards = f", towards the {min(off)[1]}" if off and min(off)[0] < STEP / 2 else ""
+        slope = float(o.candidates.slope[i])
+        stairs = "" if abs(slope) < math.radians(15) else f", {'up' if slope > 0 else 'down'} the stairs"
+        said.append(f"go {i}: {side(float(bearing))}{towards}{stairs}")
+    return "; ".join(said) or "nowhere"
+
+
+def sees(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+    """What the observation tells of the place: names, descriptions (HARI, Ask-v0) and detections (Ask-v0)."""
+    yaw = o.turn * STEP
+    parts = [f"{name} ({side(y - yaw)}, {d:.0f} m)" for name, y, d in names]
+    if o.state_description:
+        parts.append(f"here: {described(o.state_description, o.turn)}")
+    for d in o.detections:
+        parts.append(f"perhaps it: {side(d.bearing)}, {d.distance:.1f} m, score {d.score:.2f}")
+    if o.advised is not None:
+        told = "stop here" if isinstance(o.advised, Stop) else f"go {o.advised.candidate}"
+        parts.append(f"the route that you were told says: {told}")
+    if o.goal_descriptions:
+        parts.append(f"where to go: {described(o.goal_descriptions[-1], o.turn)}")
+    return "; ".join(parts) or "nothing that has a name"
+
+
+def described(description: Description, turn: int) -> str:
+    """A bag of features in words, directions relative to the gaze."""
+    said = []
+    for f in description:
+        if f.kind == "room":
+            said.append(f.name.replace("_", " "))
+        elif f.name == "stop":
+            said.append("you are there")
+        else:
+            where = side((f.horizontal - turn) * STEP)
+            said.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
+    return ", ".join(said)
+
+
+def walk_in_words(world: SeenPlace, path: Sequence[int], yaw: float) -> str:
+    """What happened on a walk, plainly: turns, rooms, and what one stands by at its end."""
+    from embodied.language import PlainLanguage
+
+    plain = PlainLanguage().route(world, path, yaw, rng=np.random.default_rng(0))
+    kind = world.house.room_by_id[world.graph.room_of_node[path[0]]].kind.replace("_", " ")
+    near = sorted((s.distance, s.object_class) for s in world.sightings(path[-1]) if s.pixels >= SMALLEST)[:2]
+    end = f" By the end there is {' and '.join(name for _, name in near)}." if near else ""
+    return f"It begins in the {kind}: {plain}{end}"

@@ -1,0 +1,1 @@
+"""The one study engine: tables are data, a learner is a protocol."""

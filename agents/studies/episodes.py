@@ -1,0 +1,130 @@
+"""Studies of agents that play episodes on a data set: what is common to them, so that a learner is a few functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import torch
+
+from agents.common.session import Note
+from agents.studies.engine import Measured, StudyRow, Table
+from embodied.datasets.store import Dataset, SplitData
+from embodied.evaluation.evaluate import spread
+from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import Samples, measured
+from embodied.identity import Identity, identity_of
+from embodied.interface import Agent, Episode
+from embodied.records import save_lines
+
+JUDGES = ("embodied.evaluation.evaluate", "embodied.datasets.store")
+"""Modules that decide how every agent is judged."""
+
+
+@dataclass(frozen=True)
+class EpisodeStudy:
+    """A study whose agents play episodes. A learner says `settings`, `train`, `load`, `policies` and its tables.
+
+    It is a StudyLearner of agents.studies.engine.
+    """
+
+    data: Path
+    """Data set."""
+    repeats: tuple[int, ...]
+    """Training seeds."""
+    tasks: int | None = None
+    """Judge on at most so many tasks of a split, from all houses alike."""
+    judging: tuple[int, ...] = (0,)
+    """Seeds of what is drawn in judging; the same tasks are judged with each."""
+    threads: int = 1
+    """Of PyTorch, per run."""
+
+    name = ""
+    makers: ClassVar[tuple[str, ...]] = ()
+    """Modules that decide what is trained."""
+    judges: ClassVar[tuple[str, ...]] = JUDGES
+    batch = 32
+    """Episodes judged side by side; has no influence on results."""
+
+    # What a learner says ------------------------------------------------------------------------
+
+    def tables(self) -> Mapping[str, Table]:
+        raise NotImplementedError
+
+    def settings(self, train: Mapping[str, Any], seed: int) -> object:
+        """The settings, a record, with what differs in a row."""
+        raise NotImplementedError
+
+    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+        """As in engine.StudyLearner."""
+        raise NotImplementedError
+
+    def load(self, weights: Path) -> Any:
+        """A trained agent."""
+        raise NotImplementedError
+
+    def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
+        """Who plays; `agent` is None in rows that do not learn."""
+        raise NotImplementedError
+
+    # What it may say otherwise ------------------------------------------------------------------
+
+    def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
+        """All that a run depends on besides its settings."""
+        return {"data": Dataset(self.data).digest}
+
+    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
+        """The data set in whose houses a row is judged."""
+        return Dataset(self.data)
+
+    def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
+        """Tasks and environments that a row is judged in."""
+        return self.judged_in(judge).split(split)
+
+    def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
+        """What is counted of some episodes."""
+        return measured(episodes, {name: place.graph for name, place in split.worlds.items()})
+
+    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
+        """As in engine.StudyLearner."""
+
+    def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
+        """As in engine.StudyLearner."""
+
+    # What the engine asks -----------------------------------------------------------------------
+
+    def seeds(self, row: StudyRow) -> Sequence[int]:
+        return self.repeats if row.train is not None else self.repeats[:1]
+
+    def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
+        return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))
+
+    def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
+        return {"data": self.judged_in(row.judge).digest, "tasks": self.tasks, "judging": self.judging}
+
+    @torch.inference_mode()
+    def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
+        agent = None if weights is None else self.load(weights)
+        whole = self.where(agent, row.judge, split)
+        tasks, player = spread(whole.tasks, self.tasks), self.policies(agent, row.judge, split)
+        found: list[Episode] = []
+        for k in self.judging:
+            episodes = play(whole.make_env, player, tasks, seed=k, batch=self.batch, agent=keep.name)
+            save_lines(keep.with_name(f"{keep.name}_{k}.jsonl"), episodes)
+            found += episodes
+        return self.count(found, whole, row.judge)
+
+    def about(self) -> str:
+        seeds, data = ", ".join(map(str, self.repeats)), Dataset(self.data)
+        tasks = "all" if self.tasks is None else f"at most {self.tasks}"
+        return (
+            f"Data set {data.digest[:16]}, {len(data.names('train'))} training houses; training seeds {seeds}; {tasks} "
+            f"tasks of a split, judged with seeds {', '.join(map(str, self.judging))}."
+        )
+
+
+def mean_of(values: Sequence[float], groups: Sequence[str] = ()) -> Samples:
+    """Numbers of which the mean is shown."""
+    return Samples(tuple(map(float, values)), tuple(groups))

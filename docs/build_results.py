@@ -1,0 +1,122 @@
+"""Writes the tables of docs/results/data/*.json into the pages that show them, and a page with all tables.
+
+    python docs/build_results.py            # writes
+    python docs/build_results.py --check    # exits 1 where a page is not what the data say
+
+A page shows a table between two comments; `columns` chooses some of its columns by key:
+
+    <!-- table: hanna-4.5 columns: success_unseen_houses, requests_unseen_houses -->
+    <!-- end -->
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+DATA = HERE / "results" / "data"
+DETAILS = HERE / "results" / "details.md"
+PLACE = re.compile(
+    r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))? -->\n).*?(<!-- end -->)", re.DOTALL
+)
+OLDER = "Measured with an earlier version of the program."
+
+
+def load(name: str) -> dict:
+    """The table of that name.
+
+    Raises:
+      FileNotFoundError: no such table.
+    """
+    return json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def number(value: float, digits: int) -> str:
+    return f"{value:,.{digits}f}".replace("-", "−")
+
+
+def digits_of(table: dict, key: str) -> int:
+    """How many decimals most numbers of a column were written with."""
+    values = [row["values"].get(key, {}) for row in table["rows"]]
+    written = [decimals(v) for v in values if v.get("mean") is not None]
+    return max(set(written), key=lambda n: (written.count(n), n), default=0)
+
+
+def decimals(value: dict) -> int:
+    """How many decimals a number needs, at most three."""
+    numbers = [x for part in ("mean", "half_width") if (x := value.get(part)) is not None and x != int(x)]
+    return max((min(len(repr(x).partition(".")[2]), 3) for x in numbers), default=0)
+
+
+def cell(row: dict, key: str, digits: int) -> str:
+    """'56.4 ± 6.2 (45.43)': the mean, half of its 95 % interval, and what was printed in the paper."""
+    value = row["values"].get(key)
+    if value is None:
+        return ""
+    digits = max(digits, decimals(value))
+    text = value["text"] if "text" in value else number(value["mean"], digits)
+    if value.get("half_width") is not None:
+        text += f" ± {number(value['half_width'], digits)}"
+    printed = row.get("printed", {}).get(key)
+    return text if printed is None else f"{text} ({printed:g})"
+
+
+def markdown(table: dict, columns: str | None = None) -> str:
+    """The table and what one must know to read it."""
+    keys = [c.strip() for c in columns.split(",")] if columns else [c["key"] for c in table["columns"]]
+    shown = {c["key"]: c for c in table["columns"]}
+    chosen = [shown[key] for key in keys]
+    titles = [c["title"] + (f", {c['unit']}" if c.get("unit") else "") for c in chosen]
+    lines = [f"| {table.get('row_title', '')} | " + " | ".join(titles) + " |", "|" + "---|" * (len(chosen) + 1)]
+    digits = {c["key"]: digits_of(table, c["key"]) for c in chosen}
+    for row in table["rows"]:
+        lines.append(f"| {row['label']} | " + " | ".join(cell(row, k, digits[k]) for k in digits) + " |")
+    caption = [f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + f".* {table['settings']}"]
+    if any(row.get("printed") for row in table["rows"]):
+        caption.append("In brackets: the number printed in the paper.")
+    if table["identity"] is None:
+        caption.append(OLDER)
+    notes = "".join(f"- {note}\n" for note in table["notes"])
+    command = f"```\n{table['command']}\n```\n" if table["command"] else ""
+    return "\n".join(lines) + "\n\n" + " ".join(caption) + "\n" + (f"\n{notes}" if notes else "") + f"\n{command}"
+
+
+def filled(text: str) -> str:
+    """A page with its tables."""
+    return PLACE.sub(lambda m: f"{m[1]}\n{markdown(load(m['name']), m['columns'])}\n{m[4]}", text)
+
+
+def details() -> str:
+    """The page with every table in full."""
+    parts = ["# All tables\n\nEvery stored table in full, as `docs/results/data` has it.\n"]
+    for path in sorted(DATA.glob("*.json")):
+        table = json.loads(path.read_text(encoding="utf-8"))
+        parts.append(f"## {table['table']}\n\n{markdown(table)}")
+    return "\n".join(parts)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing, exit 1 where a page is out of date")
+    args = parser.parse_args()
+    stale = []
+    for page in sorted(HERE.rglob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        if page != DETAILS and (new := filled(text)) != text:
+            stale.append(page)
+            if not args.check:
+                page.write_text(new, encoding="utf-8")
+    if args.check:
+        for page in stale:
+            print(f"{page} is not what docs/results/data says; run python docs/build_results.py", file=sys.stderr)
+        return int(bool(stale))
+    DETAILS.write_text(details(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

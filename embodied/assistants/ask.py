@@ -1,0 +1,178 @@
+"""Ask-v0's assistant: true answers to typed questions about the object that is meant, in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from embodied.geometry import wrap
+from embodied.house.house import Placement
+from embodied.interface import STEP, FindDescribed, Intention, Language, Place, Reply, Situation, Subtask
+from embodied.language.plain import PlainLanguage
+from embodied.navigation.graph import nearest
+from embodied.tasks.ask import Look
+from embodied.tasks.goals import footprint_distance
+
+QUESTIONS = (
+    Intention.CONFIRM,
+    Intention.APPEARANCE,
+    Intention.REGION,
+    Intention.ROUTE,
+    Intention.DISAMBIGUATE,
+    Intention.FREE,
+)
+NEAR = 2.0
+"""Metres within which one is at a thing."""
+FARTHEST = 6.0
+"""Metres within which a thing is seen."""
+LONGEST = 6
+"""Nodes of a route that one answer tells."""
+UNKNOWN = "I do not know."
+KEYWORDS = (
+    (Intention.ROUTE, ("how do i get", "way", "route", "direction", "go to", "left", "right")),
+    (Intention.REGION, ("room", "where")),
+    (Intention.APPEARANCE, ("look", "colour", "color", "made", "material", "big", "size")),
+    (Intention.DISAMBIGUATE, ("which",)),
+    (Intention.CONFIRM, ("is it this", "is this", "this one", "correct", "is that")),
+)
+"""By which words the template understands a free question, the first that fits."""
+
+
+def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, float, float]]:
+    """What of the goal's class is in the room and within FARTHEST, nearest first: (placement, yaw, metres)."""
+    eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
+    found = []
+    for name in (*goal.fitting, *goal.similar):
+        p = world.house.placement_by_id[name]
+        if p.room != room:
+            continue
+        distance = float(np.round(footprint_distance(p, eye[None])[0], 6))
+        if distance <= FARTHEST:
+            found.append((name, math.atan2(p.position[1] - eye[1], p.position[0] - eye[0]), distance))
+    return sorted(found, key=lambda x: (x[2], x[0]))
+
+
+class AskAssistant:
+    """Knows where everything is. `facts` is all that whoever words an answer is told."""
+
+    def __init__(self, look: Look, language: Language | None = None) -> None:
+        """
+        Args:
+          look: words of colour and material of things.
+          language: of routes; plain where not given.
+        """
+        self._look, self._language = look, language or PlainLanguage()
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        """Confirm at a thing of the class, disambiguate where several are seen that may be it, all others always."""
+        seen = in_view(situation.world, situation.pose.node, _goal(situation))
+        possible = [name for name, _, _ in seen if name in situation.possible]
+        cannot = set()
+        if not seen or seen[0][2] > NEAR:
+            cannot.add(Intention.CONFIRM)
+        if len(possible) < 2:
+            cannot.add(Intention.DISAMBIGUATE)
+        return tuple(q for q in QUESTIONS if q not in cannot)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        """The truth, and which placements it rules out."""
+        if question is Intention.FREE:
+            meant = understood(situation.question)
+            if meant is None or meant not in self.intentions(situation):
+                return Reply(text=UNKNOWN, intention=question)
+        else:
+            meant = question
+        goal, subtask = _goal(situation), None
+        if meant is Intention.CONFIRM:
+            this = in_view(situation.world, situation.pose.node, goal)[0][0]
+            yes = this == goal.placement
+            text = "Yes, it is this one." if yes else "No, it is not this one."
+            kept = {this} if yes else {*goal.fitting, *goal.similar} - {this}
+        elif meant is Intention.APPEARANCE:
+            text, kept = self._appearance(situation)
+        elif meant is Intention.REGION:
+            text, kept = _region(situation)
+        elif meant is Intention.DISAMBIGUATE:
+            text, kept = _which(situation)
+        else:
+            text, subtask = self._route(situation, rng)
+            kept = {*goal.fitting, *goal.similar}
+        out = tuple(p for p in (*goal.fitting, *goal.similar) if p not in kept)
+        return Reply(text=text, intention=question, subtask=subtask, ruled_out=out)
+
+    def facts(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> tuple[str, ...]:
+        """What a model or a person who words the answer is told: the answer itself, or for a free question, all."""
+        if question is not Intention.FREE:
+            return (self.answer(situation, question, rng=rng).text or "",)
+        told = (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE)
+        return tuple(self.answer(situation, q, rng=rng).text or "" for q in told)
+
+    def _appearance(self, s: Situation) -> tuple[str, set[str]]:
+        goal, of = _goal(s), s.world.house.placement_by_id
+        mine, own = of[goal.placement], self._look(of[goal.placement])
+        width = f"about {max(mine.size[0], 0.05):.1f} m wide"
+        text = f"It is {', '.join([*own, width])}{_beside(s.world, mine)}."
+        return text, {p for p in (*goal.fitting, *goal.similar) if self._look(of[p]) == own}
+
+    def _route(self, s: Situation, rng: np.random.Generator) -> tuple[str, Subtask]:
+        graph = s.world.graph
+        whole = graph.path(s.pose.node, nearest(graph, s.pose.node, s.task.goal_nodes))
+        nodes = whole[:LONGEST]
+        subtask = Subtask("route", nodes[-1], path=nodes)
+        if len(nodes) < 2:
+            return "You are there.", subtask
+        text = self._language.route(s.world, nodes, s.pose.yaw, rng=rng)
+        return text + ("" if nodes == whole else " From there it is further."), subtask
+
+
+def understood(text: str) -> Intention | None:
+    """The typed question that a free one amounts to, as far as a template understands it."""
+    text = text.lower()
+    return next((q for q, keys in KEYWORDS if any(k in text for k in keys)), None)
+
+
+def _goal(s: Situation) -> FindDescribed:
+    if not isinstance(s.task.goal, FindDescribed):
+        raise TypeError(f"this assistant answers in Ask-v0 only, {s.task.id!r} is of kind {s.task.kind!r}")
+    return s.task.goal
+
+
+def _region(s: Situation) -> tuple[str, set[str]]:
+    goal, house = _goal(s), s.world.house
+    kind_of = {p: house.room_by_id[house.placement_by_id[p].room].kind for p in (*goal.fitting, *goal.similar)}
+    kind = kind_of[goal.placement]
+    several = sum(r.kind == kind for r in house.rooms) > 1
+    name = kind.replace("_", " ")
+    return f"It is in {'one of the ' + name + 's' if several else 'the ' + name}.", {
+        p for p, k in kind_of.items() if k == kind
+    }
+
+
+def _which(s: Situation) -> tuple[str, set[str]]:
+    goal = _goal(s)
+    seen = {name: (yaw, d) for name, yaw, d in in_view(s.world, s.pose.node, goal)}
+    if goal.placement not in seen:
+        return "None of those that you see.", {*goal.fitting, *goal.similar} - set(seen)
+    yaw, distance = seen[goal.placement]
+    return f"The one {_side(float(wrap(yaw - s.pose.yaw)))}, {distance:.1f} m from you.", {goal.placement}
+
+
+def _side(bearing: float) -> str:
+    steps = round(bearing / STEP)
+    if steps == 0:
+        return "straight ahead"
+    return "behind you" if abs(steps) >= 6 else f"{30 * abs(steps)} degrees to your {'left' if steps > 0 else 'right'}"
+
+
+def _beside(world: Place, mine: Placement) -> str:
+    """', next to the bed': the nearest larger thing of another class in the room, within 1.5 m."""
+    others: Sequence[Placement] = [
+        p
+        for p in world.house.placements
+        if p.room == mine.room and p.object_class != mine.object_class and p.size[0] * p.size[1] > 0.15
+    ]
+    at = np.asarray([mine.position])
+    near = sorted((float(footprint_distance(p, at)[0]), p.id, p.object_class) for p in others)
+    return f", next to the {near[0][2]}" if near and near[0][0] < 1.5 else ""

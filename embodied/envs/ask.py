@@ -1,0 +1,135 @@
+"""Ask-v0's rule of play: every question costs a step and a price; stopping ends the episode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from embodied.action_spaces import Moves
+from embodied.assistants.ask import in_view
+from embodied.assistants.descriptions import Describer
+from embodied.envs.base import HelpEnv
+from embodied.geometry import wrap
+from embodied.interface import (
+    Action,
+    Ask,
+    Assistant,
+    Description,
+    Detection,
+    FindDescribed,
+    Intention,
+    Move,
+    Place,
+    Reply,
+    Stop,
+)
+from embodied.seeds import stream
+
+
+@dataclass(frozen=True)
+class Prices:
+    """What each question costs, where a success is worth 1."""
+
+    confirm: float = 0.05
+    appearance: float = 0.05
+    region: float = 0.05
+    route: float = 0.2
+    disambiguate: float = 0.1
+    free: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not all(0 <= getattr(self, f) < float("inf") for f in self.__dataclass_fields__):
+            raise ValueError(f"prices should be numbers from 0 on, got {self}")
+
+    def of(self, question: Intention) -> float:
+        return float(getattr(self, question.value))
+
+
+@dataclass(frozen=True)
+class AskRules:
+    """What may be varied of Ask-v0."""
+
+    prices: Prices = Prices()
+    grounded: bool = True
+    """The detector takes in what was answered, and the next step of a route is shown while it is followed. False leaves
+    the agent with the words alone."""
+    fits: float = 0.75
+    other: float = 0.35
+    """Mean score of what fits all that was said, and of other things of the class."""
+    denied: float = 0.1
+    """Mean score of a thing of which was said that it is not it."""
+    noise: float = 0.15
+    """Standard deviation of a score."""
+
+
+class AskEnv(HelpEnv):
+    """Find what somebody has in mind. The detector's noise belongs to thing and place, so looking again does not help;
+    whether a thing is the one that is meant never reaches its score."""
+
+    def __init__(
+        self,
+        worlds: Mapping[str, Place],
+        assistant: Assistant,
+        moves: Moves | None = None,
+        rules: AskRules = AskRules(),
+        describer: Describer | None = None,
+    ) -> None:
+        super().__init__(worlds, assistant, moves)
+        self.rules, self._describer = rules, describer or Describer(())
+
+    def facts(self) -> dict[str, float]:
+        """The price of the questions so far."""
+        return {"price": sum(s.cost for s in self._steps)}
+
+    def _begin(self) -> None:
+        if not isinstance(self.task.goal, FindDescribed):
+            raise TypeError(f"{self.task.id!r} is of kind {self.task.kind!r}, here 'ask' is played")
+        self._goal = self.task.goal
+        self._fitting: tuple[str, ...] = self._goal.fitting
+        self._denied: set[str] = set()
+        self._way: tuple[int, ...] = ()
+        """Nodes of the route that is being followed, the present one first."""
+        self._arrives = False
+        """Whether it leads to a goal node, not only towards one."""
+
+    def _replied(self, reply: Reply) -> None:
+        self._fitting = tuple(p for p in self._fitting if p not in reply.ruled_out)
+        self._denied |= set(reply.ruled_out)
+        if reply.subtask is not None:
+            self._way = reply.subtask.path
+            self._arrives = self._way[-1] in self.task.goal_nodes
+            self._moved()
+        self.instruction = f"{self.instruction} . {reply.text}"
+        self.time_on_task = 0
+
+    def _moved(self) -> None:
+        if self.pose.node in self._way:
+            self._way = self._way[self._way.index(self.pose.node) :]
+        if self.pose.node not in self._way or (len(self._way) == 1 and not self._arrives):
+            self._way = ()
+
+    def _cost(self, action: Action) -> float:
+        return self.rules.prices.of(action.intention) if isinstance(action, Ask) else 0.0
+
+    def _possible(self) -> tuple[str, ...]:
+        return self._fitting
+
+    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
+        """The room and what is near."""
+        return self._describer.dense(self.world, self.pose.node), ()
+
+    def _advised(self) -> Move | Stop | None:
+        if not self.rules.grounded or not self._way:
+            return None
+        return Stop() if len(self._way) == 1 else Move(self.situation.candidate_nodes.index(self._way[1]))
+
+    def _detections(self) -> tuple[Detection, ...]:
+        known = self._fitting if self.rules.grounded else self._goal.fitting
+        denied = self._denied if self.rules.grounded else ()
+        found = []
+        for name, yaw, distance in in_view(self.world, self.pose.node, self._goal):
+            rng = stream(0, "detector", self.task.world, name, self.pose.node)
+            mean = self.rules.denied if name in denied else self.rules.fits if name in known else self.rules.other
+            score = min(max(mean + self.rules.noise * float(rng.standard_normal()), 0.0), 1.0)
+            found.append(Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2)))
+        return tuple(sorted(found, key=lambda d: (-d.score, d.distance)))

@@ -1,0 +1,180 @@
+"""Judging on Ask-v0: houses from seeds that nobody has seen, and agents from a folder or over HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import importlib.util
+import json
+import sys
+import urllib.parse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from embodied.errors import UnableError
+from embodied.evaluation.tables import Row, row
+from embodied.interface import (
+    Action,
+    Actions,
+    Agent,
+    Ask,
+    Episode,
+    Intention,
+    Move,
+    Observation,
+    Observations,
+    Place,
+    Stop,
+    Task,
+)
+from embodied.records import RecordError, parse, to_json
+from embodied.tasks.ask import AskConfig, Look, ask_pool, ask_tasks
+
+MOST_BYTES = 100_000
+"""Of an answer over HTTP; more is not read."""
+SECONDS = 60.0
+"""Time for an answer over HTTP."""
+COLUMNS = ("success", "spl", "weighted success", "success progress", "price", "price per success", "requests")
+
+
+def read_seeds(path: Path) -> list[int]:
+    """The seeds of a list: one whole number a line, '#' begins a remark.
+
+    Raises:
+      ValueError: names the line.
+    """
+    seeds = []
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        word = line.partition("#")[0].strip()
+        if word:
+            try:
+                seeds.append(int(word))
+            except ValueError:
+                raise ValueError(f"{path}:{number} should be a whole number, got {word[:40]!r}") from None
+    if not seeds or len(set(seeds)) < len(seeds):
+        raise ValueError(f"{path} should hold at least one seed and none twice")
+    return seeds
+
+
+def ask_split(
+    houses: Mapping[str, Place], look: Look, per_house: int, *, seed: int, unseen: bool | None = None
+) -> list[Task]:
+    """So many tasks of every house.
+
+    Args:
+      unseen: only classes that are kept from training, or only the others.
+    """
+    tasks: list[Task] = []
+    for place in houses.values():
+        tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen, config=AskConfig()), per_house, seed=seed)
+    return tasks
+
+
+def ask_row(agent: str, split: str, episodes: Sequence[Episode], places: Mapping[str, Place], *, seed: int) -> Row:
+    """All measures of one agent."""
+    return row(agent, split, episodes, {n: p.graph for n, p in places.items()}, seed=seed)
+
+
+# Agents of others -------------------------------------------------------------------------------
+
+
+def submitted(where: str) -> Agent:
+    """The agent of a submission: a folder whose agent.py has `make_agent()`, or the address of an HTTP agent.
+
+    Code of a folder is run as it is: judge strangers in a container.
+
+    Raises:
+      ValueError: neither.
+    """
+    if where.startswith(("http://", "https://")):
+        return HttpAgent(where)
+    file = Path(where) / "agent.py"
+    if not file.exists():
+        raise ValueError(
+            f"{where} should be an agent's http:// address, or a folder with an agent.py with make_agent()"
+        )
+    spec = importlib.util.spec_from_file_location("submission", file)
+    assert spec is not None and spec.loader is not None, "a .py file"
+    module = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(file.parent.resolve()))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
+    if not callable(getattr(module, "make_agent", None)):
+        raise ValueError(f"{file} should define make_agent(), which gives an embodied.interface.Policy")
+    agent = module.make_agent()
+    if hasattr(agent, "act_privileged") or not hasattr(agent, "act"):
+        raise ValueError(f"{file}: an agent has `act` and is not shown the situations")
+    return agent
+
+
+class HttpAgent:
+    """Asks a server for every action: POST of an observation as JSON, answered by {"action": "go 0"}.
+
+    An answer that is none stops the episode.
+    """
+
+    def __init__(self, url: str) -> None:
+        self._url = urllib.parse.urlsplit(url)
+        if not self._url.hostname:
+            raise ValueError(f"{url!r} is no address; write http://HOST:PORT/PATH")
+
+    def act(
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        names = memory or [f"{rng.integers(2**63):x}" for rng in rngs]
+        return [None if o is None else self._one(o, name) for o, name in zip(observations, names, strict=True)], names
+
+    def _one(self, o: Observation, episode: str) -> Action:
+        kind = http.client.HTTPSConnection if self._url.scheme == "https" else http.client.HTTPConnection
+        try:
+            server = kind(self._url.hostname or "", self._url.port, timeout=SECONDS)
+            try:
+                body = json.dumps({"episode": episode, **observed(o)})
+                server.request("POST", self._url.path or "/", body, {"Content-Type": "application/json"})
+                answer = server.getresponse().read(MOST_BYTES + 1)
+            finally:
+                server.close()
+        except (OSError, http.client.HTTPException) as e:
+            raise UnableError(f"no answer from {self._url.geturl()} ({e}); start the agent's server") from e
+        return acted(o, answer)
+
+
+def observed(o: Observation) -> dict[str, object]:
+    """An observation as JSON, without anything that names the place."""
+    c, _seen = o.candidates, o.detections
+    zip(c.bearing, c.slope, strict=True)
+    return {
+        "instruction": o.instruction,
+        "time": o.time,
+        "turn": o.turn,
+        "candidates": [
+            {"bearing": round(float(b), 4), "slope": round(float(s), 4)}
+            for b, s in zip(c.bearing, c.slope, strict=True)
+        ],
+        "can_ask": [i.value for i in o.can_ask],
+        "detections": [
+            {"bearing": round(d.bearing, 4), "distance": d.distance, "score": d.score} for d in o.detections
+        ],
+        "here": json.loads(to_json(o.state_description)),
+        "advised": "stop" if isinstance(o.advised, Stop) else f"go {o.advised.candidate}" if o.advised else None,
+    }
+
+
+def acted(o: Observation, answer: bytes) -> Action:
+    """The action of an answer: 'go 0', 'ask region', 'stop'; with 'question' for a free one. Anything else stops."""
+    try:
+        said = parse(answer[: MOST_BYTES + 1], "an action")
+    except RecordError:
+        return Stop()
+    word = said.get("action") if isinstance(said, dict) else None
+    kind, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
+    if kind == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
+        return Move(int(what))
+    if kind == "ask" and what in {i.value for i in o.can_ask}:
+        question = said.get("question") if isinstance(said, dict) else None
+        return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)
+    return Stop()

@@ -1,0 +1,165 @@
+"""Ask-v0's baselines: one way to explore, and rules of when to ask what.
+
+All explore alike: they remember where they have been (a robot's odometry; that is all they use of the Situation, but
+for the oracle), walk up to what looks like the thing, and follow a route while it is shown. They do not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from embodied.geometry import wrap
+from embodied.interface import (
+    Action,
+    Actions,
+    Agent,
+    Ask,
+    Detection,
+    Intention,
+    Move,
+    Observation,
+    Observations,
+    Situation,
+    Situations,
+    Stop,
+)
+from embodied.policies.baselines import Shortest
+
+REACH = 2.0
+"""Metres within which a thing has been reached."""
+LIKELY = 0.55
+"""Score from which a thing is walked up to."""
+
+
+@dataclass
+class Trail:
+    """What an agent remembers of one episode."""
+
+    visits: dict[int, int] = field(default_factory=dict)
+    asked: dict[Intention, int] = field(default_factory=dict)
+    """How often each question was asked."""
+    confirmed: int | None = None
+    """Where it asked last whether this is it."""
+    before: float = 0.0
+    """The score of the thing then."""
+
+
+AskRule = Callable[[Observation, Detection | None, Trail], Action | None]
+"""What to do about what is known: an Ask, a Stop, or None to go on. It is given the thing that was reached, if any, the
+one nearest."""
+
+
+class Asker:
+    """Explores, and asks by a rule."""
+
+    def __init__(self, rule: AskRule) -> None:
+        self.rule = rule
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        trails = memory or [Trail() for _ in observations]
+        return [
+            None if o is None or s is None else self.one(o, s, trail, rng)
+            for o, s, trail, rng in zip(observations, situations, trails, rngs, strict=True)
+        ], trails
+
+    def one(self, o: Observation, s: Situation, trail: Trail, rng: np.random.Generator) -> Action:
+        """The action of one episode; notes it in its trail."""
+        action = self.rule(o, reached(o), trail)
+        if isinstance(action, Ask) and action.intention in o.can_ask:
+            trail.asked[action.intention] = trail.asked.get(action.intention, 0) + 1
+            return action
+        if isinstance(action, Stop):
+            return action
+        trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
+        return onward(o, s, trail, rng)
+
+
+def reached(o: Observation) -> Detection | None:
+    """The nearest thing of the class within reach."""
+    near = [d for d in o.detections if d.distance <= REACH]
+    return min(near, key=lambda d: d.distance) if near else None
+
+
+def onward(o: Observation, s: Situation, trail: Trail, rng: np.random.Generator) -> Action:
+    """Along the route that is shown, else towards what looks like the thing, else where it has been least."""
+    if o.advised is not None:
+        return o.advised
+    visits = np.array([trail.visits.get(v, 0) for v in s.candidate_nodes])
+    if not len(visits):
+        return Stop()
+    bearing = o.candidates.bearing
+    likely = [d for d in o.detections if d.score >= LIKELY and d.distance > REACH]
+    if likely and visits.min() < 2:
+        off = np.abs(wrap(bearing - likely[0].bearing)) + 2.0 * visits
+        return Move(int(np.argmin(off)))
+    return Move(int(rng.choice(np.flatnonzero(visits == visits.min()))))
+
+
+# Rules ------------------------------------------------------------------------------------------
+
+
+def never(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    """Stops at the first thing that looks like it."""
+    return Stop() if thing and thing.score >= LIKELY else None
+
+
+def always_route(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    """Asks for the way whenever none is shown."""
+    return None if o.advised else Ask(Intention.ROUTE)
+
+
+def confirm_on_sight(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    """Asks at everything that looks like it whether this is it."""
+    return between(LIKELY - 0.1, 2.0)(o, thing, trail)
+
+
+def between(low: float, high: float) -> AskRule:
+    """Stops at a thing whose score is at least `high`, passes by below `low`, and asks between."""
+
+    def rule(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+        here = trail.confirmed == len(trail.visits) + sum(trail.visits.values())
+        if thing is None:
+            return None
+        if here:  # it was asked at this very place: a no has lowered the score
+            return Stop() if thing.score >= trail.before else None
+        if thing.score >= high:
+            return Stop()
+        if thing.score >= low and Intention.CONFIRM in o.can_ask:
+            trail.confirmed = len(trail.visits) + sum(trail.visits.values())
+            trail.before = thing.score
+            return Ask(Intention.CONFIRM)
+        return None
+
+    return rule
+
+
+def first(question: Intention, rule: AskRule) -> AskRule:
+    """Asks one question at the beginning, then follows another rule."""
+
+    def both(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+        return Ask(question) if question in o.can_ask and not trail.asked.get(question) else rule(o, thing, trail)
+
+    return both
+
+
+RULES: Mapping[str, AskRule] = {
+    "never ask": never,
+    "confirm on sight": confirm_on_sight,
+    "threshold 0.45-0.85": between(0.45, 0.85),
+    "threshold 0.55-0.75": between(0.55, 0.75),
+    "appearance first": first(Intention.APPEARANCE, never),
+    "region first": first(Intention.REGION, never),
+    "appearance, then confirm": first(Intention.APPEARANCE, between(0.5, 0.95)),
+    "always route": always_route,
+}
+
+
+def baselines() -> dict[str, Agent]:
+    """All agents that do not learn, by name; the oracle last."""
+    return {**{name: Asker(rule) for name, rule in RULES.items()}, "oracle": Shortest()}

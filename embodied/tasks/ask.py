@@ -1,0 +1,158 @@
+"""Ask-v0: find one described object among its like, where the description may fit several of them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from embodied.house.house import Placement
+from embodied.interface import TURNS, FindDescribed, Place, Pose, Task
+from embodied.seeds import stream
+from embodied.tasks.goals import Instance, find_instances, footprint_distance
+
+Look = Callable[[Placement], tuple[str, ...]]
+"""The words of colour and material of a placement."""
+UNSEEN = 0.25
+"""Share of the object classes that are kept for the split of unseen classes."""
+
+
+@dataclass(frozen=True)
+class AskConfig:
+    """What an Ask-v0 task may be."""
+
+    ambiguous: float = 0.6
+    """Share of the tasks whose request fits several objects."""
+    reach: float = 2.0
+    """A goal node lies within this many metres of the object, in its room, and nearer to it than to its like."""
+    fewest_nodes: int = 4
+    """Nodes on the shortest path to the nearest goal node."""
+    most_nodes: int = 18
+    horizon: int = 60
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.ambiguous <= 1:
+            raise ValueError(f"ambiguous is a share from 0 to 1, got {self.ambiguous}")
+
+
+@dataclass(frozen=True)
+class AskPool:
+    """(goal, start) pairs of a house, ambiguous and clear ones apart, each in a seeded order."""
+
+    world: str
+    goals: tuple[tuple[FindDescribed, tuple[int, ...]], ...]
+    """Goals and their goal nodes."""
+    ambiguous: np.ndarray
+    clear: np.ndarray
+    """(m, 2) int64 each: index into `goals`, start node."""
+
+
+def is_unseen(object_class: str) -> bool:
+    """Whether a class is kept from training; it depends on its name alone."""
+    return float(stream(0, "ask class", object_class).random()) < UNSEEN
+
+
+def ask_pool(
+    world: Place, look: Look, *, seed: int, unseen: bool | None = None, config: AskConfig = AskConfig()
+) -> AskPool:
+    """All tasks of a house.
+
+    Args:
+      unseen: only classes that are kept from training, or only the others; all if None.
+    """
+    by_class: dict[str, list[Instance]] = {}
+    for x in find_instances(world, config.reach):
+        if unseen is None or is_unseen(x.object_class) == unseen:
+            by_class.setdefault(x.object_class, []).append(x)
+    found = [(x, alike) for _, alike in sorted(by_class.items()) if len(alike) > 1 for x in alike]
+    goals, kinds = [], []
+    for x, alike in found:
+        if nodes := _own_nodes(world, x, alike):
+            for goal in _descriptions(world, x, alike, look):
+                goals.append((goal, nodes))
+                kinds.append(len(goal.fitting) > 1)
+    hops, distance = world.graph.hops + 1, np.asarray(world.graph.distance)
+    pairs: tuple[list[tuple[int, int]], list[tuple[int, int]]] = ([], [])
+    for g, (_, goal_nodes) in enumerate(goals):
+        ends = np.array(goal_nodes)
+        count = hops[np.arange(len(hops)), ends[np.argmin(distance[:, ends], axis=1)]]
+        fits = (count >= config.fewest_nodes) & (count <= config.most_nodes)
+        pairs[kinds[g]].extend((g, int(v)) for v in np.flatnonzero(fits))
+    classes = [goal.object_class for goal, _ in goals]
+    clear, ambiguous = (
+        _in_turn(p, classes, rng=stream(seed, "pool", "ask", world.house.name, k)) for k, p in enumerate(pairs)
+    )
+    return AskPool(world.house.name, tuple(goals), ambiguous, clear)
+
+
+def ask_tasks(pool: AskPool, count: int, *, seed: int, config: AskConfig = AskConfig()) -> list[Task]:
+    """The first `count` tasks of a house, of which the stated share is ambiguous; fewer where the house has fewer."""
+    tasks = []
+    for j in range(count):
+        before, after = math.floor(j * config.ambiguous + 1e-9), math.floor((j + 1) * config.ambiguous + 1e-9)
+        pairs, k = (pool.ambiguous, before) if after > before else (pool.clear, j - before)
+        if k >= len(pairs):
+            break
+        goal, goal_nodes = pool.goals[int(pairs[k, 0])]
+        turn = int(stream(seed, "task", "ask", pool.world, j).integers(TURNS))
+        task = Task(
+            id=f"{pool.world}/ask/{j}",
+            kind="ask",
+            world=pool.world,
+            start=Pose(int(pairs[k, 1]), turn),
+            goal=goal,
+            goal_nodes=goal_nodes,
+            request=request(goal),
+            radius=0.0,
+            horizon=config.horizon,
+        )
+        tasks.append(task)
+    return tasks
+
+
+def request(goal: FindDescribed) -> str:
+    """'find the brown wood chair in the kitchen'."""
+    where = f" in the {goal.room_kind.replace('_', ' ')}" if goal.room_kind else ""
+    return f"find the {' '.join([*goal.words, goal.object_class])}{where}"
+
+
+def _in_turn(pairs: list[tuple[int, int]], classes: list[str], *, rng: np.random.Generator) -> np.ndarray:
+    """(m, 2) int64: shuffled pairs, one of every class before a second of any."""
+    seen: dict[str, int] = {}
+    ranked: list[tuple[int, int, tuple[int, int]]] = []
+    for i in rng.permutation(len(pairs)):
+        name = classes[pairs[i][0]]
+        seen[name] = seen.get(name, 0) + 1
+        ranked.append((seen[name], len(ranked), pairs[i]))
+    return np.array([pair for _, _, pair in sorted(ranked)], dtype=np.int64).reshape(-1, 2)
+
+
+def _own_nodes(world: Place, x: Instance, alike: list[Instance]) -> tuple[int, ...]:
+    """The nodes within reach of an object at which none of its like in the room is as near; ascending."""
+    at = np.asarray(world.graph.positions)[list(x.nodes)]
+    of = world.house.placement_by_id
+    mine = footprint_distance(of[x.placement], at)
+    others = [footprint_distance(of[o.placement], at) for o in alike if o is not x and o.room == x.room]
+    nearest = np.min(others, axis=0) if others else np.full(len(at), np.inf)
+    return tuple(sorted(v for v, d, e in zip(x.nodes, mine, nearest) if d < e - 1e-6))
+
+
+def _descriptions(world: Place, x: Instance, alike: list[Instance], look: Look) -> list[FindDescribed]:
+    """Every way to describe an object by its class, some of its words, and its kind of room."""
+    of = world.house.placement_by_id
+    own, found = look(of[x.placement]), {}
+    looks = {o.placement: look(of[o.placement]) for o in alike}
+    for n in range(len(own) + 1):
+        for words in itertools.combinations(own, n):
+            for kind in (None, x.room_kind):
+                fits = [
+                    o.placement
+                    for o in alike
+                    if all(w in looks[o.placement] for w in words) and kind in (None, o.room_kind)
+                ]
+                others = tuple(o.placement for o in alike if o.placement not in fits)
+                found[words, kind] = FindDescribed(x.object_class, x.placement, tuple(fits), others, words, kind)
+    return list(found.values())

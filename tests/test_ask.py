@@ -1,0 +1,324 @@
+"""Ask-v0: questions have a price and true answers; nothing of the goal reaches the agent unasked."""
+
+from __future__ import annotations
+
+import dataclasses
+import http.server
+import json
+import threading
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hand_worlds import grid_world
+
+from agents.ask.foresight import CHOICES, Foresight
+from agents.ask.learned import LearnedAsker, facts, train
+from embodied.assistants.ask import in_view, understood
+from embodied.cli import main as start
+from embodied.envs.ask import AskRules, Prices
+from embodied.envs.make import ask_environment_maker, look_of
+from embodied.evaluation import tables
+from embodied.evaluation.ask import acted, ask_row, observed, read_seeds, submitted
+from embodied.evaluation.metrics import price, success, success_progress, weighted_success
+from embodied.evaluation.rollout import play
+from embodied.gym.env import HelpGymEnv, layout_of
+from embodied.gym.eyes import Closed
+from embodied.interface import Ask, Intention, Move, Pose, Stop
+from embodied.policies.ask import RULES, Asker, Trail, baselines
+from embodied.records import from_json, to_json
+from embodied.tasks.ask import AskConfig, ask_pool, ask_tasks
+
+CHAIRS = ("red", "red", "blue", "blue")
+
+
+def ask_world():
+    """The grid with four chairs, two red and two blue, one in each room."""
+    world = grid_world()
+    house = world.house
+    (mug,) = [p for p in house.placements if p.id == "mug_1"]
+    corners = {
+        "kitchen_1": (1.2, 0.8),
+        "bedroom_1": (11.0, 0.8),
+        "living_room_1": (1.0, 11.0),
+        "bathroom_1": (11.0, 11.2),
+    }
+    chairs = tuple(
+        dataclasses.replace(mug, id=f"chair_{i}", object_class="chair", room=room, position=(*at, 0.0), asset=colour)
+        for i, ((room, at), colour) in enumerate(zip(corners.items(), CHAIRS))
+    )
+    return dataclasses.replace(world, house=dataclasses.replace(house, placements=(*house.placements, *chairs)))
+
+
+def look(placement) -> tuple[str, ...]:
+    return (placement.asset,) if placement.object_class == "chair" else ()
+
+
+@pytest.fixture(scope="module")
+def world():
+    return ask_world()
+
+
+@pytest.fixture(scope="module")
+def tasks(world):
+    return ask_tasks(ask_pool(world, look, seed=0), 20, seed=0)
+
+
+@pytest.fixture
+def make_env(world):
+    return ask_environment_maker({"grid": world}, look)
+
+
+def at_target(task, world) -> Pose:
+    return dataclasses.replace(task.start, node=task.goal_nodes[0])
+
+
+def test_the_stated_share_of_requests_is_ambiguous_and_all_can_be_solved(world, tasks, make_env):
+    assert sum(len(t.goal.fitting) > 1 for t in tasks) == round(AskConfig().ambiguous * len(tasks))
+    for t in tasks:
+        assert t.goal.placement in t.goal.fitting and not set(t.goal.fitting) & set(t.goal.similar)
+        assert all(word in t.request for word in (*t.goal.words, t.goal.object_class))
+        for node in t.goal_nodes:
+            assert in_view(world, node, t.goal)[0][0] == t.goal.placement, "what is nearest there is what is meant"
+    episodes = play(make_env, baselines()["oracle"], tasks, seed=0)
+    assert all(success(e, world.graph) == 1 for e in episodes)
+    assert [from_json(type(t), to_json(t)) for t in tasks] == tasks
+
+
+def test_task_j_is_the_same_however_many_are_drawn(world, tasks):
+    assert ask_tasks(ask_pool(world, look, seed=0), 7, seed=0) == tasks[:7]
+
+
+def test_every_answer_is_true_and_costs_its_price_and_a_step(world, tasks, make_env):
+    env, prices = make_env(), Prices()
+    for t in tasks:
+        env.reset(t)
+        for question in (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE):
+            before = env.time
+            o = env.step(Ask(question))
+            reply = env.last_step.reply
+            assert t.goal.placement not in reply.ruled_out and env.last_step.cost == prices.of(question)
+            assert env.time == before + 1 and reply.text in o.instruction
+        kind = world.house.room_by_id[world.house.placement_by_id[t.goal.placement].room].kind
+        region = env._steps[0].reply.text
+        assert kind.replace("_", " ") in region
+        assert o.advised is not None
+
+
+def test_confirm_says_yes_at_the_thing_that_is_meant_and_no_elsewhere(world, tasks, make_env):
+    env = make_env()
+    for t in tasks:
+        for goal in (t.goal.placement, *t.goal.fitting):
+            node = next(n for n in range(36) if (v := in_view(world, n, t.goal)) and v[0][0] == goal and v[0][2] <= 2.0)
+            o = env.reset(dataclasses.replace(t, start=dataclasses.replace(t.start, node=node)))
+            assert Intention.CONFIRM in o.can_ask
+            nearest = min(o.detections, key=lambda d: d.distance)
+            o = env.step(Ask(Intention.CONFIRM))
+            yes = goal == t.goal.placement
+            assert env.last_step.reply.text.startswith("Yes" if yes else "No")
+            now = min(o.detections, key=lambda d: d.distance)
+            assert now.score == nearest.score if yes else now.score < nearest.score
+
+
+def test_a_thing_that_is_far_cannot_be_confirmed(world, tasks, make_env):
+    for node in range(36):
+        t = dataclasses.replace(tasks[0], start=Pose(node))
+        o = make_env().reset(t)
+        seen = in_view(world, node, t.goal)
+        assert (Intention.CONFIRM in o.can_ask) == bool(seen and seen[0][2] <= 2.0)
+
+
+def test_nothing_of_the_goal_is_seen_before_it_is_asked_for(world, tasks, make_env):
+    """Tasks alike but for which of the things is meant give equal observations under equal moves."""
+    t = next(t for t in tasks if len(t.goal.fitting) > 1)
+    others = []
+    for p in t.goal.fitting:
+        env = make_env()
+        o = env.reset(dataclasses.replace(t, goal=dataclasses.replace(t.goal, placement=p)))
+        seen = [o]
+        for _ in range(10):
+            o = env.step(Move(0))
+            seen.append(o)
+        others.append(seen)
+    assert all(seen == others[0] for seen in others)
+
+
+def test_without_grounding_answers_come_in_words_alone(world, tasks):
+    env = ask_environment_maker({"grid": world}, look, AskRules(grounded=False))()
+    for t in tasks[:6]:
+        first = env.reset(t)
+        o = env.step(Ask(Intention.ROUTE))
+        assert o.advised is None and o.detections == first.detections
+        assert o.instruction != first.instruction
+
+
+def test_a_free_question_is_answered_by_what_it_means_or_not_at_all(tasks, make_env):
+    env = make_env()
+    env.reset(tasks[0])
+    env.step(Ask(Intention.FREE, question="In which room should I look?"))
+    assert env.last_step.reply.text.startswith("It is in")
+    env.step(Ask(Intention.FREE, question="Do you like me?"))
+    assert env.last_step.reply.text == "I do not know." and not env.last_step.reply.ruled_out
+    assert understood("How do I get there?") is Intention.ROUTE
+
+
+def test_following_told_routes_always_arrives(world, tasks, make_env):
+    episodes = play(make_env, Asker(RULES["always route"]), tasks, seed=0, batch=4)
+    assert all(success(e, world.graph) == 1 for e in episodes)
+    assert all(price(e, world.graph) == pytest.approx(0.2 * e.requests) for e in episodes)
+
+
+def test_asking_pays_and_episodes_do_not_depend_on_the_batch(world, tasks, make_env):
+    """Here, where four chairs look alike, asking at each whether it is the one finds more than never asking."""
+    rate = {}
+    for name in ("never ask", "confirm on sight"):
+        alone = play(make_env, Asker(RULES[name]), tasks, seed=0)
+        assert [to_json(e) for e in play(make_env, Asker(RULES[name]), tasks, seed=0, batch=7)] == [
+            to_json(e) for e in alone
+        ]
+        rate[name] = np.mean([weighted_success(e, world.graph) for e in alone])
+    assert rate["confirm on sight"] > rate["never ask"]
+
+
+def test_measures_by_hand(world, tasks, make_env):
+    t = tasks[0]
+    env = make_env()
+    env.reset(dataclasses.replace(t, start=at_target(t, world)))
+    for q in (Intention.CONFIRM, Intention.REGION, Intention.ROUTE):
+        env.step(Ask(q))
+    env.step(Stop())
+    won = env.episode()
+    env.reset(dataclasses.replace(t, id="grid/ask/lost"))
+    env.step(Ask(Intention.APPEARANCE))
+    env.step(Stop())
+    lost = env.episode()
+    graph = world.graph
+    assert price(won, graph) == pytest.approx(0.3) and weighted_success(won, graph) == pytest.approx(0.7)
+    assert success_progress(won, graph) == pytest.approx(3 / 5) and weighted_success(lost, graph) == 0
+    row = ask_row("by hand", "x", [won, lost], {"grid": world}, seed=0)
+    assert row.values["price per success"].mean == pytest.approx(0.35)
+    assert row.values["asks confirm"].mean == 0.5 and "model calls" not in row.values
+    assert "weighted success (%)" in tables.markdown([row])
+
+
+def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = HelpGymEnv(make_env, tasks, Closed(), layout=layout_of("ask"), render_mode="rgb_array")
+        check_env(env, skip_render_check=True)
+    assert env.render().ndim == 3
+    assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}
+
+
+# Judging others ---------------------------------------------------------------------------------
+
+
+def test_what_an_http_agent_is_sent_names_no_place_and_no_goal(tasks, make_env):
+    for t in tasks:
+        sent = json.dumps(observed(make_env().reset(t)))
+        assert "grid" not in sent and not [p for p in (*t.goal.fitting, *t.goal.similar) if p in sent]
+
+
+def test_an_http_agent_plays_and_nonsense_stops_it(tasks, make_env, world):
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_POST(self):
+            o = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            body = json.dumps({"action": o["advised"] or "ask route"}).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+        agent = submitted(f"http://127.0.0.1:{server.server_port}/act")
+        episodes = play(make_env, agent, tasks[:5], seed=0)
+        server.shutdown()
+    assert all(success(e, world.graph) == 1 for e in episodes)
+    o = make_env().reset(tasks[0])
+    assert acted(o, b'{"action": "go 0"}') == Move(0) and acted(o, b'{"action": "ask region"}') == Ask(Intention.REGION)
+    for bad in (b"<html>", b"[]", b'{"action": 7}', b'{"action": "go 99"}', b'{"action": "go -1"}', b"[" * 99_999, b""):
+        assert acted(o, bad) == Stop()
+
+
+def test_a_submitted_folder_is_judged_and_may_not_see_situations(tmp_path, tasks, make_env):
+    with pytest.raises(ValueError, match=r"agent\.py"):
+        submitted(str(tmp_path))
+    file = tmp_path / "agent.py"
+    file.write_text(
+        "from embodied.interface import Stop\nclass A:\n"
+        "    def act(self, o, m, *, rngs):\n        return [Stop() if x else None for x in o], ()\n"
+        "def make_agent():\n    return A()\n"
+    )
+    (episode,) = play(make_env, submitted(str(tmp_path)), tasks[:1], seed=0)
+    assert episode.ended == "stop" and len(episode.steps) == 1
+    file.write_text("from embodied.policies.baselines import Shortest as make_agent\n")
+    with pytest.raises(ValueError, match="not shown the situations"):
+        submitted(str(tmp_path))
+
+
+def test_a_list_of_seeds_is_read_and_checked(tmp_path):
+    file = tmp_path / "seeds.txt"
+    file.write_text("# ours\n12\n-3  # small\n")
+    assert read_seeds(file) == [12, -3]
+    file.write_text("12\nx\n")
+    with pytest.raises(ValueError, match=r"seeds.txt:2"):
+        read_seeds(file)
+
+
+def test_looks_without_a_catalogue_are_empty(world):
+    assert look_of(None)(world.house.placements[0]) == ()
+
+
+# Who learns to ask ------------------------------------------------------------------------------
+
+
+def test_the_oracle_of_asking_improves_on_the_rule_that_it_thinks_ahead_with(world, tasks, make_env):
+    def value(agent) -> float:
+        return float(np.mean([weighted_success(e, world.graph) for e in play(make_env, agent, tasks[:6], seed=0)]))
+
+    assert value(Foresight(make_env)) > value(Asker(RULES["confirm on sight"])), "which it goes on with in its head"
+
+
+def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
+    env = make_env()
+    env.reset(tasks[0])
+    before = (len(env._steps), env.time, env.pose, env._fitting, set(env._denied))
+    Foresight(make_env)._value(env, env.observation, Trail(), Intention.APPEARANCE, np.random.default_rng(0))
+    assert (len(env._steps), env.time, env.pose, env._fitting, set(env._denied)) == before
+
+
+def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
+    """It is taught to ask for the way at once, and does so."""
+    shown = [(o := make_env().reset(t), facts(o, Trail()))[1] for t in tasks]
+    labels = np.full(len(shown), CHOICES.index(Intention.ROUTE))
+    net = train(np.stack(shown), labels, seed=0)
+    episodes = play(make_env, LearnedAsker(net), tasks[:4], seed=0)
+    assert all(isinstance(e.steps[0].action, Ask) and e.steps[0].action.intention is Intention.ROUTE for e in episodes)
+    quiet = play(make_env, LearnedAsker(net, reserve=100.0), tasks[:4], seed=0)
+    assert not any(e.requests for e in quiet)
+
+
+@pytest.mark.slow
+def test_the_command_judges_in_houses_of_hidden_seeds_and_does_not_tell_the_seeds(tmp_path, shared_cache, capsys):
+    (tmp_path / "seeds.txt").write_text("918273645\n")
+    words = [
+        "evaluate",
+        "ask",
+        "--seeds",
+        str(tmp_path / "seeds.txt"),
+        "--agent",
+        "never ask",
+        "oracle",
+        "--tasks",
+        "4",
+    ]
+    assert start([*words, "--cache", str(shared_cache), "--out", str(tmp_path / "out"), "--sees", "nothing"]) == 0
+    assert "weighted success" in capsys.readouterr().out
+    written = "".join(p.read_text() for p in (tmp_path / "out").rglob("*") if p.is_file())
+    assert "918273645" not in written and '"world":"ask_0"' in written

@@ -1,0 +1,590 @@
+"""The losses of 4.2.3 by hand, and training as a whole: it learns, resumes exactly, and fails clearly."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import itertools
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import torch.distributed as dist
+from hand_worlds import grid_world
+
+from agents.common.checkpoint import CheckpointError
+from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
+from agents.common.lessons import Split
+from agents.common.session import Clock, DivergedError, as_good, falling_rate, metrics_of, tasks_of_update
+from agents.common.spine import ADDED, NUMBERS
+from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
+from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
+from agents.hanna.asking import RULES, ask_above
+from agents.hanna.collect import collect, imitation_loss
+from agents.hanna.losses import (
+    IGNORE,
+    curiosity,
+    help_loss,
+    navigation_loss,
+    negative_log_likelihood,
+    reason_loss,
+    relative_entropy,
+)
+from agents.hanna.policy import for_training
+from agents.hanna.training import learn_once, train
+from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
+from agents.vision.bank import FeatureBank
+from embodied.action_spaces import PanoramicMoves
+from embodied.assistants.anna import Anna
+from embodied.assistants.route_system import build_routes
+from embodied.envs.hanna import HannaEnv
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
+from embodied.identity import identity_of
+from embodied.interface import Ask, Move, Observation, Sight, Stop
+from embodied.language.plain import PlainLanguage
+from embodied.locks import LockedError, locked
+from embodied.tasks.hanna import hanna_pool, hanna_task
+from embodied.teachers.hanna import HannaTeacher
+
+torch.set_num_threads(1)
+
+TINY = dataclasses.replace(
+    SCALES["mini"],
+    hidden_size=32,
+    navigation_embedding=32,
+    ask_embedding=8,
+    self_heads=2,
+    text_heads=2,
+    dropout=0.1,
+    iterations=4,
+    batch=6,
+    training_steps=8,
+    validate_every=2,
+    validation_tasks=6,
+    instruction_length=40,
+    learning_rate=3e-3,
+    cooldown=0.25,
+)
+JUDGED = dataclasses.replace(EVALUATIONS["mini"], evaluation_steps=12)
+
+
+def setting(side: int = 6, houses: int = 1) -> Split:
+    """Grids with people and routes, and features that tell the nodes apart."""
+    worlds = {f"grid{i}": grid_world(side, name=f"grid{i}") for i in range(houses)}
+    routes = {n: build_routes(w, seed=3, language=PlainLanguage(), house_split="test") for n, w in worlds.items()}
+    tasks = []
+    for world in worlds.values():
+        pool = hanna_pool(world, seed=3)
+        tasks += [hanna_task(pool, i, seed=3, language=PlainLanguage()) for i in range(min(30, len(pool)))]
+    anna = Anna({n: w.graph for n, w in worlds.items()}, routes, split="test")
+    moves = PanoramicMoves()
+    rng = np.random.default_rng(0)
+    bank = FeatureBank({n: rng.normal(size=(side * side, 36, 16)) for n in worlds}, "tests")
+    return Split(worlds, tasks, lambda: HannaEnv(worlds, anna, moves), bank)
+
+
+def agent_for(split: Split, config: TrainingConfig = TINY, evaluation=JUDGED):
+    world = next(iter(split.worlds.values()))
+    routes = build_routes(world, seed=3, language=PlainLanguage(), house_split="test")
+    words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
+    return new_agent(config, words, split.bank.digest, split.bank.size, evaluation)
+
+
+def identity(agent):
+    return identity_of(settings=agent.config, encoder=agent.encoder_digest)
+
+
+def run(folder, config=TINY, split=None, **options):
+    split = split or setting()
+    agent = agent_for(split, config)
+    progress = train(agent, split, split, HannaTeacher(), folder, identity(agent), note=lambda line: None, **options)
+    return agent, progress
+
+
+# Losses ------------------------------------------------------------------------------------------
+
+
+def test_the_navigation_loss_is_that_of_equation_4_13():
+    logits = torch.log(torch.tensor([[0.5, 0.2, 0.3], [0.1, 0.8, 0.1], [0.2, 0.2, 0.6]]))
+    labels = torch.tensor([0, 1, IGNORE])
+    negatives = torch.tensor([[False, True, True], [False, False, False], [True, False, False]])
+    expected = [-math.log(0.5) + 2.0 * (math.log(0.2) + math.log(0.3)) / 2, -math.log(0.8), 0.0]
+    assert torch.allclose(navigation_loss(logits, labels, negatives, 2.0), torch.tensor(expected))
+    assert torch.allclose(navigation_loss(logits, labels, negatives, 0.0), negative_log_likelihood(logits, labels))
+
+
+def test_the_curiosity_loss_pushes_past_mistakes_down_even_beside_masked_actions():
+    logits = torch.tensor([[1.0, 0.5, -torch.inf]], requires_grad=True)
+    curiosity(logits, torch.tensor([0]), torch.tensor([[False, True, False]])).sum().backward()
+    assert torch.isfinite(logits.grad).all()
+    assert logits.grad[0, 1] > 0  # gradient descent lowers it
+    assert logits.grad[0, 2] == 0
+
+
+def test_below_its_floor_the_curiosity_loss_lets_a_mistake_be():
+    logits = torch.log(torch.tensor([[0.989, 0.001, 0.01]])).requires_grad_()
+    label, both = torch.tensor([0]), torch.tensor([[False, True, True]])
+    loss = curiosity(logits, label, both, floor=0.005)
+    assert loss.item() == pytest.approx((math.log(0.005) + math.log(0.01)) / 2, rel=1e-4)
+    loss.sum().backward()
+    free = curiosity(logits, label, torch.tensor([[False, False, True]])) / 2
+    alone = torch.autograd.grad(free.sum(), logits)[0]
+    assert torch.allclose(logits.grad, alone, atol=1e-6)
+
+
+def test_the_help_loss_is_that_of_equation_4_14():
+    ask = torch.log(torch.tensor([[0.25, 0.75], [0.5, 0.5]]))
+    labels = torch.tensor([1, IGNORE])
+    rho = torch.tensor([[0.9, 0.2, 0.5], [0.9, 0.9, 0.9]])
+    reasons = torch.tensor([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    binary = -(math.log(0.9) + math.log(0.8) + math.log(0.5)) / 3
+    assert torch.allclose(reason_loss(rho.logit(), reasons, labels), torch.tensor([binary, 0.0]))
+    expected = torch.tensor([-math.log(0.75) + binary, 0.0])
+    assert torch.allclose(help_loss(ask, labels, rho.logit(), reasons), expected)
+    assert torch.allclose(help_loss(ask, labels, None, reasons), torch.tensor([-math.log(0.75), 0.0]))
+
+
+def test_entropy_in_base_37_of_37_equal_actions_is_one():
+    assert relative_entropy(torch.full((1, 37), 1 / 37), 37).item() == pytest.approx(1.0)
+    assert relative_entropy(torch.eye(37)[:1], 37).item() == 0.0
+
+
+# Words, draws, batches ---------------------------------------------------------------------------
+
+
+def test_words_keep_their_numbers_and_strangers_are_unknown():
+    words = build_vocabulary(["Find a mug.", "find a towel, please"])
+    assert words.words[:6] == ("<PAD>", "<UNK>", "<EOS>", "a", "find", ",")
+    assert tokenize("Don't go 60 degrees; stop!") == ["don't", "go", "60", "degrees", ";", "stop", "!"]
+    numbers = words.encode("find the mug", 6)
+    assert numbers.tolist() == [words.number_of["find"], 1, words.number_of["mug"], 2, 0, 0]
+    assert words.encode("find a mug", 2).tolist() == [words.number_of["find"], words.number_of["a"]]
+    with pytest.raises(ValueError, match="starts with"):
+        Vocabulary(("mug",))
+
+
+def test_sampled_choices_have_their_frequencies_and_never_take_the_impossible():
+    rng = np.random.default_rng(0)
+    p = np.array([0.2, 0.0, 0.5, 0.3, 0.0])
+    counts = np.bincount([choose_sampled(p, rng) for _ in range(4000)], minlength=5) / 4000
+    assert counts[1] == counts[4] == 0
+    assert np.allclose(counts, p, atol=0.03)
+    assert choose_likeliest(p, rng) == 2
+
+
+def test_a_low_temperature_sharpens_and_zero_takes_the_likeliest():
+    """At temperature 1/2 the odds of 1 : 3 become 1 : 9."""
+    p, rng = np.array([0.25, 0.0, 0.75]), np.random.default_rng(0)
+    drawn = [choose_at(0.5)(p, rng) for _ in range(4000)]
+    assert abs(drawn.count(2) / 4000 - 0.9) < 0.02 and 1 not in drawn
+    assert {choose_at(0)(p, rng) for _ in range(50)} == {2}
+    assert abs(sum(choose_at(1)(p, rng) == 2 for _ in range(4000)) / 4000 - 0.75) < 0.03
+
+
+def test_the_threshold_decides_when_the_learned_rule_asks():
+    asks = lambda threshold, p: ask_above(threshold)(p, None, -1, rng=None)
+    assert asks(0.4, 0.45) and not asks(0.5, 0.45) and not asks(0.5, 0.5)
+
+
+def test_every_pass_of_training_takes_every_task_once():
+    tasks = setting().tasks[:10]
+    taken = [t.id for u in range(5) for t in tasks_of_update(tasks, u, 4, seed=0)]
+    for start in (0, 10):
+        assert sorted(taken[start : start + 10]) == sorted(t.id for t in tasks)
+    assert taken[:10] != taken[10:]
+
+
+# Play --------------------------------------------------------------------------------------------
+
+
+def test_where_the_agent_was_weighs_less():
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, ask_rule="never"))
+    tasks = [dataclasses.replace(t, horizon=20) for t in split.tasks[::5]]
+
+    def repeated(again: float) -> int:
+        """Steps to places where the episode had been under the same words."""
+        policy = dataclasses.replace(agent.policy(split.bank), again=again)
+        policy.network.eval()
+        with torch.inference_mode():
+            played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
+        moves = lambda e: [(s.instruction, s.next_pose.node) for s in e.steps if isinstance(s.action, Move)]
+        return sum(len(moves(e)) - len(set(moves(e))) for e in played)
+
+    assert repeated(1.0) > 1.5 * repeated(0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "model, again, by_image", [("hanna", 1.0, False), ("hanna", 0.3, False), ("hanna", 0.3, True), ("lstm", 1.0, False)]
+)
+def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, by_image):
+    split = setting(houses=2)
+    judged = dataclasses.replace(JUDGED, again=again, by_image=by_image)
+    policy = agent_for(split, dataclasses.replace(TINY, model=model), judged).policy(split.bank)
+    policy.network.eval()
+    policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)
+    tasks = [dataclasses.replace(t, horizon=12) for t in split.tasks[::5]]
+    with torch.inference_mode():
+        together = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
+        alone = play(split.make_env, policy, tasks, seed=1, batch=1)
+        backwards = play(split.make_env, policy, tasks[::-1], seed=1, batch=5)[::-1]
+    assert together == alone == backwards
+    assert any(isinstance(s.action, Ask) for e in together for s in e.steps)
+    assert any(isinstance(s.action, Move) for e in together for s in e.steps)
+    assert len({len(e.steps) for e in together}) > 1  # some leave the batch before others
+
+
+def test_actions_are_described_by_the_view_they_lie_in_and_stop_by_nothing():
+    split = setting()
+    policy = agent_for(split).policy(split.bank)
+    task = split.tasks[0]
+    seen = split.make_env().reset(task)
+    percept = policy.percept([seen], policy.start((0,)))
+    assert torch.equal(percept.actions[0, 0], torch.zeros(policy.network.config.action_size))
+    first = split.bank.features(seen.sight)[seen.candidates.view[0]]
+    assert np.allclose(percept.actions[0, 1, : split.bank.size], first)
+    assert percept.actions[0, 1, split.bank.size] == pytest.approx(math.sin(seen.candidates.bearing[0]), abs=1e-6)
+    ahead = split.bank.features(seen.sight)[12 + seen.turn]
+    assert np.allclose(percept.current[0, 12], ahead)  # row 12 looks where the agent looks
+    relative = (seen.candidates.view[0] % 12 - seen.turn) % 12
+    assert percept.action_slots[0].tolist()[:2] == [36, seen.candidates.view[0] // 12 * 12 + relative]
+    assert torch.equal(percept.target, torch.zeros(1, 36, split.bank.size))
+
+
+def test_two_observations_that_differ_only_in_what_is_private_look_the_same():
+    """An agent that turned together with its world cannot tell: bearings and views are its own."""
+    split = setting()
+    policy = agent_for(split).policy(FeatureBank({"a": np.arange(36.0)[None, :, None] * np.ones((1, 36, 16))}, "tests"))
+    env = split.make_env()
+    seen = env.reset(split.tasks[0])
+
+    def turned(o: Observation, k: int) -> Observation:
+        view = o.candidates.view // 12 * 12 + (o.candidates.view % 12 + k) % 12
+        return dataclasses.replace(
+            o, sight=Sight("a", 0), turn=(o.turn + k) % 12, candidates=dataclasses.replace(o.candidates, view=view)
+        )
+
+    bank = policy.bank.features(Sight("a", 0))
+    rolled = np.concatenate([np.roll(bank[12 * b : 12 * b + 12], 4, 0) for b in range(3)])
+    other = dataclasses.replace(policy, bank=FeatureBank({"a": rolled[None]}, "tests"))
+    a = policy.percept([turned(seen, 0)], policy.start((0,)))
+    b = other.percept([turned(seen, 4)], other.start((0,)))
+    for name in ("current", "actions", "action_slots"):
+        assert torch.equal(getattr(a, name), getattr(b, name)), name
+
+
+def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
+    """So a panorama still equals its target image exactly, whatever is hidden."""
+    split = setting()
+    learner = for_training(agent_for(split).policy(split.bank), environment_dropout=0.5)
+    sight = Sight("grid0", 0)
+    first = dataclasses.replace(split.make_env().reset(split.tasks[0]), sight=sight, target=sight, turn=0)
+    torch.manual_seed(0)
+    memory = learner.start((0, 1))
+    percept = learner.percept([first, first], memory)
+    assert torch.equal(percept.current, percept.target)
+    hidden = percept.current.abs().sum(1) == 0  # (2, D)
+    assert 0.2 < hidden.float().mean() < 0.8
+    assert not torch.equal(hidden[0], hidden[1])
+    assert torch.equal(hidden[1:], learner.percept([first], memory.keep((1,))).current.abs().sum(1) == 0)
+    assert agent_for(split).policy(split.bank).start((0,)).channels is None
+
+
+@pytest.mark.slow
+def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
+    split = setting()
+    tasks = [dataclasses.replace(t, horizon=20) for t in (*split.tasks, *split.tasks, *split.tasks)]
+    half = round(len(tasks) / 2)
+    learner = for_training(agent_for(split).policy(split.bank), RULES["never"][0], guided_asking=0.5)
+    episodes = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0).episodes
+    asked = [[t for t, s in enumerate(e.steps) if isinstance(s.action, Ask)] for e in episodes]
+    assert sum(map(len, asked[:half])) > 0 and not any(asked[half:])
+    assert all(first >= 4 for first, *_ in filter(None, asked)) and all(
+        b - a >= 5 for times in asked for a, b in itertools.pairwise(times)
+    )
+
+
+def test_labels_line_up_with_what_the_networks_said():
+    """The teacher's word about step t of episode i is compared with the scores of that very step."""
+    split = setting()
+    agent = agent_for(split)
+    tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:5]]
+    teacher = HannaTeacher()
+    experience = collect(split.make_env, for_training(agent.policy(split.bank)), tasks, teacher, split.worlds, seed=0)
+    labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in experience.episodes]
+    rows = [(t, i) for t in range(8) for i, e in enumerate(experience.episodes) if t < len(e.steps)]
+    assert len(rows) == len(experience.targets.moves)
+    for row, (t, i) in enumerate(rows):
+        step, label = experience.episodes[i].steps[t], labels[i][t]
+        expected = IGNORE if label.move is None else 0 if isinstance(label.move, Stop) else label.move.candidate + 1
+        assert experience.targets.moves[row] == expected
+        assert experience.targets.asks[row] == (IGNORE if label.ask is None else int(label.ask))
+        n = len(step.candidate_nodes)
+        said = experience.said.moves[row].softmax(-1).detach().numpy()
+        assert np.allclose(np.append(said[1 : n + 1], said[0]), step.action.thought.moves, atol=1e-5)
+        assert said[n + 1 :].sum() == 0
+
+
+# Learning ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["hanna", "lstm"])
+def test_it_overfits_one_batch(model):
+    """Loss on the same eight episodes falls to a fraction; nothing in the gradient's way is broken."""
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, model=model, dropout=0.0))
+    optimizer = torch.optim.Adam(agent.network.parameters(), 5e-3)
+    learner = dataclasses.replace(for_training(agent.policy(split.bank)), choose=choose_likeliest)
+    tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:8]]
+    losses, rights = [], []
+    for _ in range(40):
+        played = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0)
+        navigation, asking = imitation_loss(played.said, played.targets, 0.0, len(tasks))
+        optimizer.zero_grad()
+        (navigation + asking).backward()
+        optimizer.step()
+        known = played.targets.moves != IGNORE
+        rights.append(float((played.said.moves.argmax(-1) == played.targets.moves)[known].float().mean()))
+        losses.append(float((navigation / known.sum()).detach()))
+    assert np.mean(rights[-5:]) > 0.8, rights
+    assert np.mean(losses[-5:]) < 0.5 * losses[0], losses
+
+
+@pytest.mark.slow
+def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
+    straight, _ = run(tmp_path / "straight")
+    half = dataclasses.replace(TINY, iterations=2)
+    run(tmp_path / "broken", half)
+    resumed, progress = run(tmp_path / "broken")
+    assert progress.update == 4
+    for name, value in straight.network.state_dict().items():
+        assert torch.equal(value, resumed.network.state_dict()[name]), name
+    a, b = (
+        [line for line in metrics_of(tmp_path / d) if line[1].startswith("validation/")] for d in ("straight", "broken")
+    )
+    assert a == b and {name for _, name, _ in a} >= {"validation/success", "validation/spl"}
+
+
+@pytest.mark.slow
+def test_training_writes_what_a_researcher_looks_at(tmp_path):
+    seen = []
+    _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
+    assert seen == [(2, 6), (4, 6)]
+    found = {update: value for update, name, value in metrics_of(tmp_path) if name == "validation/success"}
+    assert list(found) == [2, 4] and progress.best == max(found.values())
+    assert progress.best_update in [update for update, success in found.items() if as_good(success, progress.best, 6)]
+    assert list(tmp_path.glob("events.out.tfevents.*"))
+    assert json.loads((tmp_path / "settings.json").read_text())["settings"]["batch"] == 6
+
+
+def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
+    split = setting()
+    first, second = agent_for(split), agent_for(split, dataclasses.replace(TINY, ask_rule="every5", seed=5))
+    name = next(n for n, p in first.network.named_parameters() if p.dim() > 1)
+    assert not torch.equal(first.network.state_dict()[name], second.network.state_dict()[name])
+    take_weights(second, first, tmp_path / "first.safetensors")
+    for n, value in first.network.state_dict().items():
+        assert torch.equal(value, second.network.state_dict()[n]), n
+    other = agent_for(split, dataclasses.replace(TINY, hidden_size=16))
+    with pytest.raises(ValueError, match="cannot be begun with"):
+        take_weights(other, first, tmp_path / "first.safetensors")
+
+
+def test_of_agents_as_good_as_each_other_the_later_is_kept():
+    assert as_good(0.68, 0.71, 100) and not as_good(0.66, 0.71, 100)  # one standard error is 4.5 points
+    assert not as_good(0.68, 0.71, 1000)
+    assert as_good(0.0, 0.0, 60) and not as_good(0.9, 1.0, 60)
+
+
+@pytest.mark.slow
+def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
+    run(tmp_path)
+    before = (tmp_path / "checkpoint.pt").read_bytes()
+    with pytest.raises(CheckpointError, match="batch 6 -> 5"):
+        run(tmp_path, dataclasses.replace(TINY, batch=5))
+    other = setting()
+    worlds = {n: other.bank._table.numpy() for n in other.worlds}
+    with pytest.raises(CheckpointError, match="encoder 'tests' -> 'another encoder'"):
+        run(tmp_path, split=dataclasses.replace(other, bank=FeatureBank(worlds, "another encoder")))
+    assert (tmp_path / "checkpoint.pt").read_bytes() == before
+    (tmp_path / "checkpoint.pt").write_bytes(before[: len(before) // 2])
+    with pytest.raises(CheckpointError, match="cut short"):
+        run(tmp_path)
+    torch.save({"format": "something else"}, tmp_path / "checkpoint.pt")
+    with pytest.raises(CheckpointError, match="not a checkpoint of format"):
+        run(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
+    agent, _ = run(tmp_path, dataclasses.replace(TINY, iterations=1))
+    for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", load_agent)):
+        body = bytearray((tmp_path / name).read_bytes())
+        body[len(body) // 2] ^= 1
+        (tmp_path / name).write_bytes(body)
+        with pytest.raises(ValueError, match="checksum"):
+            read(tmp_path / name)
+
+
+def test_a_second_training_in_the_same_folder_is_refused(tmp_path):
+    with locked(tmp_path), pytest.raises(LockedError, match=f"written by process {os.getpid()}"):
+        run(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_path):
+    run(tmp_path, dataclasses.replace(TINY, iterations=2))
+    before = (tmp_path / "checkpoint.pt").read_bytes()
+    bad = setting()
+    bad.bank._table[:] = torch.nan
+    with pytest.raises(DivergedError, match="update 2.*last checkpoint is intact"):
+        run(tmp_path, split=bad)
+    assert (tmp_path / "checkpoint.pt").read_bytes() == before
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(tmp_path, shown):
+    split = setting()
+    own = {n: split.bank._table[a:b].numpy() for n, (a, b) in split.bank._rows.spans.items()}
+    dark = {n: np.full_like(x, np.nan) for n, x in own.items()}
+    bank = FeatureBank(own, split.bank.digest, [dark] if shown else [])
+    config = dataclasses.replace(TINY, iterations=3, validate_every=1)
+    with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
+        agent, shown_in = agent_for(split, config), dataclasses.replace(split, bank=bank)
+        train(agent, shown_in, split, HannaTeacher(), tmp_path, identity(agent), note=str)
+
+
+def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
+    split = setting()
+    agent, path = agent_for(split), tmp_path / "agent.safetensors"
+    save_agent(agent, path)
+    again = load_agent(path)
+    assert (again.config, again.evaluation, again.vocabulary) == (agent.config, JUDGED, agent.vocabulary)
+    save_agent(again, tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes(), "equal agents are equal files"
+    for name, value in agent.network.state_dict().items():
+        assert torch.allclose(value, again.network.state_dict()[name], atol=2e-3), name
+    other = FeatureBank({"x": np.zeros((1, 36, 16))}, "another encoder")
+    with pytest.raises(ValueError, match="features come from encoder another"):
+        again.policy(other)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_agent(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": "gpt"}, "model must be one of"),
+        ({"ask_rule": "often"}, "ask_rule must be one of"),
+        ({"batch": 0}, "batch must be at least 1"),
+        ({"learning_rate": 0.0}, "learning_rate must be positive"),
+        ({"alpha": -1.0}, "alpha must be at least 0"),
+    ],
+)
+def test_impossible_settings_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        dataclasses.replace(TINY, **change)
+
+
+def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
+    config = dataclasses.replace(TINY, iterations=100, cooldown=0.4, learning_rate=1e-3)
+    rates = [falling_rate(1e-3, u, 100, 0.4) for u in range(100)]
+    assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
+    assert falling_rate(1e-3, 99, 100, 0.0) == 1e-3
+    agent, split = agent_for(setting(), config), setting()
+    optimizer = torch.optim.Adam(agent.network.parameters(), 1.0)
+    learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())
+    assert optimizer.param_groups[0]["lr"] == rates[-1]
+
+
+def test_table_d1_is_the_default():
+    d1 = SCALES["paper"]
+    assert (d1.hidden_size, d1.navigation_embedding, d1.ask_embedding, d1.batch) == (256, 256, 128, 32)
+    assert (d1.learning_rate, d1.dropout, d1.alpha, d1.iterations) == (1e-4, 0.3, 1.0, 30_000)
+    steps = EVALUATIONS["paper"].evaluation_steps
+    assert (d1.training_steps, steps, d1.instruction_length) == (20, 50, 50)
+
+
+@pytest.mark.slow
+def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
+    here = Path(__file__).parent
+    code = (
+        "import sys, dataclasses; sys.path.insert(0, sys.argv[2])\n"
+        "import test_hanna_learner as t; from pathlib import Path\n"
+        "config = dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6)\n"
+        "split = t.setting(); agent = t.agent_for(split, config)\n"
+        "note = lambda line: print(line, flush=True)\n"
+        "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), t.identity(agent), note=note)\n"
+    )
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path), str(here)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+    assert process.stdout.readline().startswith("20/")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert "KeyboardInterrupt" in err and "goes on from there" in out, (out, err)
+    update = int(out.split("stopped after update ")[1].split(";")[0])
+    saved = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+    assert saved["progress"]["update"] == update >= 20
+    assert time.time() - (tmp_path / "checkpoint.pt").stat().st_mtime < 60
+
+
+def test_success_in_the_progress_line_is_the_judges():
+    split = setting()
+    policy = agent_for(split).policy(split.bank)
+    policy.network.eval()
+    with torch.inference_mode():
+        episodes = play(split.make_env, policy, split.tasks[:4], seed=0, batch=4)
+    world = split.worlds[episodes[0].task.world]
+    assert all(metrics.success(e, world.graph) in (0.0, 1.0) for e in episodes)
+
+
+def gradients_of_a_share(rank: int, folder: str) -> None:
+    """One of two processes: its share of one update, and the gradient that it then has."""
+    dist.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=2)
+    save_gradients(Path(folder) / f"{rank}.pt")
+    dist.destroy_process_group()
+
+
+def save_gradients(path: Path) -> None:
+    torch.set_num_threads(1)
+    split = setting()
+    agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0))
+    optimizer = torch.optim.SGD(agent.network.parameters(), 0.0)
+    numbers = learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
+    torch.save([p.grad for p in agent.network.parameters()], path)
+    path.with_suffix(".json").write_text(json.dumps(numbers))
+
+
+@pytest.mark.slow
+def test_two_processes_learn_what_one_would(tmp_path):
+    torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=2)
+    save_gradients(tmp_path / "alone.pt")
+    alone, first, second = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("alone", "0", "1"))
+    for a, b, c in zip(alone, first, second, strict=True):
+        assert (a is None) == (b is None) == (c is None)
+        if a is not None:
+            assert torch.equal(b, c)
+            assert torch.allclose(a, b, atol=1e-4, rtol=1e-3)
+    alone, *both = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("alone", "0", "1"))
+    assert set(alone) <= set(NUMBERS) and both[0] == both[1]
+    for name in (*ADDED, "gradient", "success", "requests"):
+        assert both[0][name] == pytest.approx(alone[name], rel=1e-3), name

@@ -1,0 +1,398 @@
+"""Language models in every role, against a small server in this process that also answers badly."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import json
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_chat import ChatServer, Parrot, first_allowed, said
+from hand_worlds import grid_world
+from PIL import Image
+
+from assets.catalogue import load_catalogue
+from embodied.assistants.ask import AskAssistant
+from embodied.envs.base import HelpEnv
+from embodied.envs.make import ask_environment_maker, environment_maker, look_of
+from embodied.errors import UnableError
+from embodied.evaluation import metrics, tables
+from embodied.evaluation.rollout import play
+from embodied.gym.env import HelpGymEnv
+from embodied.gym.eyes import Closed
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Step, Subtask, Usage
+from embodied.language import PlainLanguage
+from embodied.records import from_json, to_json
+from embodied.render.panorama import Panorama
+from embodied.tasks.ask import ask_pool, ask_tasks
+from embodied.tasks.find import find_pool, find_task
+
+pytest.importorskip("openai", reason="the optional extra [llm] is not installed")
+
+from agents.language_models.agent import LanguageModelAgent
+from agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
+from agents.language_models.cache import AnswerCache
+from agents.language_models.checking import arrives, understood
+from agents.language_models.client import MOST_BYTES, Client, ServerSettings, misfit, object_schema
+from agents.language_models.judge import ModelJudge
+from agents.language_models.messages import Messages
+from agents.language_models.paraphrase import paraphrased
+from agents.language_models.prompts import read_prompt
+from agents.language_models.telling import Teller
+
+ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
+ASKED = [{"role": "user", "content": "say it"}]
+FAST = {"wait": 0.01, "tries": 3, "timeout": 5.0}
+
+
+@pytest.fixture
+def answers(tmp_path) -> Path:
+    return tmp_path / "answers.sqlite"
+
+
+def client_of(server: ChatServer, answers: Path, **settings) -> Client:
+    return Client(ServerSettings("m", server.url, **{**FAST, **settings}), AnswerCache(answers))
+
+
+def find_tasks(n: int) -> list:
+    pool = find_pool(grid_world(), seed=0)
+    tasks = [find_task(pool, i, seed=0, language=PlainLanguage()) for i in range(n)]
+    return [dataclasses.replace(t, horizon=5) for t in tasks]
+
+
+def find_env() -> HelpEnv:
+    return environment_maker("find", {"grid": grid_world()})()
+
+
+# The client -------------------------------------------------------------------------------------
+
+
+def test_an_answer_is_asked_for_once_and_kept_in_one_file_without_the_key(answers, monkeypatch):
+    monkeypatch.setenv("A_KEY", "sk-very-secret")
+    with ChatServer(lambda r: said('{"word": "yes"}')) as server:
+        first = client_of(server, answers, key_variable="A_KEY").ask(ASKED, ONE)
+        again = client_of(server, answers, key_variable="A_KEY").ask(ASKED, ONE)
+        assert first == again and first.value == {"word": "yes"} and (first.tokens_in, first.tokens_out) == (100, 10)
+        assert len(server.requests) == 1 and server.headers[0]["authorization"] == "Bearer sk-very-secret"
+        client_of(server, answers, temperature=0.5).ask(ASKED, ONE)
+        assert len(server.requests) == 2, "another sampling is another question"
+    assert b"sk-very-secret" not in answers.read_bytes()
+    assert sorted(p.name for p in answers.parent.iterdir()) == ["answers.sqlite"]
+
+
+def test_pictures_are_kept_as_digests(answers):
+    url = "data:image/jpeg;base64," + "QUJD" * 5000
+    with ChatServer(lambda r: said('{"word": "yes"}')) as server:
+        shown = [{"role": "user", "content": [{"type": "image_url", "image_url": {"url": url}}]}]
+        client_of(server, answers).ask(shown, ONE)
+        assert server.requests[0]["messages"][0]["content"][0]["image_url"]["url"] == url
+    assert b"QUJDQUJD" not in answers.read_bytes()
+
+
+BAD = {
+    "HTML": (200, {"Content-Type": "text/html"}, b"<html>log in</html>"),
+    "ten megabytes": (200, {"Content-Type": "application/json"}, b"[" + b"1," * 5_000_000 + b"1]"),
+    "deep": (200, {"Content-Type": "application/json"}, b"[" * 100_000),
+    "an object of another kind": (200, {}, b'{"error": "none"}'),
+    "choices that are a number": (200, {}, b'{"choices": 3}'),
+    "no JSON": said("I would rather not say"),
+    "an unknown word": said('{"word": "maybe"}'),
+    "a field too many": said('{"word": "yes", "and": "more"}'),
+    "NaN": said('{"word": NaN}'),
+    "a number of a thousand digits": said('{"word": ' + "9" * 10_000 + "}"),
+    "long text": said("a" * (MOST_BYTES // 2)),
+    "unknown tools": said(None, tool_calls=[{"id": "1", "function": {"name": "shell", "arguments": "{}"}}] * 50),
+    "tools without an end": said(None, tool_calls=[{"id": "1", "function": {"name": "answer", "arguments": 7}}]),
+    "nothing": said(None),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_a_broken_answer_is_counted_as_invalid_and_is_nothing_else(what, answers):
+    with ChatServer(lambda r: BAD[what]) as server:
+        client = client_of(server, answers)
+        answer = client.ask(ASKED, ONE)
+        assert answer.value is None and answer.problem
+        usage = answer.usage(client.settings)
+        assert (usage.calls, usage.invalid, usage.refusals) == (1, 1, 0)
+        assert client.ask(ASKED, ONE) == answer and len(server.requests) == 1
+    assert answers.stat().st_size < 100_000
+
+
+def test_a_refusal_is_counted_as_one(answers):
+    with ChatServer(lambda r: said(None, refusal="I cannot help with that")) as server:
+        usage = client_of(server, answers).ask(ASKED, ONE).usage(ServerSettings("m"))
+        assert (usage.invalid, usage.refusals) == (0, 1)
+
+
+def test_a_busy_server_is_asked_again_and_a_dead_one_is_an_error_that_says_what_to_do(answers):
+    waiting = [(503, {}, b"busy"), (429, {"Retry-After": "0"}, b"slower"), said('{"word": "no"}')]
+    with ChatServer(lambda r: waiting.pop(0)) as server:
+        client = client_of(server, answers)
+        assert client.ask(ASKED, ONE).value == {"word": "no"} and len(server.requests) == 3
+    with pytest.raises(UnableError, match=r"start the server .* 1 answers are kept"):
+        client.ask([{"role": "user", "content": "something else"}], ONE)
+
+
+def test_a_rejected_request_is_an_error_that_does_not_show_the_key(answers, monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    body = json.dumps({"error": {"message": "Incorrect API key provided: sk-very-secret"}}).encode()
+    with ChatServer(lambda r: (401, {"Content-Type": "application/json"}, body)) as server:
+        with pytest.raises(UnableError, match="401") as e:
+            client_of(server, answers).ask(ASKED, ONE)
+        assert "secret" not in str(e.value) and len(server.requests) == 1
+
+
+def test_a_server_that_drips_is_given_up(answers):
+    slow = ChatServer(lambda r: said('{"word": "yes"}'), delay=0.6)
+    with slow as server, pytest.raises(UnableError, match="after 2 tries"):
+        client_of(server, answers, timeout=0.2, tries=2).ask(ASKED, ONE)
+
+
+@pytest.mark.parametrize("form", ["schema", "tools", "text"])
+def test_three_ways_to_ask_for_json(form, answers):
+    call = said(None, tool_calls=[{"id": "1", "function": {"name": "answer", "arguments": '{"word": "yes"}'}}])
+    text = said('Sure!\n```json\n{"word": "yes"}\n```')
+    with ChatServer(lambda r: {"schema": said('{"word": "yes"}'), "tools": call, "text": text}[form]) as server:
+        assert client_of(server, answers, form=form).ask(ASKED, ONE).value == {"word": "yes"}
+        (request,) = server.requests
+        assert ("tools" in request, "response_format" in request) == (form == "tools", form == "schema")
+
+
+def test_another_file_is_not_taken_for_answers(tmp_path):
+    (tmp_path / "text").write_text("hello, this is no data base at all, whatever its length may be" * 20)
+    with pytest.raises(ValueError, match="cannot be used to keep answers"):
+        AnswerCache(tmp_path / "text")
+    with sqlite3.connect(tmp_path / "other") as other:
+        other.execute("CREATE TABLE people (name TEXT)")
+    with pytest.raises(ValueError, match="not of answers"):
+        AnswerCache(tmp_path / "other")
+
+
+def test_a_schema_says_what_does_not_fit():
+    schema = object_schema(stars={"type": "integer", "minimum": 1, "maximum": 5})
+    assert misfit({"stars": 5}, schema) == ""
+    assert "range" in misfit({"stars": 6}, schema) and "type" in misfit({"stars": True}, schema)
+    assert "lacks" in misfit({}, schema) and "type" in misfit([1], schema)
+
+
+def test_a_prompt_of_ones_own_replaces_the_shipped_one_and_is_checked(tmp_path):
+    (tmp_path / "agent.md").write_text("You are a cat.\n---\n$instruction")
+    assert read_prompt("agent", ("instruction",), tmp_path).messages(instruction="come")[1]["content"] == "come"
+    (tmp_path / "agent.md").write_text("You are a cat.\n---\n$secret")
+    with pytest.raises(ValueError, match=r"\$secret"):
+        read_prompt("agent", ("instruction",), tmp_path)
+
+
+# The agent --------------------------------------------------------------------------------------
+
+
+def test_twenty_tasks_replay_from_the_file_byte_for_byte_without_a_server(answers):
+    with ChatServer() as server:
+        client = client_of(server, answers, price_in=2.0, price_out=10.0)
+        first = play(find_env, LanguageModelAgent(client), find_tasks(20), seed=0, batch=5, agent="llm")
+        assert client.sent == len(server.requests) > 0
+    offline = Client(dataclasses.replace(client.settings, base_url="http://127.0.0.1:9"), AnswerCache(answers))
+    again = play(find_env, LanguageModelAgent(offline), find_tasks(20), seed=0, batch=2, agent="llm")
+    assert [to_json(e) for e in again] == [to_json(e) for e in first] and offline.sent == 0
+    row = tables.row("llm", "x", first, {"grid": grid_world().graph}, seed=0)
+    steps = row.values["steps"].mean
+    assert row.values["model calls"].mean == steps and row.values["tokens in"].mean == 100 * steps
+    assert row.values["model price"].mean == pytest.approx(steps * (100 * 2 + 10 * 10) / 1e6)
+    read = from_json(type(first[0]), to_json(first[0]))
+    assert metrics.usage(read) == metrics.usage(first[0]) != Usage()
+
+
+def test_a_run_goes_on_where_its_server_was_killed(answers):
+    tasks = find_tasks(6)
+    with ChatServer() as whole:
+        wanted = play(find_env, LanguageModelAgent(client_of(whole, answers.with_name("whole"))), tasks, seed=0)
+    left = 10
+
+    def dies(request: dict) -> tuple:
+        nonlocal left
+        left -= 1
+        return first_allowed(request) if left >= 0 else (503, {}, b"")
+
+    with ChatServer(dies) as server, pytest.raises(UnableError, match="10 answers are kept"):
+        play(find_env, LanguageModelAgent(client_of(server, answers)), tasks, seed=0)
+    with ChatServer() as server:
+        again = play(find_env, LanguageModelAgent(client_of(server, answers)), tasks, seed=0)
+        assert len(server.requests) == len(whole.requests) - 10
+    assert [to_json(e) for e in again] == [to_json(e) for e in wanted]
+
+
+def test_an_agent_whose_model_talks_nonsense_goes_on_and_then_stops(answers):
+    with ChatServer(lambda r: said("blah")) as server:
+        (episode,) = play(find_env, LanguageModelAgent(client_of(server, answers)), find_tasks(1), seed=0)
+    assert episode.ended == "stop" and len(episode.steps) == 4
+    assert all(isinstance(s.action, Move) and s.action.candidate == 0 for s in episode.steps[:-1])
+    used = metrics.usage(episode)
+    assert used is not None and used.invalid == used.calls == 4
+
+
+def test_no_message_names_a_place(answers):
+    with ChatServer() as server:
+        play(find_env, LanguageModelAgent(client_of(server, answers)), find_tasks(2), seed=0)
+        told = json.dumps([r["messages"] for r in server.requests])
+    assert "grid" not in told and "_node" not in told and "n0" not in told
+
+
+# The assistant ----------------------------------------------------------------------------------
+
+
+def ask_stage() -> tuple:
+    world = grid_world()
+    tasks = ask_tasks(ask_pool(world, look_of(None), seed=0), 4, seed=0)
+    return world, tasks, ask_environment_maker({"grid": world}, look_of(None))
+
+
+def test_template_model_and_person_answer_through_one_interface(answers):
+    _, tasks, make_env = ask_stage()
+    told = []
+    with ChatServer(lambda r: said('{"answer": "Look in the kitchen, dear."}')) as server:
+        makers = {
+            "template": assistant_maker("template", lambda: None, None),
+            "llm": assistant_maker("llm", lambda: client_of(server, answers), None),
+            "person": lambda base: PersonAssistant(base, lambda text: told.append(text) or "over there"),
+            "own": assistant_maker("hand_chat:Parrot", lambda: None, None),
+        }
+        said_by = {}
+        for name in ("template", "llm", "person"):
+            env = make_env()
+            env.assistant = makers[name](env.assistant)
+            env.reset(tasks[0])
+            env.step(Ask(Intention.REGION))
+            said_by[name] = env.last_step.reply
+        (request,) = server.requests
+    assert said_by["llm"].text == "Look in the kitchen, dear." and said_by["person"].text == "over there"
+    assert {r.ruled_out for r in said_by.values()} == {said_by["template"].ruled_out}, "the facts are the same"
+    assert said_by["template"].text in request["messages"][1]["content"] and said_by["template"].text in told[0]
+    assert said_by["llm"].usage.calls == 1 and isinstance(makers["own"](AskAssistant(look_of(None))), Parrot)
+    with pytest.raises(ValueError, match="module:Class"):
+        assistant_maker("nobody", lambda: None, None)
+
+
+def test_an_assistants_model_that_fails_leaves_the_template_and_is_counted(answers):
+    _, tasks, make_env = ask_stage()
+    with ChatServer(lambda r: said("<html>")) as server:
+        env = make_env()
+        template = env.assistant
+        env.assistant = ModelAssistant(template, client_of(server, answers))
+        env.reset(tasks[0])
+        env.step(Ask(Intention.REGION))
+    reply = env.last_step.reply
+    assert reply.usage.invalid == 1
+    assert reply.text == template.answer(env.situation, Intention.REGION, rng=np.random.default_rng(0)).text
+
+
+def test_a_free_question_reaches_the_model_with_true_facts_only(answers):
+    _, tasks, make_env = ask_stage()
+    with ChatServer(lambda r: said('{"answer": "I do not know."}')) as server:
+        env = make_env()
+        env.assistant = ModelAssistant(env.assistant, client_of(server, answers))
+        env.reset(tasks[0])
+        env.step(Ask(Intention.FREE, question="Is there a cat in the house?"))
+        content = server.requests[0]["messages"][1]["content"]
+    assert "Is there a cat in the house?" in content and content.count("\n- ") == 3
+    assert env.last_step.action.question == "Is there a cat in the house?"
+
+
+# Other roles ------------------------------------------------------------------------------------
+
+
+class Seen:
+    """The grid with a catalogue, for whoever reads words of things; nothing but rooms is seen."""
+
+    def __init__(self) -> None:
+        world = grid_world()
+        self.house, self.graph, self.name = world.house, world.graph, world.house.name
+        self.catalogue = load_catalogue()
+
+    def sightings(self, node: int) -> tuple:
+        return ()
+
+
+@pytest.fixture(scope="module")
+def seen() -> Seen:
+    return Seen()
+
+
+def a_route(world: Seen, k: int) -> Route:
+    path = world.graph.path(0, 20)
+    return Route(f"grid_{k}", path, 0, 0, PlainLanguage().route(world, path, 0.0, rng=np.random.default_rng(0)))
+
+
+def test_paraphrases_that_lead_elsewhere_are_dropped_and_counted(seen, answers):
+    routes = [("grid", a_route(seen, k)) for k in range(4)]
+    good = "Leave the kitchen and go into the living room. Stop in the living room."
+    texts = [f'{{"instruction": "{good}"}}', '{"instruction": "Fly to the moon."}', "<html>"]
+    texts.append(json.dumps({"instruction": routes[0][1].instruction}))
+    with ChatServer(lambda r: said(texts[len(server.requests) - 1])) as server:
+        found = paraphrased(routes, {"grid": seen}, client_of(server, answers, together=1))
+        told = [r["messages"][1]["content"] for r in server.requests]
+    assert (found.asked, found.lost, found.invalid, found.unchanged) == (4, 1, 1, 1)
+    assert [r.instruction for r in found.routes] == [good] and found.failing == 0.75 and found.usage.calls == 4
+    assert found.routes[0].path == routes[0][1].path and len(set(told)) == 4, "every one in another style"
+
+
+def test_the_listener_tells_how_often_told_ways_are_understood(seen):
+    route = a_route(seen, 0)
+    assert arrives(seen, "Go into the living room. Stop in the living room.", route.path, 0.0)
+    assert not arrives(seen, "blah blah", route.path, 0.0)
+    reply = Reply("blah", subtask=Subtask("r", 20, path=route.path))
+    stopped = Step(Pose(0), Mode.MAIN, "", (0,), "none", (), (1,), Ask(), reply, Pose(0))
+    episode = Episode(find_tasks(1)[0], (stopped,), "limit")
+    assert understood([episode], {"grid": seen}) == (0, 1)
+
+
+def test_a_judge_rates_in_stars_and_describes(seen, answers):
+    path = seen.graph.path(0, 20)
+    replies = iter(['{"stars": 4}', '{"stars": 9}', '{"description": "Walk to the living room."}', "<html>"])
+    with ChatServer(lambda r: said(next(replies))) as server:
+        judge = ModelJudge(client_of(server, answers))
+        assert judge.rate(seen, "go to the living room", path, 0.0) == 0.75
+        assert judge.rate(seen, "go to the kitchen", path, 0.0) is None
+        assert "living room" in server.requests[0]["messages"][1]["content"].split("Walk:")[1]
+        rng = np.random.default_rng(0)
+        assert judge.describe(seen, path, 0.0, rng=rng) == "Walk to the living room."
+        assert judge.describe(seen, path[::-1], 0.0, rng=rng) == "" and judge.usage.invalid == 2
+
+
+def test_the_gymnasium_wrapper_speaks_in_messages():
+    env = Messages(HelpGymEnv(find_env, find_tasks(3), Closed()))
+    text, info = env.reset(seed=1)
+    assert env.observation_space.contains(text) and "find" in text
+    assert [m["role"] for m in info["messages"]] == ["system", "user"]
+    names = info["schema"]["properties"]["action"]["enum"]
+    assert "stop" in names and "go 0" in names
+    after, reward, ended, cut, info = env.step("go 0")
+    assert "You went" in after and not ended and not cut
+    _, _, _, _, info = env.step("fly")
+    assert "invalid_action" in info
+    _, _, ended, _, info = env.step("stop")
+    assert ended and "success" in info
+
+
+def test_a_model_that_sees_is_shown_numbered_views(answers):
+    class Grey:
+        def at(self, sight):
+            return Panorama(
+                np.full((6, 64, 64, 3), 90, np.uint8), np.ones((6, 64, 64), np.float32), np.zeros((6, 64, 64), np.int32)
+            )
+
+    with ChatServer() as server:
+        for how in ("strip", "panorama"):
+            agent = LanguageModelAgent(client_of(server, answers), Teller(panoramas=Grey(), pictures=how))
+            play(find_env, agent, [dataclasses.replace(find_tasks(1)[0], horizon=1)], seed=0)
+        sizes = []
+        for request in server.requests:
+            text, picture = request["messages"][1]["content"]
+            data = base64.b64decode(picture["image_url"]["url"].partition(",")[2])
+            sizes.append(Image.open(io.BytesIO(data)).size)
+            count = text["text"].count("go ") // 2
+    assert sizes[0] == (224 * count + 4 * (count - 1), 224) and sizes[1] == (768, 384)
