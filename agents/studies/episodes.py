@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import torch
 
 from agents.common.session import Note
-from agents.studies.engine import Measured, StudyRow, Table
+from agents.studies.engine import Measured, StudyRow, StudyTable
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
@@ -50,7 +50,7 @@ class EpisodeStudy:
 
     # What a learner says ------------------------------------------------------------------------
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         raise NotImplementedError
 
     def settings(self, train: Mapping[str, Any], seed: int) -> object:

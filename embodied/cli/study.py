@@ -197,6 +197,7 @@ def vnla(args: argparse.Namespace) -> StudyLearner:
         args.tasks,
         threads=args.threads,
         encoder=args.encoder,
+        network=args.network,
         config=config,
         evaluation=chosen(args, EvaluationSettings()),
         without_rooms=args.without_rooms,
