@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import tempfile
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -18,9 +19,12 @@ from pathlib import Path
 DRAFTS = ".embodied-unfinished-"
 """How folders of unfinished files begin; what makes them ours is the mark in them."""
 MARK = ".mark"
-DAMAGED = (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+DAMAGED = (
+    ValueError, KeyError, EOFError, RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile,
+    zlib.error,
+)  # fmt: skip
 """What reading a damaged .npz archive may raise, besides errors of the operating system: cut short, flipped in its
-directory (another compression, encrypted, another name) or in its content."""
+directory (another compression, encrypted, another name), in its content, or in the size that an array says to have."""
 
 
 def default_cache() -> Path:

@@ -155,7 +155,9 @@ class Catalogue:
         return materials.finish(material_key, self.cache)
 
 
-def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: Sequence[Path] = ()) -> Catalogue:
+def load_catalogue(
+    cache: Path | None = None, packs: Sequence[Path] | Path | str = (), own: Sequence[Path] | Path | str = ()
+) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
 
     Args:
@@ -163,8 +165,7 @@ def load_catalogue(cache: Path | None = None, packs: Sequence[Path] = (), own: S
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    if isinstance(own, (str, Path)):  # the letters of a word are folders, too
-        own = (Path(own),)
+    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)

@@ -7,7 +7,9 @@ of its kind. What carries a checksum may never be the last.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import hashlib
 import io
 import json
 import shutil
@@ -17,6 +19,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
+import rerun.blueprint as rrb
 import torch
 from conftest import two_rooms
 from hand_data import build
@@ -44,20 +48,25 @@ from agents.vision.labels import HouseStrips
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.errors import UnableError
+from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
 from embodied.house.house import House
 from embodied.interface import Episode
+from embodied.mattersim.graphs import load_graphs
 from embodied.navigation.graph import from_matterport
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import load_lines, save_lines, to_json
 from embodied.render.panorama import Panorama
-from embodied.render.panorama_file import PanoramaFile, write_panoramas
+from embodied.render.panorama_file import MAGIC, TAIL, PanoramaFile, write_panoramas
+from embodied.render.sightings import load_table, save_table, sightings_table
 from embodied.seeds import stream
+from viz.report import judged
+from viz.sinks import Sinks, check_recording, open_recording
 
 pytestmark = pytest.mark.slow
 
-MUTATIONS = 20
-"""Of each of the KINDS; together a little over 300."""
+MUTATIONS = 36
+"""Of each of the KINDS; together some 750."""
 CLEAR = (ValueError, OSError, UnableError)
 """What the command line shows as one line."""
 VALUES = (None, True, False, 0, -1, 10**30, 1e300, -0.5, "", "nope", "../../etc", [], {}, [[]], "9" * 5000)
@@ -93,6 +102,8 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
     _write_learned(folder)
     _write_others(folder)
     _write_pictures(folder)
+    _write_shown(folder)
+    shutil.copy(home / "connectivity.json", folder / "scan_connectivity.json")
     whole = lambda _: _of(Dataset(data.folder))
     return {
         "house.json": Kind(folder / "house.json", lambda p: House.load(p).to_json(), False),
@@ -111,6 +122,10 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
         "checkpoint": Kind(folder / "checkpoint.pt", _resumed, True),
         "panoramas": Kind(folder / "a.pano", _pictures, True),
+        "graph of the simulator": Kind(folder / "scan_connectivity.json", _simulated, False),
+        "table.json": Kind(folder / "table.json", lambda p: judged(p.parent), False),
+        "sightings": Kind(folder / "sightings.npz", _sighted, False),
+        "recording": Kind(folder / "a.rrd", _recorded, False),
         "strips": Kind(folder / "strips.npz", lambda p: HouseStrips.load(p).rgb.tolist(), True),
     }
 
@@ -182,6 +197,38 @@ def _write_pictures(folder: Path) -> None:
     shapes = (1, 192, 576, 3), (1, 12, 36, 2), (1, 12, 36), (1, 12, 36), (1,)
     types = np.uint8, np.uint8, np.int8, np.float16, np.int8
     HouseStrips("a", ("door", "wall"), *(np.zeros(s, t) for s, t in zip(shapes, types))).save(folder / "strips.npz")
+
+
+def _write_shown(folder: Path) -> None:
+    """What is made to be looked at, and the sightings in a cache."""
+    values = {"success": tables.Estimate(0.5, 0.1, 40)}
+    (folder / "table.json").write_text(tables.as_json([tables.Row("shortest path", "val_seen", 0, 40, 4, values)]))
+    save_table(folder / "sightings.npz", sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3))
+    with open_recording(Sinks(folder / "a.rrd"), rrb.Blueprint(), name="fuzz", properties={}) as recording:
+        recording.log("text", rr.TextDocument("a"))
+
+
+def _simulated(path: Path) -> object:
+    load_graphs.cache_clear()
+    graphs = load_graphs(str(path.parent), ("scan",))
+    assert np.isfinite(graphs.positions).all()
+    return graphs.positions.tolist(), graphs.neighbours.tolist()
+
+
+def _sighted(path: Path) -> object:
+    table = load_table(path)
+    if table is None:
+        raise ValueError("made anew")
+    return {f.name: np.asarray(getattr(table, f.name)).tolist() for f in dataclasses.fields(table)}
+
+
+def _recorded(path: Path) -> object:
+    """Only what is no recording at all is refused; what is inside is the viewer's to read."""
+    with contextlib.redirect_stderr(io.StringIO()) as said:
+        check_recording(path)
+    if said.getvalue():
+        raise ValueError(said.getvalue())
+    return path.read_bytes()
 
 
 def _pictures(path: Path) -> object:
@@ -262,6 +309,10 @@ KINDS = (
     "features",
     "checkpoint",
     "panoramas",
+    "graph of the simulator",
+    "table.json",
+    "sightings",
+    "recording",
     "strips",
 )
 
@@ -286,7 +337,7 @@ def test_a_damaged_file_is_refused_in_a_line_or_harmless(name, kinds):
                 assert found == good or not kind.guarded or damage == before, (name, k, "believed although changed")
     finally:
         kind.path.write_bytes(before)
-    assert refused >= MUTATIONS // 4, "most damage is noticed"
+    assert refused >= MUTATIONS // 4 or name == "recording", "most damage is noticed"
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -354,6 +405,24 @@ def test_strips_in_an_archive_that_says_it_is_packed_otherwise_are_refused(offse
             kind.read(kind.path)
     finally:
         kind.path.write_bytes(before)
+
+
+def test_an_index_of_pictures_that_is_whole_and_wrong_is_refused_or_its_pictures_have_its_size(tmp_path):
+    """Whoever changes the index knows how to write its checksum."""
+    _write_pictures(tmp_path)
+    body, refused = (tmp_path / "a.pano").read_bytes(), 0
+    length, _, _ = TAIL.unpack(body[-TAIL.size :])
+    pictures, index = body[: -TAIL.size - length], body[-TAIL.size - length : -TAIL.size]
+    for k in range(60):
+        wrong = edited(index, stream(3, "index", k))
+        tail = TAIL.pack(len(wrong), hashlib.sha256(wrong).digest(), MAGIC)
+        (tmp_path / "b.pano").write_bytes(pictures + wrong + tail)
+        try:
+            with PanoramaFile(tmp_path / "b.pano") as file:
+                assert all(file.rgb(n).shape == (6, file.size, file.size, 3) for n in range(len(file)))
+        except CLEAR:
+            refused += 1
+    assert refused > 20
 
 
 def test_the_mutations_are_what_they_say():

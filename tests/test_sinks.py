@@ -79,14 +79,15 @@ def test_serving_to_others_is_said_aloud(ports, capsys):
     assert "warning: everybody who reaches 0.0.0.0 can look at what is served" in capsys.readouterr().err
 
 
-def test_every_viewer_that_is_started_is_told_to_listen_on_the_loopback_address(ports, monkeypatch):
+def test_every_viewer_that_is_started_is_told_to_listen_on_the_loopback_address(ports, monkeypatch, tmp_path):
+    (tmp_path / "a.rrd").write_bytes(b"RRF2" + bytes(12))
     commands: list[list[str]] = []
     monkeypatch.setattr(subprocess, "run", lambda c, **_: (commands.append(c), subprocess.CompletedProcess(c, 0))[1])
     monkeypatch.setattr(subprocess, "Popen", lambda c, **_: commands.append(c))
     monkeypatch.setattr(sinks, "_wait_for", lambda *_: None)
     monkeypatch.setenv("DISPLAY", ":7")
-    sinks.open_file(Path("a.rrd"), serve=True)
-    sinks.open_file(Path("a.rrd"))
+    sinks.open_file(tmp_path / "a.rrd", serve=True)
+    sinks.open_file(tmp_path / "a.rrd")
     with sinks.open_viewers(spawn=True):
         pass
     assert [c[c.index("--bind") + 1] for c in commands] == ["127.0.0.1"] * 3

@@ -38,6 +38,8 @@ HERE = "127.0.0.1"
 PATIENCE = 60.0
 """Seconds that a viewer may take to accept the last of a recording."""
 
+MAGIC = b"RRF"
+"""What a .rrd file begins with, before the number of its format."""
 FOOTER = b"RRF2FOOT"
 """What stands 12 bytes before the end of a .rrd file that was finished (Rerun 0.41)."""
 
@@ -134,12 +136,29 @@ def open_recording(
             raise OSError(f"{sinks.rrd} could not be written to its end; free some disk space and run again")
 
 
+def check_recording(rrd: Path) -> None:
+    """Refuse what is no recording; warn of one that was cut short.
+
+    Raises:
+      ValueError: another kind of file.
+    """
+    with open(rrd, "rb") as f:
+        begin, end = f.read(4), f.seek(0, os.SEEK_END)
+        f.seek(max(0, end - 12))
+        footer = f.read(8)
+    if not begin.startswith(MAGIC):
+        raise ValueError(f"{rrd} is no recording of Rerun; make one with `embodied demo` or `embodied rollout --rrd`")
+    if footer != FOOTER:
+        print(f"warning: {rrd} was cut short or changed; its last moments may be missing", file=sys.stderr)
+
+
 def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
     """Show a .rrd file in the native viewer, or serve it to browsers; returns when that is closed or stopped.
 
     Raises:
       UnableError: there is no screen, or the viewer could not be started.
     """
+    check_recording(rrd)
     command = [viewer_program(), str(Path(rrd).absolute()), "--bind", bind, *LIMITS]  # never an option
     if serve:
         _warn_of(bind)

@@ -114,6 +114,9 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
     tables = {Path(p): re.sub(r"\W+", "_", Path(p).stem) for p in episodes}
     if twice := [str(p) for p, n in tables.items() if list(tables.values()).count(n) > 1]:
         raise ValueError(f"{' and '.join(twice)} would become one table; give the files different names")
+    for path in tables:  # all of them are good before any is written
+        for _ in _played(data, path):
+            pass
     for split in data.splits:
         names = data.names(split)
         files += [

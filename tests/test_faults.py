@@ -1,0 +1,364 @@
+"""Nothing of other people's is deleted or believed: what stands beside what is written, episodes played elsewhere."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_data import build, content, paint, small_house
+from hand_worlds import grid_world
+from test_locks import own_files
+
+import embodied
+from assets.cache import DRAFTS
+from assets.catalogue import CatalogueError, load_catalogue
+from assets.closure import ROOT
+from embodied import cli
+from embodied.cli import doctor
+from embodied.datasets.checks import DatasetError
+from embodied.datasets.store import Dataset
+from embodied.evaluation import tables
+from embodied.evaluation.rollout import play
+from embodied.generate import generate_house
+from embodied.house.house import HouseError
+from embodied.light import baking
+from embodied.mattersim.graphs import load_graphs
+from embodied.policies.baselines import Shortest
+from embodied.records import save_lines
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import PanoramaFile, write_panoramas
+from embodied.render.pictures import PictureSettings
+from embodied.seeds import stream
+from viz import sinks
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory) -> Dataset:
+    """A data set whose houses have painted pictures."""
+    folder = tmp_path_factory.mktemp("here")
+    data = build(folder / "data", folder / "cache", "vln", size="1x4", make_house=small_house)
+    paint(data, PictureSettings(16, "fast"))
+    return data
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory) -> Path:
+    """Episodes that were played in another data set, whose houses have the same names."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    split = build(folder / "data", folder / "cache", "vln", size="1x4").split("val_seen")
+    save_lines(folder / "run" / "episodes_val_seen_x.jsonl", play(split.make_env, Shortest(), split.tasks, seed=0))
+    return folder / "run" / "episodes_val_seen_x.jsonl"
+
+
+@pytest.fixture(scope="module")
+def played(here, tmp_path_factory) -> Path:
+    split, path = here.split("val_seen"), tmp_path_factory.mktemp("played") / "episodes_val_seen_x.jsonl"
+    save_lines(path, play(split.make_env, Shortest(), split.tasks, seed=0))
+    return path
+
+
+# Whose it is --------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["lerobot", "parquet", "view"])
+def test_episodes_of_another_data_sets_house_are_believed_nowhere(what, here, elsewhere, played, tmp_path, capsys):
+    orders = {
+        "lerobot": lambda file: [
+            "export",
+            "lerobot",
+            "--episodes",
+            str(file),
+            "--size",
+            "16",
+            "--out",
+            str(tmp_path / "o"),
+        ],
+        "parquet": lambda file: ["export", "parquet", "--episodes", str(file), "--out", str(tmp_path / "o")],
+        "view": lambda file: ["view", str(file.parent), "--episode", "0"],
+    }
+    assert cli.main([*orders[what](elsewhere), "--data", str(here.folder)]) == 2
+    assert "was played in another house of the name" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("*.*")), "nothing is written"
+    if what != "view":
+        assert cli.main([*orders[what](played), "--data", str(here.folder)]) == 0, "its own are"
+
+
+def test_nodes_that_the_house_has_not_are_refused(here, played):
+    (line, *_) = played.read_text().splitlines()
+    body = json.loads(line)
+    body["task"]["goal_nodes"] = [10**6]
+    episode = embodied.records.from_json(embodied.interface.Episode, json.dumps(body))
+    with pytest.raises(DatasetError, match=r"names the nodes \[1000000\], its house has 0 to 15"):
+        here.place_of(episode)
+
+
+@pytest.mark.slow
+def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, played, tmp_path, capsys):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.jsonl").write_bytes(played.read_bytes())
+    files = [str(tmp_path / name / "x.jsonl") for name in ("a", "b")]
+    out = tmp_path / "out"
+    assert cli.main(["export", "parquet", "--data", str(here.folder), "--out", str(out), "--episodes", *files]) == 2
+    assert "would become one table" in capsys.readouterr().err and not list(out.rglob("*.parquet"))
+
+
+# What is deleted ----------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "order",
+    [
+        ["dataset", "vln", "--houses", "1", "--tasks", "4", "--panoramas", "none", "--workers", "1"],
+        ["eval", "vln", "--agent", "shortest", "--split", "val_seen"],
+        ["export", "parquet"],
+        ["export", "r2r"],
+        ["export", "lerobot", "--split", "val_seen", "--size", "16"],
+    ],
+    ids=lambda order: " ".join(order[:2]),
+)
+def test_no_command_touches_what_stands_beside_what_it_writes(order, here, tmp_path, monkeypatch):
+    if order[0] == "dataset":  # as `here` was built, house by house
+        monkeypatch.setattr("embodied.datasets.build.make_dataset_house", small_house)
+        out = tmp_path / "out"
+        order = ["dataset", *order[1:], "--language", "plain", "--seed", "4", "--out", str(out)]
+        beside = (tmp_path, out / "houses", out / "houses" / "train_0000")
+        assert cli.main(order) == 0
+        (out / "dataset.json").unlink()
+    else:
+        order = [*order, "--data", str(here.folder), "--out", str(tmp_path / "out")]
+        beside = (tmp_path,) if order[1] == "lerobot" else (tmp_path, tmp_path / "out")
+    mine: dict[Path, bytes] = {}
+    for folder in beside:
+        folder.mkdir(exist_ok=True)
+        mine |= {p: p.read_bytes() for p in own_files(folder) if p.is_file()}
+    assert cli.main(order) == 0
+    assert {p: p.read_bytes() for p in mine if p.is_file()} == mine
+
+
+DELETES = {"rmtree", "unlink", "rmdir", "remove"}
+REVIEWED = {
+    "assets/cache.py": "drafts, which are marked",
+    "embodied/locks.py": "its own lock",
+    "embodied/bench/serve.py": "what people did in a study that it has just written",
+    "embodied/bench/freeze.py": "a folder that holds what it made",
+    "embodied/datasets/lerobot.py": "an empty folder",
+    "embodied/light/baking.py": "a bake in the cache",
+    "embodied/light/files.py": "a bake in the cache",
+    "embodied/scene/collision.py": "a file in the cache",
+    "embodied/scene/export.py": "house.xml, which it writes anew",
+    "agents/vision/run.py": "the checkpoint of a finished training",
+}
+"""Who deletes files, and which; nobody else does."""
+
+
+def test_only_reviewed_places_delete_files():
+    found = set()
+    for package in ("assets", "embodied", "agents", "viz"):
+        for path in (ROOT / package).rglob("*.py"):
+            calls = (n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call))
+            names = {n.func.attr for n in calls if isinstance(n.func, ast.Attribute) and not _of_a_list(n)}
+            if names & DELETES:
+                found.add(path.relative_to(ROOT).as_posix())
+    assert found <= set(REVIEWED), f"{found - set(REVIEWED)} delete files; say here what makes them sure"
+
+
+def _of_a_list(call: ast.Call) -> bool:
+    """list.remove(x) and sys.meta_path.remove(x), which delete no file."""
+    return isinstance(call.func, ast.Attribute) and call.func.attr == "remove" and not _is_os(call.func.value)
+
+
+def _is_os(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) and node.id == "os"
+
+
+@pytest.mark.slow
+def test_an_export_that_is_killed_leaves_nothing_that_is_believed_and_the_next_is_whole(here, tmp_path):
+    order = ["export", "parquet", "--data", str(here.folder), "--out"]
+    assert cli.main([*order, str(tmp_path / "whole")]) == 0
+    whole, out, rng = content(tmp_path / "whole"), tmp_path / "out", stream(0, "kills")
+    for _ in range(3):
+        process = subprocess.Popen([sys.executable, "-m", "embodied", *order, str(out)], stderr=subprocess.DEVNULL)
+        while not out.exists() and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(float(rng.uniform(0.0, 0.06)))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        there = {k: v for k, v in content(out).items() if not k.startswith(".")} if out.exists() else {}
+        for name, data in there.items():
+            assert DRAFTS in name or data == whole[name], "what has its name is whole"
+    assert cli.main([*order, str(out)]) == 0
+    assert content(out) == whole
+
+
+# Light --------------------------------------------------------------------------------------------
+
+
+def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
+    made, house = [], grid_world(4).house
+
+    def open_bake(folder, _):
+        if not made:
+            raise baking.StaleBake("none")
+        return made[0]
+
+    def make(*_):
+        time.sleep(0.2)
+        made.append(object())
+        return made[-1]
+
+    for name, value in {
+        "house_parts": lambda *_: (),
+        "looks_of": lambda _: "",
+        "Shared": lambda *_, **__: None,
+        "_folder": lambda *_: tmp_path / "bake",
+        "open_bake": open_bake,
+        "reopened": lambda *_: made[0] if made else None,
+        "_make": make,
+    }.items():
+        monkeypatch.setattr(baking, name, value)
+    threads = [threading.Thread(target=baking.bake, args=(house, None, tmp_path, "fast")) for _ in range(2)]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert len(made) == 1
+
+
+# What is read -------------------------------------------------------------------------------------
+
+VIEWPOINT = {"image_id": "a", "pose": [1.0] * 16, "included": True, "unobstructed": [False]}
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("[" * 100_000, "recursion"),
+        ("[" * 60 + "]" * 60, "nested more than 40 deep"),
+        ("{}", "should hold a list"),
+        ("[3]", "viewpoint 0 .*should have"),
+        (json.dumps([VIEWPOINT | {"included": {}}]), "viewpoint 0 .*should have"),
+        (json.dumps([VIEWPOINT | {"pose": [float("nan")] * 16}]), "NaN is no JSON"),
+        (json.dumps([VIEWPOINT | {"pose": [1e300] * 16}]), "viewpoint 0 .*should have"),
+        (json.dumps([{k: v for k, v in VIEWPOINT.items() if k != "image_id"}]), "viewpoint 0 .*should have"),
+        (json.dumps([VIEWPOINT])[:-2] + ', "included": false}]', "'included' stands there twice"),
+    ],
+)
+def test_graphs_of_the_simulator_are_read_as_strictly_as_all_others(body, message, tmp_path):
+    (tmp_path / "s_connectivity.json").write_text(body)
+    load_graphs.cache_clear()
+    with pytest.raises(HouseError, match=f"s_connectivity.json.*{message}"):
+        load_graphs(str(tmp_path), ("s",))
+
+
+@pytest.mark.parametrize("wrong", ["3", 3.0, None, float("nan")])
+def test_a_seed_that_is_none_is_refused_before_any_work(wrong):
+    for made in (lambda: generate_house(wrong), lambda: stream(wrong, "x")):
+        with pytest.raises(TypeError, match="a seed should be an integer, got"):
+            made()
+
+
+def test_numpys_integers_are_seeds():
+    assert stream(np.int64(3), "x").random() == stream(3, "x").random()
+
+
+@pytest.mark.parametrize("angle", [90.0, -360.0, float("nan"), float("inf")])
+def test_degrees_and_what_is_no_angle_are_no_radians(angle):
+    faces = Panorama(np.zeros((6, 8, 8, 3), np.uint8), np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
+    for look in (faces.view, faces.view_rgb):
+        with pytest.raises(ValueError, match=r"are in radians, got .*math\.radians\(90\)"):
+            look(angle)
+    with pytest.raises(ValueError, match="in radians"):
+        faces.view_rgb(0.0, angle)
+
+
+def test_one_folder_of_own_models_may_be_named_as_a_text(tmp_path):
+    with pytest.raises(CatalogueError, match="catalogue.json does not exist"):
+        load_catalogue(tmp_path, own=str(tmp_path / "mymodels"))
+
+
+def test_a_picture_of_another_size_than_its_file_says_is_refused(tmp_path):
+    faces = lambda s: Panorama(
+        np.zeros((6, s, s, 3), np.uint8), np.ones((6, s, s), np.float32), np.zeros((6, s, s), int)
+    )
+    write_panoramas(tmp_path / "a.pano", [faces(16), faces(8)], {})
+    with PanoramaFile(tmp_path / "a.pano") as file, pytest.raises(ValueError, match="no picture of its size"):
+        file.rgb(0)
+
+
+# Machines -----------------------------------------------------------------------------------------
+
+
+NAMELESS = """
+import pwd, sys
+def nobody(*_):
+    raise KeyError("getpwuid(): uid not found")
+pwd.getpwuid = pwd.getpwnam = nobody
+from embodied.cli import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+def test_somebody_without_a_home_and_a_name_gets_help_and_tables(here, tmp_path):
+    bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    out = ["--data", str(here.folder), "--out", str(tmp_path / "out")]
+    for words in (["--help"], ["house", "--help"], ["export", "parquet", *out]):
+        done = subprocess.run([sys.executable, "-c", NAMELESS, *words], capture_output=True, text=True, env=bare)
+        assert done.returncode == 0 and done.stdout, done.stderr[-2000:]
+
+
+def test_a_cache_where_nothing_can_be_written_is_named_with_what_to_do(capsys, tmp_path):
+    order = ["house", "--seed", "1", "--out", str(tmp_path / "h"), "--cache", "/proc/nowhere", "--area", "38", "46"]
+    assert cli.main(order) == 2
+    assert "/proc/nowhere" in capsys.readouterr().err
+
+
+def test_a_cache_that_cannot_be_written_is_told_with_the_remedy():
+    found = doctor.disk(argparse.Namespace(cache=Path("/proc/nowhere/cache")))
+    assert not found.ok and found.needed and "cannot be written" in found.text and "EMBODIED_CACHE" in found.remedy
+
+
+def test_viewers_that_we_start_send_no_statistics():
+    config = [sinks.viewer_program(), "analytics", "config"]
+    said = subprocess.run(config, capture_output=True, text=True, env=sinks.viewer_environment(), timeout=60)
+    assert re.search(r'"analytics_enabled": false', said.stdout), said
+
+
+def test_a_recording_is_never_an_option_and_everybody_is_warned(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("--version.rrd").write_bytes(b"RRF2" + bytes(40))
+    commands = []
+    monkeypatch.setattr(sinks, "_refuse_taken", lambda bind: None)
+    monkeypatch.setattr(sinks.subprocess, "run", lambda c, **_: commands.append(c) or subprocess.CompletedProcess(c, 0))
+    assert cli.main(["view", "./--version.rrd", "--serve", "--bind", "0.0.0.0"]) == 0
+    assert commands[0][1] == str(tmp_path / "--version.rrd")
+    said = capsys.readouterr().err
+    assert "everybody who reaches 0.0.0.0" in said and "was cut short or changed" in said
+    Path("a.rrd").write_bytes(b"GIF89a")
+    assert cli.main(["view", "a.rrd", "--serve"]) == 2
+    assert "is no recording of Rerun" in capsys.readouterr().err
+
+
+# Tables -------------------------------------------------------------------------------------------
+
+
+def test_a_share_of_all_has_the_exact_interval():
+    """Clopper and Pearson: of n of n, the lower end is the n-th root of 0.025."""
+    for mean in (0.0, 1.0):
+        assert tables._at_the_end(tables.Estimate(mean, 0.0, 40)).half == pytest.approx(0.0881, abs=1e-4)
+    for other in (tables.Estimate(0.5, 0.1, 40), tables.Estimate(1.0, 0.02, 40), tables.Estimate(float("nan"), 0.0, 0)):
+        assert tables._at_the_end(other) is other
