@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test quick setup lint docs wheel clean
+.PHONY: help demo test quick setup browser page lint docs wheels clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -11,7 +11,9 @@ help:
 	@echo 'make quick   the tests that take less than a minute together'
 	@echo 'make lint    ruff, its formatter, import-linter, mypy'
 	@echo 'make docs    the documentation site, in site/; warnings are errors'
-	@echo 'make wheel   build the wheel into dist/'
+	@echo 'make browser install Chromium and Caddy (Debian), without which the tests of `embodied serve` in them are skipped'
+	@echo 'make page    build the page of `embodied serve` from web/ with Node'
+	@echo 'make wheels  build embodied-houses and embodied-houses-furniture into dist/'
 
 setup:
 	@PYTHON='$(PYTHON)' ./setup.sh
@@ -37,8 +39,17 @@ docs: setup
 	@.venv/bin/python docs/build_reference.py
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict -q
 
-wheel: setup
-	@.venv/bin/python -m pip wheel -q --no-deps -w dist .
+browser:
+	@command -v chromium >/dev/null && command -v caddy >/dev/null || { as=$$([ "$$(id -u)" = 0 ] || echo 'sudo -n'); \
+	  $$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	  chromium caddy fonts-dejavu-core >/dev/null; } || echo 'note: no Chromium or Caddy here; their tests are skipped'
+
+page:
+	@cd web && npm ci --no-audit --no-fund && npm run build
+
+wheels: setup
+	@.venv/bin/python packaging/furniture/collect.py
+	@.venv/bin/python -m pip wheel -q --no-deps -w dist . ./packaging/furniture
 	@.venv/bin/python -c 'import twine' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt twine
 	@.venv/bin/twine check --strict dist/*.whl
 

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from assets import materials
-from assets.built import MAKERS
+from assets.built import BASICS, MAKERS
 from assets.cache import default_cache
 from assets.importing.importer import import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own, source_digest
@@ -88,6 +88,14 @@ class Catalogue:
         kept = {key: self._asset(key) for key in keys}
         return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
 
+    @functools.cached_property
+    def furnishing(self) -> Catalogue:
+        """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
+        furniture models are installed, only what code builds, the simple furniture included."""
+        if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
+            return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
+        return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
+
     def mesh(
         self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
     ) -> tuple[MeshPart, ...]:
@@ -117,6 +125,11 @@ class Catalogue:
           MeshError, PackError: a file is gone since the catalogue was read.
         """
         return {key: source_digest(self._own[key]) for key in sorted(set(keys)) if key in self._own}
+
+    @property
+    def models(self) -> frozenset[str]:
+        """The models of furniture libraries that are used, by the keys they have there."""
+        return frozenset(self._recipes[k].model or k for k in self._recipes if k not in self._own)
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""

@@ -213,7 +213,8 @@ def _build_choice(args: tuple[typing.Any, ...], value: object, where: str) -> ty
     some = [a for a in args if a is not type(None)]
     records: list[type] = [a for a in some if isinstance(a, type) and dataclasses.is_dataclass(a)]
     if len(records) < 2:
-        return _build(some[0], value, where)
+        fits = [a for a in some if type(value) is a or (a is float and type(value) is int)]
+        return _build((fits or some)[0], value, where)
     named = value.get("is") if isinstance(value, dict) else None
     for a in records:
         if a.__name__ == named:

@@ -27,11 +27,21 @@ def with_thing(**changes) -> House:
     return dataclasses.replace(house, placements=(dataclasses.replace(house.placements[0], **changes),))
 
 
+def test_numbers_and_words_that_things_are_built_from_survive_json():
+    house = with_thing(params=(("finish", "oak/1"), ("open", 0.5), ("turned", 0.0)))
+    assert House.from_json(house.to_json()) == house
+
+
 def test_a_house_survives_json_and_a_file(tmp_path):
     house = two_rooms()
     assert House.from_json(house.to_json()) == house
     house.save(tmp_path / "house.json")
     assert House.load(tmp_path / "house.json").digest == house.digest
+
+
+def test_what_a_built_thing_is_made_of_may_be_words_and_numbers():
+    house = with_thing(params=(("finish", "oak"), ("lean", 0.25), ("turns", 2.0)))
+    assert House.from_json(house.to_json()) == house
 
 
 def test_any_change_changes_the_digest():

@@ -398,6 +398,25 @@ def test_a_file_that_requires_what_is_not_read_is_refused_by_name(tmp_path, name
     assert remedy in str(caught.value) and "binary glTF 2.0" not in str(caught.value)
 
 
+def with_pictures(material, images, textures) -> bytes:
+    data = model(material)
+    length = struct.unpack_from("<I", data, 12)[0]
+    header = json.loads(data[20 : 20 + length])
+    return glb(header | {"images": images, "textures": textures}, data[28 + length :])
+
+
+def test_a_webp_picture_beside_a_png_does_no_harm_and_alone_is_refused_by_name(tmp_path):
+    webp = {"mimeType": "image/webp", "bufferView": 0}
+    textures = [{"source": 1, "extensions": {"EXT_texture_webp": {"source": 0}}}]
+    material = pbr(baseColorTexture={"index": 0})
+    images = [webp, png(Image.new("RGB", (4, 4), "red"))]
+    (part,) = imported(tmp_path, with_pictures(material, images, textures))
+    np.testing.assert_allclose(seen(part), [RED] * 2)
+    del textures[0]["source"]
+    with pytest.raises(MeshError, match="EXT_texture_webp"):
+        imported(tmp_path, with_pictures(material, images, textures))
+
+
 def test_draco_that_nothing_is_told_of_is_refused_by_name_too(tmp_path):
     data = model(primitive={"extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}}})
     length = struct.unpack_from("<I", data, 12)[0]
@@ -411,6 +430,7 @@ def test_draco_that_nothing_is_told_of_is_refused_by_name_too(tmp_path):
     ("material", "more", "words"),
     [
         (pbr() | {"normalTexture": {"index": 0}}, {}, "normalTexture"),
+        ({"name": "paint", "pbrMetallicRoughness": {}}, {}, "give it a metallicFactor"),
         (pbr() | {"emissiveFactor": [1, 1, 0]}, {}, "'glow'"),
         (pbr(), {"extensionsUsed": ["KHR_materials_sheen"]}, "KHR_materials_sheen"),
         (pbr(), {"animations": [{}]}, "animations are not played"),
@@ -561,6 +581,12 @@ def test_negative_indices_count_back_from_their_own_line(tmp_path):
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nv 0 0 0\nv 1 1 0\nf -1 -3 -2\n"
     parts = obj(tmp_path, text, None)
     assert area(parts) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("face", ["f 0 1 2", "f 1 2 9", "f -1 -2 -9", "f 1/0 2/1 3/2", "f 1 2 x"])
+def test_an_index_that_is_none_is_refused(tmp_path, face):
+    with pytest.raises(MeshError, match="bad index"):
+        obj(tmp_path, f"{SQUARE}{face}\nv 5 5 5\n", None)
 
 
 def test_curves_and_lines_are_told(tmp_path, caplog):

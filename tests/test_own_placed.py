@@ -87,9 +87,9 @@ def test_seeds_are_whole_numbers_of_any_kind(tmp_path):
     house.save(tmp_path / "house.json")
     assert House.load(tmp_path / "house.json").digest == generate_house(3, stages=bare).digest
     for seed in (3.0, "3", None, np.float32(3)):
-        with pytest.raises(TypeError, match="a seed should be a whole number, got"):
+        with pytest.raises(TypeError, match="a seed should be an integer, got"):
             generate_house(seed, stages=bare)
-        with pytest.raises(TypeError, match="a seed should be a whole number, got"):
+        with pytest.raises(TypeError, match="a seed should be an integer, got"):
             stream(seed, "name")
 
 

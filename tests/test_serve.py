@@ -9,16 +9,22 @@ import numpy as np
 import pytest
 from hand_serve import HEAD, TOGETHER, make_data, write_study
 
+from agents.bandit.ratings import Rater, fitted
+from agents.vnla.run import vocabulary_of
 from embodied.envs.base import ActionError
 from embodied.interface import Ask, Episode
+from embodied.language.plain import PlainLanguage
+from embodied.language.said import PeoplesWords
 from embodied.records import load_lines, parse, to_json
 from embodied.serve.game import set_table
+from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
 from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
 from embodied.serve.screens import screen_of
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Event
 from embodied.serve.study import Part, Question, StudyError, load_study
 from embodied.serve.talk import spoken_reply
+from embodied.teachers.vnla import VnlaTeacher
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +116,7 @@ def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(dat
     (episode,) = load_lines(tmp_path / "episodes_val_seen_together.jsonl", Episode)
     ask, move, stop = episode.steps
     assert isinstance(ask.action, Ask) and ask.action.question == "Which door?"
-    assert ask.reply.text == "the left one" and ask.reply.image._node == 9 == ask.reply.subtask.target
+    assert ask.reply.text == "the left one" and ask.reply.image.node == 9 == ask.reply.subtask.target
     assert move.instruction == "the left one" and ask.pose == ask.next_pose
     assert ask.seconds < move.seconds < stop.seconds and episode.agent == "ann with bob"
 
@@ -315,3 +321,83 @@ def test_alpha_is_krippendorffs():
     rng = np.random.default_rng(0)
     assert abs(agreement([(str(i % 400), float(rng.integers(5))) for i in range(1600)])) < 0.08
     assert agreement([("a", 1.0), ("b", 2.0)]) is None
+
+
+# What learners make of it ------------------------------------------------------------------------
+
+
+def played(data, folder, text, *, far):
+    """Two people played: somebody was told `text` at the start of the first task; the folder of their study."""
+    play = Script(data, TOGETHER + f"way = {0 if far else 1}\n")
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+    play.play("ann", "asked", question="Where?")
+    game = play.game("ann")
+    reply = spoken_reply(game.situation, text, None, 1, game.table.part.way)
+    play.play("bob", "answered", reply=parse(to_json(reply)))
+    play.play("ann", "stopped")
+    folder.mkdir()
+    Writer(folder, play.sessions)
+    return game.task, reply.subtask.path
+
+
+@pytest.mark.parametrize("only", [False, True])
+def test_what_people_answered_is_what_hannas_assistants_say_in_training(data, tmp_path, only):
+    task, path = played(data, tmp_path / "people", "past the <b>sofa</b>", far=True)
+    made = write_people_dataset(data, worded_by_people(tmp_path / "people"), tmp_path / "made", only=only)
+    mine = [r for r in made.routes(task.world) if "people" in r.id]
+    assert [(r.path, r.split) for r in mine] == [(path, "train_seen"), (path, "train_unseen")]
+    assert len(made.routes(task.world)) == 2 or not only
+    train, seen = made.split("train"), made.split("val_seen")
+    env = train.make_env()
+    env.reset(task)
+    env.step(Ask())
+    heard = env.last_step.reply
+    assert heard.text == "past the <b>sofa</b>" or not only
+    env = seen.make_env()
+    env.reset(task)
+    env.step(Ask())
+    assert "sofa" not in env.last_step.reply.text, "what agents learned from is not what they are judged by"
+    assert (
+        write_people_dataset(data, worded_by_people(tmp_path / "people"), tmp_path / "2", only=only).digest
+        == made.digest
+    )
+
+
+def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path, shared_cache):
+    data = make_data(tmp_path, shared_cache, "vnla")
+    task, path = played(data, tmp_path / "people", "over there", far=False)
+    words = worded_by_people(tmp_path / "people")
+    made = write_people_dataset(data, words, tmp_path / "made")
+    (said,) = made.said([task.world])
+    actions, end = VnlaTeacher().words(data.place(task.world), task.start, (path[-1],), 99)
+    assert (*said.words, "stop") == actions and end.node == path[-1]
+    voice = PeoplesWords([said], PlainLanguage())
+    assert voice.subgoal(said.words) == "over there" and voice.subgoal(("left", *said.words)) != "over there"
+    assert "there" in vocabulary_of(made).words
+
+
+def test_descriptions_become_routes_and_stars_a_rater(data, tmp_path):
+    parts = "".join(f'[[parts]]\nname = "{k}"\nkind = "{k}"\nof = "together"\n' for k in ("rate", "describe"))
+    play = Script(data, TOGETHER + parts)
+    play.join("ann", "bob", "eve")
+    play.ready("ann", "bob")
+    play.play("ann", "moved", candidate=0)
+    walked = play.game("ann").env.pose.node
+    play.play("ann", "stopped")
+    play.sessions.people["eve"].without.add("together")
+    play.ready("eve")
+    play.do("judged", "eve", stars=2, text="")
+    play.ready("eve")
+    play.do("judged", "eve", text="one step on")
+    Writer(tmp_path, play.sessions)
+    (word,) = worded_by_people(tmp_path)
+    assert word.text == "one step on" and word.path[-1] == walked and len(word.path) == 2
+    assert [stars for _, stars in rated_by_people(tmp_path, data)] == [2]
+
+
+def test_the_rater_that_people_resemble_is_found_again():
+    rater, rng = Rater(4, 0.3, 2.0), np.random.default_rng(3)
+    scores = rng.uniform(0, 1, 4000)
+    found = fitted(scores, [rater.rate(s, rng=rng) for s in scores], 4)
+    assert found.granularity == 4 and abs(found.skew - 2.0) < 0.3 and 0.2 < found.variance < 0.6

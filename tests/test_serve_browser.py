@@ -130,7 +130,7 @@ def test_two_browsers_play_to_the_end_through_a_reload_and_a_dead_server(two, se
         one.sees("Ready for the next one?")
     episode = list(load_lines(server.people / "episodes_val_seen_together.jsonl", Episode))[-1]
     replies = [s.reply for s in episode.steps if s.reply]
-    assert [r.text for r in replies] == ["The left one, please"] and replies[0].image._node == 5
+    assert [r.text for r in replies] == ["The left one, please"] and replies[0].image.node == 5
 
 
 def test_what_people_write_never_becomes_markup(two, server):

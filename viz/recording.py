@@ -117,6 +117,8 @@ def record(
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
+        if step.seconds is not None:  # people took part
+            recording.set_time("seconds", duration=step.seconds)
         log_step(recording, world, task, step, state, views)
         yield step
     if state.last is not None:

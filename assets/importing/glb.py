@@ -24,12 +24,15 @@ from assets.importing.meshing import face_normals
 from assets.importing.obj import FARTHEST, MAX_FACES, MeshError
 from assets.importing.sh3f import MAX_ENTRY
 from assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
-from assets.json_file import parse, shown
+from assets.json_file import parse
+from assets.json_file import shown as short
 from assets.records import Finish
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 PICTURES = ("PNG", "JPEG")
 """The two kinds of picture that glTF 2.0 knows (section 3.8.3)."""
+FOREIGN = ("image/webp", "image/ktx2", "image/avif", "image/vnd-ms.dds")
+"""Kinds of pictures of extensions, beside which files may hold the others."""
 HONOURED = ("KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness")
 DRACO = "KHR_draco_mesh_compression"
 REFUSED = {
@@ -90,7 +93,7 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
         raise ValueError("the file does not begin as glTF 2.0 does")
     header = parse(data[20 : 20 + length], "a header")
     if not isinstance(header, dict):
-        raise ValueError(f"its header should be an object, got {shown(header)}")
+        raise ValueError(f"its header should be an object, got {short(header)}")
     start = 20 + length + (-length) % 4
     if start + 8 > len(data):
         return header, b""
@@ -137,7 +140,9 @@ class _Reader:
         if not all(isinstance(n, int) and 0 <= n <= 3 * MAX_FACES for n in counts) or sum(counts) > 20 * MAX_FACES:
             raise ValueError(f"an accessor's count is impossible, or the model has more than {MAX_FACES} triangles")
         self._check_extensions()
-        self._pictures = [self._picture(image) for image in header.get("images", [])]
+        self._pictures = [
+            None if image.get("mimeType") in FOREIGN else self._picture(image) for image in header.get("images", [])
+        ]
         self._surfaces: dict[int, _Surface] = {}
 
     def _check_extensions(self) -> None:
@@ -345,6 +350,8 @@ class _Reader:
             factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
             roughness, metallic, both = 1 - older.get("glossinessFactor", 1.0), 0.0, None
         shown = f"material {name!r}"
+        if metallic == 1.0 and both is None and "metallicFactor" not in core:
+            self.tell(f"{shown} says nothing of metal, which makes it metal in glTF; give it a metallicFactor")
         for field in ("normalTexture", "emissiveTexture"):
             if field in material:
                 self.tell(f"the {field} of {shown} is not drawn")
@@ -382,6 +389,8 @@ class _Reader:
         sampler = self.header["samplers"][texture["sampler"]] if "sampler" in texture else {}
         wraps = sampler.get("wrapS"), sampler.get("wrapT")
         picture = self._pictures[texture["source"]]
+        if picture is None:
+            raise RefusedError(f"a texture of {shown} is neither PNG nor JPEG; export it again with such textures")
         mirror = wraps[0] == MIRRORED, wraps[1] == MIRRORED
         change = info.get("extensions", {}).get("KHR_texture_transform", {})
         c, s = np.cos(float(change.get("rotation", 0.0))), np.sin(float(change.get("rotation", 0.0)))

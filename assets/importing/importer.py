@@ -157,7 +157,7 @@ def read_obj(
             material = MtlMaterial(group.material, diffuse=(grey[0], grey[1], grey[2]))
         _tell_of(material, say)
         image = pictures.of(material)
-        there = (group.uv_corners >= 0).all(axis=1)
+        there = np.asarray((group.uv_corners >= 0).all(axis=1))
         if own and image is not None and not there.all():
             say(f"some faces of material {material.name!r} have no texture coordinates; they have the mean colour")
         if not own and not there.all():
@@ -349,8 +349,10 @@ def _turned_out(
     open ones, (m,) bool says that they need a back."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, which, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    joined = coo_matrix((np.ones(3 * len(faces)), (np.repeat(np.arange(len(faces)), 3), faces.reshape(-1)))).tocsr()
-    piece = connected_components(joined @ joined.T, directed=False)[1]
+    n = len(faces)
+    meets = np.repeat(np.arange(n), 3), n + faces.reshape(-1)  # faces and vertices as nodes of one graph
+    links = coo_matrix((np.ones(3 * n), meets), shape=(n + len(points),) * 2)
+    piece = connected_components(links, directed=False)[1][:n]
     rim = (counts[which.reshape(-1)].reshape(-1, 3) != 2).any(axis=1)
     is_open = np.zeros(piece.max() + 1, bool)
     is_open[piece[rim]] = True

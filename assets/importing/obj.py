@@ -201,7 +201,7 @@ def _map(text: str) -> MtlMap:
     found: dict[str, Any] = {}
     while option := re.match(r"-(\w+)\s+", text):
         text, number = text[option.end() :], re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+")
-        values = []
+        values: list[float] = []
         while len(values) < OPTIONS.get(option[1], 1) and (m := number.match(text)):
             values.append(float(m[1]))
             text = text[m.end() :]
@@ -265,7 +265,7 @@ def _group(name: str, polygons: list[Polygon], points: np.ndarray, uv_count: int
 def _index(word: str, before: int, count: int) -> int:
     """From 0 on, of `count`; a negative one counts back from the `before` that stand above it in the file."""
     i = int(word)
-    i = i - 1 if i > 0 else before + i
+    i = i - 1 if i > 0 else before + i if i < 0 else -1
     if not 0 <= i < count:
         raise IndexError(f"index {word} of {count}")
     return i

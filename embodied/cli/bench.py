@@ -4,8 +4,8 @@ houses, pictures, steps and memory measure the main line; views measures views o
 steps with help, seen those with pixels; drive counts live pictures and the steps of a body on wheels that sees them;
 bakes lights a flat again and again; light compares the ways of drawing with a path tracer; growth lights houses of 40
 to 400 m² (fast, or --quality normal) and fits how the cost grows; serve lets --people take part in a study at once for
---seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make every number
-worse.
+--seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make
+every number worse.
 """
 
 from __future__ import annotations

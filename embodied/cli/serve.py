@@ -9,6 +9,7 @@ are made. `embodied dataset from-people` makes a data set of it.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import os
 import sys
@@ -19,6 +20,8 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.distribution import DISTRIBUTION
+from embodied.errors import UnableError
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
@@ -57,7 +60,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+
 def run(args: argparse.Namespace) -> int:
+    if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
+        raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
     from embodied.serve.run import open_study, serve
     from embodied.serve.study import load_study
 

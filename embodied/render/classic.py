@@ -38,6 +38,8 @@ multiplies the cost of every small triangle, and smoother. A GPU multi-samples i
 MULTISAMPLES = 4
 HIDDEN = 5
 """Geom group of what is left out."""
+NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value]
+"""Flags of a scene that paint every geom in its number's colour."""
 
 
 class Painter(Protocol):
@@ -228,6 +230,8 @@ class Renderer:
         there = [
             (s, g) for r, sectors in rooms.items() if (g := self._geoms_of_room.get(r)) is not None for s in sectors
         ]
+        if not there:
+            return np.zeros_like(framed)
         geoms = np.concatenate([g for _, g in there])
         sectors = np.repeat([s for s, _ in there], [len(g) for _, g in there], axis=0)
         spans = visibility.spans_of(np.array(camera.position), self._middles, self._reaches)
@@ -260,12 +264,12 @@ class Renderer:
     def _depth_and_ids(self, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A second pass that paints every geom in its number's colour."""
         flags = self._drawn.flags
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
+        flags[NUMBERS] = 1
         rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
         reversed_z = np.empty(size, np.float32)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(numbers, reversed_z, rect, self._mjr)
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
+        flags[NUMBERS] = 0
         owner_of_number = np.zeros(len(drawn) + 1, np.int32)
         owner_of_number[1:] = self.scene.owner_of_geom[drawn]
         packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[::-1, :, 0] & 0xFFFFFF

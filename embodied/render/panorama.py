@@ -271,6 +271,7 @@ def _grid(s: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> PixelGrid:
       z: (h, 1) float32, the third: one for each row. Depth in the picture is in units of these rays.
     """
     # A face of the four around shows (x / y, -z / |y|) where |y| is the larger, else (-y / x, -z / |x|).
+    half = s / 2
     across, vertical = np.negative(y), np.abs(y)
     swapped = cv2.compare(vertical, np.abs(x), cv2.CMP_GT)
     cv2.copyTo(x, swapped, across)
@@ -278,26 +279,24 @@ def _grid(s: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> PixelGrid:
     cv2.copyTo(y, swapped, along)
     back = cv2.compare(along, 0.0, cv2.CMP_LT)
     with np.errstate(divide="ignore", invalid="ignore"):  # straight up and down
-        np.divide(1.0, along, out=along)
+        np.divide(half, along, out=along)
         np.multiply(across, along, out=across)
-    stretch = np.abs(along)
-    np.multiply(stretch, -z, out=vertical)
-    steep = np.abs(z[:, 0]) * cv2.reduce(stretch, 1, cv2.REDUCE_MAX)[:, 0] > 1
-    other = np.flatnonzero(steep)
-    for mask, faces in ((swapped, 1), (back, 2)):
-        cv2.add(vertical, faces * (s + 2) / (s / 2), dst=vertical, mask=mask)
-    if len(other):  # rows that see the faces above and below: (-y, x) / |z| and (-y / |z|, x / z)
-        rows = slice(int(other[0]), int(other[-1]) + 1)
-        nearer = 1.0 / np.where(z[rows] == 0, 1, z[rows])
-        mask = cv2.compare(stretch[rows] * np.abs(z[rows]), 1.0, cv2.CMP_GT)
-        face = np.where(z[rows] > 0, np.float32(4), np.float32(5)) * np.float32((s + 2) / (s / 2))
+    np.abs(along, out=along)
+    np.multiply(along, -z, out=vertical)
+    face = cv2.addWeighted(swapped, 1 / 255, back, 2 / 255, 0.0)
+    steep = np.flatnonzero(np.abs(z[:, 0]) * cv2.reduce(along, 1, cv2.REDUCE_MAX)[:, 0] > half)
+    if len(steep):  # rows that see the faces above and below: (-y, x) / |z| and (-y / |z|, x / z)
+        rows = slice(int(steep[0]), int(steep[-1]) + 1)
+        nearer = half / np.where(z[rows] == 0, 1, z[rows])
+        mask = cv2.compare(along[rows] * np.abs(z[rows]), half, cv2.CMP_GT)
         cv2.copyTo(y[rows] * -np.abs(nearer), mask, across[rows])
-        cv2.copyTo(x[rows] * nearer + face, mask, vertical[rows])
-        cv2.copyTo(np.repeat(np.abs(nearer), x.shape[1], axis=1), mask, stretch[rows])
-    for where in (across, vertical):
-        np.multiply(where, s / 2, out=where)
-        np.add(where, s / 2 + 0.5, out=where)
-    return PixelGrid(across, vertical, stretch)
+        cv2.copyTo(x[rows] * nearer, mask, vertical[rows])
+        for values, to in ((np.abs(nearer), along), (np.where(z[rows] > 0, 4, 5).astype(np.uint8), face)):
+            cv2.copyTo(np.repeat(values, x.shape[1], axis=1), mask, to[rows])
+    across += np.float32(half + 0.5)
+    cv2.addWeighted(face, s + 2, vertical, 1.0, half + 0.5, dst=vertical, dtype=cv2.CV_32F)
+    along *= np.float32(1 / half)
+    return PixelGrid(across, vertical, along)
 
 
 @functools.lru_cache(maxsize=8)

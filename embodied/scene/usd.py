@@ -71,7 +71,8 @@ def export_usd(house: House, lit: LitPages, path: Path) -> Path:
 
 def prim_name(owner: str) -> str:
     """An owner as USD may name it: letters, digits and underscores."""
-    return re.sub(r"\W", "_", owner if not owner[:1].isdigit() else f"_{owner}")
+    name = re.sub(r"\W", "_", owner, flags=re.ASCII)
+    return name if name and not name[0].isdigit() else f"_{name}"
 
 
 def _mesh(stage: Any, path: str, mesh: LitMesh, facts: dict[str, str], material: Any) -> None:

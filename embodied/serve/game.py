@@ -182,7 +182,7 @@ class Game:
             self.relay.reply = reply
             question, self.question = self.question, None
             self._step(Ask(question=question), self._asked_at)
-            picture = None if reply.image is None else reply.image._node
+            picture = None if reply.image is None else reply.image.node
             seconds = event.time - self._asked_at
             self.said.append({"who": "assistant", "text": reply.text or "", "picture": picture, "seconds": seconds})
         else:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step
+from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.sessions import STARS, Person, Sessions
@@ -80,11 +80,17 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     }
 
 
+def _picture_of(sight: Sight, pictures: Pictures) -> str:
+    """The name under which the browser gets what a sight shows."""
+    at = viewpoint(sight)
+    return pictures.name(at.world, at.node)
+
+
 def agent_of(game: Game, pictures: Pictures) -> Screen:
     """What the agent sees, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
-    target = seen.target and pictures.name(seen.target._world, seen.target._node)
+    target = None if seen.target is None else _picture_of(seen.target, pictures)
     return {
         "moves": moves_of(seen, game.situation, pictures),
         "words": list(seen.candidates.words),

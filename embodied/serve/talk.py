@@ -19,10 +19,10 @@ from embodied.interface import (
     Observations,
     Place,
     Reply,
-    Sight,
     Situation,
     Situations,
     Subtask,
+    Viewpoint,
 )
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import nearest
@@ -101,7 +101,7 @@ def spoken_reply(situation: Situation, text: str, picture: int | None, number: i
     path = way_to_goal(situation, way) if picture is None else graph.path(pose.node, picture)
     goal = nearest(graph, path[-1], situation.task.goal_nodes)
     subtask = Subtask(f"{SAID}{number}", path[-1], start=pose, goal=goal, path=path)
-    return Reply(text, None if picture is None else Sight(situation.task.world, picture), subtask=subtask)
+    return Reply(text, None if picture is None else Viewpoint(situation.task.world, picture), subtask=subtask)
 
 
 def way_to_goal(situation: Situation, steps: int = 0) -> tuple[int, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 
 from assets.records import Asset
 from embodied.generate.furnish.arrange import Item, floor_poses
@@ -24,12 +26,15 @@ def place_own(ctx: Context) -> None:
     """One thing of each own class whose weight for this kind of room is 1, or with that probability where it is less;
     what rests on surfaces is placed with the other small things."""
     for name in ctx.stock.catalogue.own_classes:
-        suitable = {a.key for a in ctx.stock.of_role(name) if a.support != "surface" and a.rooms.get(ctx.kind, 0) > 0}
-        weight = max((a.rooms[ctx.kind] for a in ctx.stock.of_role(name) if a.key in suitable), default=0.0)
-        if suitable and ctx.chance(min(weight, 1.0)):
-            asset = ctx.pick(name, where=lambda a, keys=suitable: a.key in keys)
+        weights = {a.key: a.rooms.get(ctx.kind, 0.0) for a in ctx.stock.of_role(name) if a.support != "surface"}
+        if ctx.chance(min(max(weights.values(), default=0.0), 1.0)):
+            asset = ctx.pick(name, where=functools.partial(_belongs, weights))
             if asset is not None:
                 _place(ctx, asset)
+
+
+def _belongs(weights: Mapping[str, float], asset: Asset) -> bool:
+    return weights.get(asset.key, 0.0) > 0
 
 
 def _place(ctx: Context, asset: Asset) -> None:
