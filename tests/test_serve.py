@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ from embodied.serve.store import Event
 from embodied.serve.study import Part, Question, StudyError, load_study
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +104,11 @@ def test_a_mistake_in_a_study_is_told_with_its_place(tmp_path):
     ):
         with pytest.raises(StudyError, match=said):
             load_study(write_study(tmp_path, parts))
+
+
+def test_the_example_is_a_study_with_every_role():
+    study = load_study(ROOT / "examples" / "study.toml")
+    assert {r for p in study.parts for r in p.roles} == {"agent", "assistant", "rater", "describer"}
 
 
 def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(data, tmp_path):
@@ -216,7 +224,7 @@ def test_who_waits_too_long_is_thanked_and_gets_a_code(data):
     assert play.screen("ann")["screen"] == "wait"
     play.time += play.study.wait_seconds + 1
     play.ready("ann")
-    assert play.screen("ann")["screen"] == "done"
+    assert (play.screen("ann")["screen"], play.screen("ann")["code"]) == ("done", "CODE")
 
 
 def test_practice_comes_first_and_does_not_count(data):
@@ -269,8 +277,8 @@ class Helpful:
 
         return (Intention.HELP,)
 
-    def answer_text(self, situation, question, *, rng):
-        return spoken_reply(situation, f"you asked {question!r}", None, 1)
+    def answer(self, situation, question, *, rng):
+        return spoken_reply(situation, f"you asked {situation.question!r}", None, 1)
 
 
 def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
