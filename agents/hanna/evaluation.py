@@ -112,7 +112,8 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]
-    rules = dataclasses.replace(learned, network=Uniform(learned.network.config), ask_rule=every5)
+    nothing: Any = Uniform(learned.network.config)
+    rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
     return {
         "blind": blind,
         "blind, not by image": dataclasses.replace(blind, by_image=False),

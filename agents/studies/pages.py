@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Picture
 from assets.cache import atomic_path
 
 if TYPE_CHECKING:
-    from agents.studies.engine import Table
+    from agents.studies.engine import StudyTable
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:
@@ -30,7 +30,7 @@ def page(body: Mapping[str, Any], picture: str | None = None) -> str:
     return "\n".join([*lines, "", *(f"- {note}" for note in body["notes"]), ""])
 
 
-def draw(table: Table, body: Mapping[str, Any], path: Path) -> None:
+def draw(table: StudyTable, body: Mapping[str, Any], path: Path) -> None:
     """The figure of a table, as PNG."""
     spec = table.figure
     assert spec is not None, "only tables with a figure are drawn"
