@@ -38,6 +38,7 @@ ROWS = (
     "learned, random ask",
     "learned, perfect interpretation",
     "blind, not by image",
+    "rules only, ask every 10",
     "rules only, blind",
     "random walk",
 )
