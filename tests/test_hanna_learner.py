@@ -20,10 +20,10 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
-from agents.common.checkpoint import CheckpointError
+from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
 from agents.common.lessons import Split
-from agents.common.session import Clock, DivergedError, as_good, falling_rate, metrics_of, tasks_of_update
+from agents.common.session import Clock, DivergedError, Session, as_good, falling_rate, metrics_of, tasks_of_update
 from agents.common.spine import ADDED, NUMBERS
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
@@ -410,9 +410,10 @@ def test_of_agents_as_good_as_each_other_the_later_is_kept():
 @pytest.mark.slow
 def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
     run(tmp_path)
-    before = (tmp_path / "checkpoint.pt").read_bytes()
+    before, settings = (tmp_path / "checkpoint.pt").read_bytes(), (tmp_path / "settings.json").read_bytes()
     with pytest.raises(CheckpointError, match="batch 6 -> 5"):
         run(tmp_path, dataclasses.replace(TINY, batch=5))
+    assert (tmp_path / "settings.json").read_bytes() == settings, "who is refused writes nothing"
     other = setting()
     worlds = {n: other.bank._table.numpy() for n in other.worlds}
     with pytest.raises(CheckpointError, match="encoder 'tests' -> 'another encoder'"):
@@ -435,6 +436,32 @@ def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
         (tmp_path / name).write_bytes(body)
         with pytest.raises(ValueError, match="checksum"):
             read(tmp_path / name)
+
+
+def test_a_checkpoint_that_cannot_be_gone_on_with_is_refused(tmp_path):
+    def parts(size=3):
+        network = torch.nn.Linear(size, 1)
+        return {"network": network, "adam": torch.optim.Adam(network.parameters())}
+
+    def save(folder, kept):
+        with Session(folder, {"settings": {}}, kept, 2, note=str) as session:
+            session.save()
+        return folder / "checkpoint.pt"
+
+    bad = parts()
+    bad["network"].weight.data.fill_(math.nan)
+    with pytest.raises(CheckpointError, match="not finite"):
+        restore(save(tmp_path / "nan", bad), {"settings": {}}, parts())
+    path = save(tmp_path / "whole", parts())
+    with pytest.raises(CheckpointError, match="network is another's"):
+        restore(path, {"settings": {}}, parts(4))
+    with pytest.raises(CheckpointError, match=r"holds \['adam', 'network'\], this run has \['network'\]"):
+        restore(path, {"settings": {}}, {"network": parts()["network"]})
+    body = torch.load(path, weights_only=True)
+    del body["parts"]["adam"]["param_groups"]
+    torch.save(body, path)
+    with pytest.raises(CheckpointError, match="do not fit its digest"):
+        restore(path, {"settings": {}}, parts())
 
 
 def test_a_second_training_in_the_same_folder_is_refused(tmp_path):

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 import torch
+from hand_data import build
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
@@ -28,7 +29,9 @@ from agents.hari.pretraining import (
 )
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
+from agents.hari.study import HariStudy
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, padded, percept
+from agents.studies.engine import run_study
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
@@ -38,6 +41,7 @@ from embodied.house.house import House, Opening, Storey
 from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
+from embodied.records import read_json
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 
 SMALL = ExecutionConfig(
@@ -556,3 +560,22 @@ def test_the_skyline_needs_no_execution_policy_on_sub_goals(fork_executor):
             if isinstance(action, Move):
                 observation = env.step(action)
         assert env.pose.node == goal
+
+
+@pytest.mark.slow
+def test_the_tables_are_made_from_a_data_set(tmp_path):
+    """Agents that were hardly trained, beside a rule, and an execution policy alone."""
+    data = build(tmp_path / "data", tmp_path / "cache", "hari")
+    walking = dataclasses.replace(SMALL, hidden_size=16, iterations=1, validate_every=1, validation_tasks=2)
+    asking = dataclasses.replace(QUICK, hidden_size=8, iterations=1, batch=4, validation_tasks=3, horizon=6)
+    study = HariStudy(data.folder, (0,), 2, (0,), execution=walking, intention=asking)
+    rows = ["learned", "random + rules", "no assistance, d^s of nothing"]
+    tables = ["4.7", "figure 4.5b", "sight"]
+    run_study(study, tables, tmp_path / "out", rows=rows, note=silent)
+    body, times, sight = (read_json(tmp_path / "out" / f"hari-{n.replace(' ', '-')}.json") for n in tables)
+    assert [r["label"] for r in body["rows"]] == ["random + rules", "learned"]
+    assert [c["key"] for c in body["columns"]][-4:] == ["CUR", "GOAL", "SUB", "DO"]
+    assert body["rows"][1]["printed"]["success_test_unseen_env"] == 19.8 and len(sight["rows"]) == 1
+    shares = [times["rows"][0]["values"][f"{name}_at_1_val_unseen_env"]["mean"] for name in INTENTIONS]
+    assert sum(shares) == pytest.approx(1), "every running episode chooses one intention"
+    assert (tmp_path / "out" / "hari-figure-4.5b.png").exists()

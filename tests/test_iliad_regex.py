@@ -532,11 +532,17 @@ def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     text = pages["3.5"].read_text()
     assert "| λ = 0.5 | " in text and "(55.7)" in text and "Not run" not in text
     runs = list((tmp_path / "runs").iterdir())
-    assert len(runs) == 2 * 4, "some runs are the same"
+    assert len(runs) == 2 * 5, "both tables have the run that is as it is"
     assert "Not run: DAgger" in run_study(study, ["3.4"], tmp_path, report=True, note=silent)["3.4"].read_text()
     other = dataclasses.replace(study, config=dataclasses.replace(QUICK, learning_rate=0.5))
     text = run_study(other, ["3.5"], tmp_path, report=True, note=silent)["3.5"].read_text()
     assert "Not run: λ = 0, λ = 1, λ = 0.5." in text and "learning rate 0.5" in text, "never old numbers, new caption"
+
+
+@pytest.mark.parametrize("wrong", ["--learner=nope", "--mixing=nan", "--threshold=nan", "--entropy=nan"])
+def test_what_cannot_be_learned_is_refused_before_data_are_made(wrong, tmp_path, capsys):
+    assert main(["train", "iliad", "regex", "--out", str(tmp_path / "run"), wrong]) == 2
+    assert wrong[2:].partition("=")[0] in capsys.readouterr().err and not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow

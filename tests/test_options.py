@@ -38,7 +38,6 @@ LEARN = ("--data", "d", "--out", "o")
         (("export", "glb", "--house", "x", "--out", "x/house.json"), "--out: should end in .glb"),
         (("rollout", "--video", "house.json"), "--video: should end in .mp4"),
         (("rollout", "--rrd", "house.json"), "--rrd: should end in .rrd"),
-        (("bench", "houses", "light"), "light makes a report of its own; run it without ['houses']"),
         (("bench", "nope"), "unknown benchmark"),
         (("dataset", "find", "--out", "x", "--houses", "2000000000"), "at most 100000, got '2000000000'"),
         (("dataset", "find", "--out", "x", "--houses", "2", "--tasks", "2147483648"), "at most 10000000"),

@@ -20,7 +20,7 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
@@ -58,8 +58,8 @@ def _sweep() -> tuple[StudyRow, ...]:
     return tuple(rows)
 
 
-TABLES: Mapping[str, Table] = {
-    "3.2": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "3.2": StudyTable(
         "Translation scores and their improvement by one round of ratings",
         tuple(
             row
@@ -72,7 +72,7 @@ TABLES: Mapping[str, Table] = {
         ),
         (SENTENCE, HELD_OUT),
     ),
-    "3.4": Table(
+    "3.4": StudyTable(
         "NED-A2C for five passes",
         tuple(
             dataclasses.replace(row, judge={"curve": True})
@@ -80,18 +80,18 @@ TABLES: Mapping[str, Table] = {
         ),
         figure=Figure((SENTENCE.replace(" ", "_"),), "pass over the rated sentences", SENTENCE),
     ),
-    "3.5": Table(
+    "3.5": StudyTable(
         "Gain by NED-A2C under imperfect ratings",
         _sweep(),
         (SENTENCE, HELD_OUT),
         figure=Figure((SENTENCE.replace(" ", "_"),), "strength of the perturbation", f"Δ {SENTENCE}", log=True),
     ),
-    "rates": Table(
+    "rates": StudyTable(
         "One round of ratings at other learning rates; 0.0001 is the text's (3.1.5.2)",
         tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNERS.items()),
         (SENTENCE, HELD_OUT),
     ),
-    "held-out": Table(
+    "held-out": StudyTable(
         "Held-out sentences: how learners translate them after one round of ratings",
         tuple(
             dataclasses.replace(
@@ -120,7 +120,7 @@ class BanditStudy:
     name = "bandit"
     judges = ("agents.bandit.behaviour",)
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         return TABLES
 
     def seeds(self, row: StudyRow) -> Sequence[int]:

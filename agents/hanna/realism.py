@@ -22,7 +22,7 @@ from agents.common.lessons import drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.studies.engine import StudyRow, Table
+from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
 from embodied.datasets.store import SplitData, dataset_of
@@ -64,10 +64,10 @@ class RealismStudy(EpisodeStudy):
         paths, through = self.arms[arm], self.encoders.get(arm, (None,))
         return [*zip(paths, through if len(through) > 1 else [*through] * len(paths), strict=True)]
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """One split per way of drawing, named by it."""
         rows = tuple(StudyRow(arm, {"arm": arm}) for arm in self.arms)
-        return {"realism": Table("Success against realism", rows, ("success", "requests"), self.pictures)}
+        return {"realism": StudyTable("Success against realism", rows, ("success", "requests"), self.pictures)}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return range(len(self.arms[(row.train or {})["arm"]]))

@@ -16,7 +16,7 @@ from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
 from embodied.datasets.store import Dataset, SplitData, dataset_of
@@ -71,7 +71,7 @@ SHORTER = "equal_passes"
 """In a row's settings: trained on fewer houses for as many passes as the agent of all houses, not as many updates."""
 
 
-def _houses_table(every: int) -> Table:
+def _houses_table(every: int) -> StudyTable:
     """Success against training houses, of those numbers that are fewer than `every`."""
     counts = [n for n in HOUSES if n < every]
     updates = {n: learned(f"{n} houses", training_houses=n) for n in counts}
@@ -86,22 +86,22 @@ def _houses_table(every: int) -> Table:
         learned("all houses, without a trail", "learned, without a trail"),
     ]
     steps = [(updates[b], updates[a]) for a, b in itertools.pairwise(counts)]
-    return Table(
+    return StudyTable(
         "Success and the number of training houses (no counterpart in the dissertation)",
         tuple(rows), FULL, TEST, (*steps, *((every_house, r) for r in updates.values())),
         Figure(("success",), "training houses", "success (%)", log=True),
     )  # fmt: skip
 
 
-def _requests_table() -> Table:
+def _requests_table() -> StudyTable:
     asked = [learned(name.removeprefix("learned, "), name) for kind in ASK_THRESHOLDS.values() for name in kind]
     priced = [learned(f"trained at price {p:g}", ask_price=p) for p in (0.25, 4.0)]
     title = "Success and the number of requests (no counterpart in the dissertation)"
-    return Table(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
+    return StudyTable(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
 
 
-TABLES: Mapping[str, Table] = {
-    "4.3": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "4.3": StudyTable(
         "Results on the test splits",
         (
             without("Random walk", "random walk"),
@@ -110,41 +110,43 @@ TABLES: Mapping[str, Table] = {
             learned("Learn to interpret assistance"),
             without("Shortest", "shortest"),
             learned("Perfect assistance interpretation", "learned, perfect interpretation"),
+            learned("Blind", "blind"),
+            learned("Rules only", "rules only"),
         ),
         FULL,
         TEST,
     ),
-    "4.4": Table("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
-    "4.5": Table(
+    "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
+    "4.5": StudyTable(
         "Help-request policies",
         (NO_ASK, RANDOM_ASK, EVERY_5, LEARNED),
         ("success", "requests"),
         TEST,
         ((HALF, NO_ASK), (HALF, RANDOM_ASK), (HALF, EVERY_5)),
     ),
-    "4.6": Table(
+    "4.6": StudyTable(
         "Model and curiosity",
         (LSTM, NO_CURIOSITY, OURS),
         ("success", "mistake repeat", "request repeat"),
         ("test_unseen",),
         ((PLAIN_OURS, LSTM), (OURS, NO_CURIOSITY)),
     ),
-    "D.1": Table("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
-    "D.2": Table(
+    "D.1": StudyTable("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
+    "D.2": StudyTable(
         "Ablations",
         (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
         FULL,
         VALIDATION,
         tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
     ),
-    "lights": Table(
+    "lights": StudyTable(
         "Success and the number of lightings of each training house (no counterpart in the dissertation)",
         (learned("1 lighting"), learned("3 lightings", lights=3)),
         FULL,
         TEST,
         ((learned("3 lightings", lights=3), learned("1 lighting")),),
     ),
-    "departures": Table(
+    "departures": StudyTable(
         "What mini does otherwise than Table D.1, one thing less at a time (no counterpart in the dissertation)",
         (
             learned("as mini is"),
@@ -182,7 +184,7 @@ class HannaStudy(EpisodeStudy):
     makers = ("agents.hanna.run",)
     judges = (*JUDGES, "agents.hanna.evaluation")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
         every = len(self._lessons().data.names("train"))
         ood = Dataset(self.elsewhere or self.data).ood

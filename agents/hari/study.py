@@ -18,7 +18,7 @@ from agents.hari.judging import RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
 from agents.hari.rules import RULES, RuleAgent
 from agents.hari.run import CONDITIONS, hari_data, rules_of, train_execution, train_intention, with_eyes
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.datasets.store import SplitData
 from embodied.evaluation.tables import Samples
@@ -56,8 +56,8 @@ def _costs() -> tuple[StudyRow, ...]:
     )
 
 
-TABLES: Mapping[str, Table] = {
-    "4.7": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "4.7": StudyTable(
         "Asking by learning and by rules",
         (
             *(_learned(rule, rule) for rule in RULE_ROWS),
@@ -70,17 +70,17 @@ TABLES: Mapping[str, Table] = {
         ((_learned("learned"), _learned(RANDOM, RANDOM)),),
         pooled=ACTIONS,
     ),
-    "4.8": Table(
+    "4.8": StudyTable(
         "Goals on the stack",
         (_learned("stack 1", stack=1), _learned("stack 2"), _learned("stack 3", stack=3)),
         ("success",),
         VALIDATION,
         pooled=ACTIONS,
     ),
-    "moves": Table(
+    "moves": StudyTable(
         "Moves, likeliest or drawn (no counterpart in the dissertation)", _moves(), ("success",), TEST, pooled=ACTIONS
     ),
-    "sight": Table(
+    "sight": StudyTable(
         "What seeing is worth (no counterpart in the dissertation)",
         (
             _sight("no assistance, d^s of nothing", "words", "none"),
@@ -97,14 +97,14 @@ TABLES: Mapping[str, Table] = {
         TEST,
         pooled=("DO",),
     ),
-    "figure 4.5": Table("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
-    "figure 4.5b": Table(
+    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
+    "figure 4.5b": StudyTable(
         "Intentions by time step",
         (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
         splits=("val_unseen_env",),
         figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes"),
     ),
-    "figure 4.6": Table(
+    "figure 4.6": StudyTable(
         "What costs change",
         _costs(),
         ("success", *ACTIONS),
@@ -143,7 +143,7 @@ class HariStudy(EpisodeStudy):
     makers = ("agents.hari.run",)
     judges = (*JUDGES, "agents.hari.judging")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside those of the tests."""
         ood = hari_data(self.data).ood
         extended = lambda t: dataclasses.replace(t, splits=(*t.splits, *ood)) if t.splits == TEST else t

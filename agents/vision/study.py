@@ -21,7 +21,7 @@ from typing import Any
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.studies.engine import Measured, StudyRow, Table
+from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.vision.config import WAYS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
@@ -75,11 +75,11 @@ class EncoderStudy:
         if twice := sorted(self.ready.keys() & ENCODERS.keys()):
             raise ValueError(f"encoders of the names {twice} are trained by the study; give those of --encoders others")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         rows = (*(StudyRow(n, dict(c)) for n, c in ENCODERS.items()), *(StudyRow(n, {READY: n}) for n in self.ready))
         return {
-            "encoders": Table("Encoders: what linear readers make of them", rows, COLUMNS),
-            "pictures": Table("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
+            "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
+            "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
         }
 
     def seeds(self, row: StudyRow) -> Sequence[int]:

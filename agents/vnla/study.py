@@ -15,10 +15,9 @@ from typing import Any
 from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.settings import EvaluationSettings
-from agents.common.weights import weights_digest
-from agents.studies.engine import StudyRow, Table
+from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
-from agents.vision.encoder import load_encoder
+from agents.vision.run import encoder_of
 from agents.vnla.agent import VnlaAgent, load_agent
 from agents.vnla.config import VnlaSettings
 from agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
@@ -38,12 +37,12 @@ def _row(label: str, played: str = LEARNED, rooms: bool = True, **train: Any) ->
     return StudyRow(label, train, {"played": played, ROOMS: rooms})
 
 
-def _table(title: str, *rows: StudyRow) -> Table:
-    return Table(title, rows, COLUMNS, SPLITS)
+def _table(title: str, *rows: StudyRow) -> StudyTable:
+    return StudyTable(title, rows, COLUMNS, SPLITS)
 
 
 PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
-TABLES: Mapping[str, Table] = {
+TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
         _row("none", asker="none"),
@@ -58,7 +57,7 @@ TABLES: Mapping[str, Table] = {
         _row("direct, in words", DIRECT),
         _row("indirect"),
     ),
-    "rooms": Table(
+    "rooms": StudyTable(
         "Requests that name no room",
         (
             StudyRow(
@@ -70,7 +69,7 @@ TABLES: Mapping[str, Table] = {
         COLUMNS,
         SPLITS,
     ),
-    "algorithm-6": Table(
+    "algorithm-6": StudyTable(
         "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
         (
             _row("program's rules, asks at random", asker="random"),
@@ -97,6 +96,8 @@ class VnlaStudy(EpisodeStudy):
     """Tables 2, 3, 4 and 7 of VNLA's first paper."""
 
     encoder: Path
+    network: str | None = None
+    """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
     config: VnlaSettings
     """Where the rows start from."""
     evaluation: EvaluationSettings
@@ -112,7 +113,7 @@ class VnlaStudy(EpisodeStudy):
     makers = ("agents.vnla.run",)
     judges = (*JUDGES, "agents.vnla.judging")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside the others."""
         splits = (*SPLITS, *vnla_data(self.data).ood)
         return {name: dataclasses.replace(table, splits=splits) for name, table in TABLES.items()}
@@ -125,11 +126,7 @@ class VnlaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         lessons = self.lessons(train.get(ROOMS, True))
-        return {
-            "data": lessons.data.digest,
-            "encoder": weights_digest(self.encoder),
-            "pictures": lessons.pictures("train"),
-        }
+        return {"data": lessons.data.digest, "encoder": lessons.encoder.digest, "pictures": lessons.pictures("train")}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data sets that are missing are told before anything is trained."""
@@ -174,7 +171,7 @@ class VnlaStudy(EpisodeStudy):
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return Lessons(data, load_encoder(self.encoder), self.quality)
+        return Lessons(data, encoder_of(self.encoder, self.network), self.quality)
 
     def about(self) -> str:
         c, pictures = self.config, self.lessons(True).pictures("train")

@@ -127,7 +127,7 @@ def from_people(args: argparse.Namespace) -> int:
     rated = rated_by_people(args.people, source)
     data = write_people_dataset(source, words, args.out, only=args.people_only)
     facts: dict[str, object] = {"folder": str(args.out), "digest": data.digest, "wordings": len(words)}
-    text = f"{data.table()}\n{len(words)} wordings of people; digest {data.digest[:16]}, in {args.out}"
+    text = f"{data.table()}\n{len(words)} wordings by people; digest {data.digest[:16]}, in {args.out}"
     if len(rated) > 1:
         rater = fitted([s for s, _ in rated], [(n - 1) / (STARS - 1) for _, n in rated], STARS - 1)
         write_json(args.out / "rater.json", dataclasses.asdict(rater))
