@@ -125,7 +125,8 @@ def readme(program: str, data: Dataset, with_features: bool) -> str:
     text = (Path(__file__).parent / "readmes" / f"{program}.md").read_text(encoding="utf-8")
     file = PROGRAMS[program].features
     if with_features:
-        note = f"`{file}` holds features of our pictures by our encoder, not {THEIRS[file]}'s; the program opens it by that name."
+        theirs = THEIRS[file]
+        note = f"`{file}` holds features of our pictures, not {theirs}'s; the program opens it by that name."
     else:
         note = f"There is no `{file}`: export again with `--features`, or make one yourself."
     facts = {
