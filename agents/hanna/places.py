@@ -220,7 +220,7 @@ def main() -> None:
         "notes": ["'again': the agent's own panoramas through a robot's camera, compared without turning."],
     }
     for row in rows:
-        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[index, attr-defined]
+        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[attr-defined]
     if args.data:
         write_json(args.out / "sight-places.json", table, indent=1)
 
