@@ -171,7 +171,7 @@ class HannaStudy(EpisodeStudy):
     """Where the rows start from."""
     evaluation: HannaEvaluation
     device: str = "cpu"
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
@@ -203,7 +203,7 @@ class HannaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         data = dataset_of(self.data, "hanna")
-        drawn = drawings(data, data.names("train"), self.quality)
+        drawn = drawings(data, data.names("train"), self.picture_kind)
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
         return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
 
@@ -211,7 +211,7 @@ class HannaStudy(EpisodeStudy):
         """Features that are missing are told before anything is trained."""
         judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
         for split in splits:
-            split_of(judged, split, encoder, quality=self.quality)
+            split_of(judged, split, encoder, picture_kind=self.picture_kind)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
@@ -225,14 +225,14 @@ class HannaStudy(EpisodeStudy):
         if agent is None:
             return agent_without_learning("hanna", played)
         data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
-        return all_policies(agent, split_of(data, split, encoder, quality=self.quality).bank)[played]
+        return all_policies(agent, split_of(data, split, encoder, picture_kind=self.picture_kind).bank)[played]
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.elsewhere or self.data, "hanna")
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         data = self.judged_in(row.judge)
-        drawn = drawings(data, data.names(split), self.quality)
+        drawn = drawings(data, data.names(split), self.picture_kind)
         return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
@@ -250,4 +250,4 @@ class HannaStudy(EpisodeStudy):
         )
 
     def _lessons(self) -> Lessons:
-        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.quality, self.device)
+        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.picture_kind, self.device)
