@@ -13,7 +13,7 @@ from handmade import HandCatalogue, furnished
 from embodied.gym import drive, suite
 from embodied.gym.drive import DriveEnv, make
 from embodied.gym.driving import DriveSettings, Driving, guided
-from embodied.gym.floor_ways import FloorWays
+from embodied.navigation.floor_ways import FloorWays
 from embodied.world import open_world
 
 SMALL = {"height": 32, "width": 32, "farthest": 5.0}

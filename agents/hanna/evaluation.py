@@ -107,8 +107,8 @@ class Forgetting:
 def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """What sight is worth, by name: the learned agent without it, and its rules with sight but without learning.
 
-    'blind' sees black with network and matcher alike; the last two draw moves evenly, stop by the picture alone and
-    ask every 5 steps.
+    'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
+    asks every 5 steps, or every 10.
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]
@@ -119,6 +119,7 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
         "blind, not by image": dataclasses.replace(blind, by_image=False),
         "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
         "rules only": rules,
+        "rules only, ask every 10": dataclasses.replace(rules, ask_rule=ask_every(10)),
         "rules only, blind": dataclasses.replace(rules, bank=blind.bank),
     }
 

@@ -197,6 +197,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
     parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
     parser.add_argument("--validation-splits", nargs="+", default=["val_unseen", "test_unseen"])
+    parser.add_argument("--table", default="sight-places", help="name of the table (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("docs/results/data"))
     args = parser.parse_args()
 
@@ -209,7 +210,7 @@ def main() -> None:
     ]
     houses = len({q.house for some in asked.values() for q in some})
     table = {
-        "table": "sight-places",
+        "table": args.table,
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
         "command": "python -m agents.hanna.places --validation VAL --data TEST --out docs/results/data",
@@ -222,7 +223,7 @@ def main() -> None:
     for row in rows:
         print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[index, attr-defined]
     if args.data:
-        write_json(args.out / "sight-places.json", table, indent=1)
+        write_json(args.out / f"{args.table}.json", table, indent=1)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ ROWS = (
     "learned, random ask",
     "learned, perfect interpretation",
     "blind, not by image",
+    "rules only, ask every 10",
     "rules only, blind",
     "random walk",
 )
@@ -66,6 +67,7 @@ def main() -> None:
     parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
     parser.add_argument("--seed", type=int, default=0, help="of the judging (default: %(default)s)")
     parser.add_argument("--episodes", type=Path, required=True, help="folder of the episodes")
+    parser.add_argument("--table", default="sight-hanna", help="name of the table (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="folder of the table; without it none is written")
     parser.add_argument("--cache", type=Path, default=default_cache())
     args = parser.parse_args()
@@ -84,9 +86,9 @@ def main() -> None:
                 rows.append({"label": f"{name} ({shown})", "values": values, "printed": {}})
     if args.out:
         write_json(
-            args.out / "sight-hanna.json",
+            args.out / f"{args.table}.json",
             {
-                "table": "sight-hanna",
+                "table": args.table,
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
                 "command": "python -m agents.hanna.sight_study --data TEST --episodes STUDY --out docs/results/data",

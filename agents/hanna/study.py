@@ -110,6 +110,8 @@ TABLES: Mapping[str, StudyTable] = {
             learned("Learn to interpret assistance"),
             without("Shortest", "shortest"),
             learned("Perfect assistance interpretation", "learned, perfect interpretation"),
+            learned("Blind", "blind"),
+            learned("Rules only", "rules only"),
         ),
         FULL,
         TEST,

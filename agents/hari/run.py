@@ -46,7 +46,9 @@ def lessons_of(data: Dataset) -> Curriculum:
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
-    return HariRules(costs, config.stack, config.longest, config.cooperative, config.states, config.horizon)
+    return HariRules(
+        costs, config.stack, config.longest, config.cooperative, config.states, config.horizon, config.kept
+    )
 
 
 def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:

@@ -43,6 +43,7 @@ COMMANDS = (
     "study",
     "iliad",
     "bench",
+    "cache",
 )
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 

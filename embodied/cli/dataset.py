@@ -2,7 +2,7 @@
 
 Interrupt it whenever you like: the same command goes on from there, and the files do not depend
 on the number of workers. One house is one unit of work. Whoever needs words only leaves the pictures
-out by --panoramas none; they can be drawn later, by the same command without it.
+out by --pictures none; they can be drawn later, by the same command without it.
 
 `embodied dataset from-people --people STUDY.people --data DATA --out DIR` writes DATA again with the words of the
 people of `embodied serve`: their routes for HANNA, VLN and ILIAD, their sub-goals for VNLA, and, where they gave
@@ -123,7 +123,7 @@ def from_people(args: argparse.Namespace) -> int:
     rated = rated_by_people(args.people, source)
     data = write_people_dataset(source, words, args.out, only=args.people_only)
     facts: dict[str, object] = {"folder": str(args.out), "digest": data.digest, "wordings": len(words)}
-    text = f"{data.table()}\n{len(words)} wordings of people; digest {data.digest[:16]}, in {args.out}"
+    text = f"{data.table()}\n{len(words)} wordings by people; digest {data.digest[:16]}, in {args.out}"
     if len(rated) > 1:
         rater = fitted([s for s, _ in rated], [(n - 1) / (STARS - 1) for _, n in rated], STARS - 1)
         write_json(args.out / "rater.json", dataclasses.asdict(rater))

@@ -7,6 +7,7 @@ answer is kept in --answers, so that the same command again costs nothing and a 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -49,6 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=any_path, metavar="FILE", help="ask: seeds of the houses, one a line")
     parser.add_argument("--unseen-classes", action="store_true", help="ask: only classes that are kept from training")
     parser.add_argument("--tasks", type=whole(), default=20, metavar="N", help="at most so many tasks (default: 20)")
+    parser.add_argument("--steps", type=whole(), metavar="N", help="most steps of an episode (default: its task's)")
     parser.add_argument("--batch", type=whole(), default=8, metavar="N", help="episodes at a time (default: 8)")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: 0)")
     parser.add_argument(
@@ -66,7 +68,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class _Stage:
     """What is played, and where."""
 
     split: str
@@ -91,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
 
     reword = assistant_maker(args.assistant, client, args.prompts)
     stage = _ask_stage(args) if args.kind == "ask" and args.seeds else _stage(args)
+    if args.steps:
+        tasks = [dataclasses.replace(t, horizon=min(t.horizon, args.steps)) for t in stage.tasks]
+        stage = dataclasses.replace(stage, tasks=tasks)
     agents = {name: _agent(args, name, stage, client) for name in args.agent}
 
     def make_env() -> HelpEnv:
@@ -111,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
             save_lines(args.out / episodes_file(stage.split, called), episodes)
     if args.out:
         tables.save(rows, args.out, "table")
-    text = tables.markdown(rows, [c for c in _columns(args.kind) if all(c in r.values for r in rows)])
+    text = tables.markdown(rows, [c for c in _columns(args.kind) if any(c in r.values for r in rows)])
     for name, heard in said.items():
         text += f"\n{name}: a listener arrives with {heard[0]} of {heard[1]} routes that were told"
     if clients:
@@ -128,7 +133,7 @@ def _columns(kind: str) -> list[str]:
     return [*(COLUMNS if kind == "ask" else plain), *metrics.USAGE]
 
 
-def _stage(args: argparse.Namespace) -> Stage:
+def _stage(args: argparse.Namespace) -> _Stage:
     """A split of a data set, or a generated flat, with worlds that can be looked at."""
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import spread
@@ -137,16 +142,16 @@ def _stage(args: argparse.Namespace) -> Stage:
     seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
     if args.data is None:
         flat = flat_playground(args.kind, args.seed, cache=args.cache, sees=seen)
-        return Stage(f"flat_{args.seed}", flat.worlds, spread(flat.tasks, args.tasks), flat.make_env)
+        return _Stage(f"flat_{args.seed}", flat.worlds, spread(flat.tasks, args.tasks), flat.make_env)
     data, catalogue = Dataset(args.data), catalogue_of(args)
     if data.kind != args.kind:
         raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
     worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(args.split)}
     split = data.split(args.split, worlds=worlds)
-    return Stage(args.split, worlds, spread(split.tasks, args.tasks), split.make_env)
+    return _Stage(args.split, worlds, spread(split.tasks, args.tasks), split.make_env)
 
 
-def _ask_stage(args: argparse.Namespace) -> Stage:
+def _ask_stage(args: argparse.Namespace) -> _Stage:
     """Ask-v0 in the houses of a list of seeds. What is written down names houses by their place in the list alone."""
     from embodied.datasets.build import make_dataset_house
     from embodied.envs.make import ask_environment_maker, look_of
@@ -163,10 +168,10 @@ def _ask_stage(args: argparse.Namespace) -> Stage:
     look, unseen = look_of(catalogue), args.unseen_classes or None
     per_house = -(-args.tasks // len(seeds))
     tasks = spread(ask_split(worlds, look, per_house, seed=seeds[0], unseen=unseen), args.tasks)
-    return Stage("unseen classes" if unseen else "hidden", worlds, tasks, ask_environment_maker(worlds, look))
+    return _Stage("unseen classes" if unseen else "hidden", worlds, tasks, ask_environment_maker(worlds, look))
 
 
-def _agent(args: argparse.Namespace, name: str, stage: Stage, client: Callable[[], Any]) -> Agent:
+def _agent(args: argparse.Namespace, name: str, stage: _Stage, client: Callable[[], Any]) -> Agent:
     from embodied.evaluation.ask import submitted
     from embodied.evaluation.evaluate import agent
     from embodied.policies.ask import baselines
@@ -179,7 +184,7 @@ def _agent(args: argparse.Namespace, name: str, stage: Stage, client: Callable[[
     return known[name] if name in known else submitted(name)
 
 
-def _model_agent(args: argparse.Namespace, stage: Stage, client: Any) -> Agent:
+def _model_agent(args: argparse.Namespace, stage: _Stage, client: Any) -> Agent:
     from agents.language_models.agent import LanguageModelAgent
     from agents.language_models.telling import Teller, agent_prompt
     from agents.language_models.words import SeenNames

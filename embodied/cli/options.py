@@ -222,6 +222,13 @@ def add_hari_rules(parser: argparse.ArgumentParser) -> None:
         default=STATES[1],
         help="how the agent's own place is described without asking (default: %(default)s)",
     )
+    group.add_argument(
+        "--kept",
+        type=float,
+        default=0.1,
+        metavar="SHARE",
+        help="share of the object classes, the commonest, that sparse descriptions keep (default: %(default)s)",
+    )
 
 
 def hari_rules_of(args: argparse.Namespace) -> HariRules:
@@ -229,7 +236,7 @@ def hari_rules_of(args: argparse.Namespace) -> HariRules:
     from embodied.envs.hari import Costs, HariRules
 
     costs, cooperative = Costs.alike(args.cost), not args.uncooperative
-    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon)
+    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon, args.kept)
 
 
 # Options made from settings ---------------------------------------------------------------------

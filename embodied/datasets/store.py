@@ -269,7 +269,7 @@ class Dataset:
             wording=ANNA_SPLIT.get(name, ""),
             language=language or (PeoplesWords(said, PlainLanguage()) if said else None),
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
-            describer=self.describer() if self.kind == "hari" else None,
+            describer=self.describer(hari.kept) if self.kind == "hari" else None,
             hari=hari,
             vnla=vnla,
             assistant=assistant,
@@ -282,9 +282,9 @@ class Dataset:
         spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
         return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
 
-    def describer(self) -> Describer:
-        """HARI's descriptions; frequent objects are counted over the training houses."""
-        return Describer(frequent_classes([self.place(n) for n in self.names("train")]))
+    def describer(self, kept: float = AS_PRINTED.kept) -> Describer:
+        """HARI's descriptions; the share of frequent classes is counted over the training houses."""
+        return Describer(frequent_classes([self.place(n) for n in self.names("train")], kept))
 
     def table(self) -> str:
         """The table of the splits, as Markdown."""

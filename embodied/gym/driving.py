@@ -16,9 +16,9 @@ import numpy as np
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
 from embodied.geometry import wrap
 from embodied.gym.eyes import FAR, PIXELS
-from embodied.gym.floor_ways import DrivingWays, FloorWays
 from embodied.gym.spaces import codes_of, word_number
 from embodied.language.plain import with_article
+from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import Camera, camera_at
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance

@@ -12,6 +12,9 @@ from types import ModuleType
 IDS = {"find": "Find", "vln": "VLN", "vnla": "VNLA", "hanna": "HANNA", "hari": "HARI", "ask": "Ask"}
 """Kind of task to the name of its environment: embodied/HANNA-v0."""
 
+CONTINUOUS = {"vlnce": "VLNCE", "objectnav": "ObjectNav"}
+"""The same, of continuous navigation (embodied.gym.continuous)."""
+
 
 def register_with_gymnasium() -> None:
     """Register the environments: now if Gymnasium is imported already, else as soon as it is."""
@@ -29,6 +32,14 @@ def register(gymnasium: ModuleType) -> None:
                 f"embodied/{name}-v0",
                 entry_point="embodied.gym.env:make",
                 vector_entry_point="embodied.gym.env:make_vec",
+                kwargs={"kind": kind},
+            )
+    for kind, name in CONTINUOUS.items():
+        if f"embodied/{name}-v0" not in gymnasium.registry:
+            gymnasium.register(
+                f"embodied/{name}-v0",
+                entry_point="embodied.gym.continuous:make",
+                vector_entry_point="embodied.gym.continuous:make_vec",
                 kwargs={"kind": kind},
             )
     if "embodied/Drive-v0" not in gymnasium.registry:

@@ -43,9 +43,9 @@ class Part:
     per_person: int = 3
     """Most that one person does of this part."""
     agent: str = PERSON
-    """Who acts: 'person', a policy that the server knows ('shortest', 'random', 'hanna', ...) or 'module:Class'."""
+    """Who acts: 'person', a policy that the server knows ('shortest', 'shipped', 'llm', ...) or 'module:Class'."""
     assistant: str = PERSON
-    """Who answers: 'person', 'simulated', 'none' or 'module:Class'."""
+    """Who answers: 'person', 'simulated', 'llm', 'none' or 'module:Class'."""
     questions: tuple[Question, ...] = ()
     """Questions that a person may choose; with `free_question`, own words besides."""
     free_question: bool = True

@@ -1,0 +1,395 @@
+"""Continuous navigation: a body that goes a step ahead, turns, looks up and down, and stops (VLN-CE, ObjectNav).
+
+The rules are those of Habitat's tasks (Savva et al. 2019; Krantz et al. 2020): a step is straight, a body that touches
+something stays or slides along it, an episode ends when the agent stops or after 500 actions. Where the body can be is
+the floor of embodied.navigation.floor_ways. Nothing is drawn here; embodied.gym.continuous does that.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from embodied.house.house import House
+from embodied.interface import Place
+from embodied.navigation.floor_ways import DrivingWays, FloorWays
+from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
+
+COLLIDED = 1e-3
+"""A step that falls short by more than this, metres, is a collision."""
+STEEPEST = 60
+"""Most degrees that the camera is tilted up or down."""
+Point = tuple[float, float, float]
+
+
+class Move(enum.IntEnum):
+    """Habitat's actions, by number."""
+
+    STOP = 0
+    FORWARD = 1
+    LEFT = 2
+    RIGHT = 3
+    UP = 4
+    DOWN = 5
+
+
+@dataclass(frozen=True)
+class Body:
+    """How an agent moves and sees."""
+
+    forward: float = 0.25
+    """Metres of a step."""
+    turn: int = 15
+    """Degrees of a turn, which divide 360."""
+    tilt: int = 30
+    """Degrees of a look up or down."""
+    looks: bool = False
+    """Whether it can look up and down."""
+    sliding: bool = True
+    """Whether it slides along what it touches."""
+    steps: int = 500
+    """Most actions of an episode, STOP included."""
+    eye: float = 1.25
+    """Height of the camera above the floor, metres."""
+    pitch: float = 0.0
+    """Degrees that a level camera is mounted above the horizon."""
+
+    def __post_init__(self) -> None:
+        if not (0 < self.forward <= 1 and 0 < self.turn <= 90 and 360 % self.turn == 0 and self.steps >= 1):
+            raise ValueError(
+                f"steps of {self.forward} m and turns of {self.turn} degrees, {self.steps} actions; expected "
+                "up to 1 m, degrees that divide 360, and at least one action"
+            )
+        if not (0.1 <= self.eye <= 2.5 and abs(self.pitch) <= STEEPEST and 0 < self.tilt <= STEEPEST):
+            raise ValueError(
+                f"a camera {self.eye} m high, mounted at {self.pitch} degrees, tilted by {self.tilt}; expected 0.1 to "
+                f"2.5 m and up to {STEEPEST} degrees"
+            )
+
+    @property
+    def actions(self) -> int:
+        return 6 if self.looks else 4
+
+
+@dataclass(frozen=True)
+class Aim:
+    """One place that satisfies an episode."""
+
+    position: Point
+    """On the floor, metres, world; of an object, its own position."""
+    views: tuple[Point, ...] = ()
+    """Where the object counts as found from; empty where the position itself is to be reached."""
+    placement: str = ""
+    """Id of the object."""
+
+
+@dataclass(frozen=True)
+class Excursion:
+    """An episode of Habitat's: where it begins, what is asked, where it should end."""
+
+    id: str
+    world: str
+    """House.name."""
+    start: Point
+    """On the floor, metres, world."""
+    yaw: float
+    """Radians counter-clockwise from +x."""
+    instruction: str
+    aims: tuple[Aim, ...]
+    radius: float = 3.0
+    """An agent that stops nearer than this, along the floor in metres, succeeded."""
+    reference: tuple[Point, ...] = ()
+    """VLN-CE: the path that is described, start and end included."""
+    expert: tuple[Point, ...] = ()
+    """VLN-CE: where an expert was on its way, for nDTW; the reference where nothing is given."""
+    object_class: str = ""
+    """ObjectNav: what is sought."""
+    trajectory: str = ""
+    """VLN-CE: the path's id, which several instructions share."""
+
+
+@dataclass(frozen=True)
+class Walk:
+    """What an agent did in an excursion."""
+
+    excursion: Excursion
+    positions: np.ndarray
+    """(n + 1, 3) float64 metres, on the floor: before each action and after the last."""
+    yaws: np.ndarray
+    """(n + 1,) radians."""
+    pitches: np.ndarray
+    """(n + 1,) degrees, integers."""
+    actions: tuple[int, ...]
+    distances: np.ndarray
+    """(n + 1,) metres along the floor to the nearest aim."""
+    collisions: int
+
+    @property
+    def stopped(self) -> bool:
+        return bool(self.actions) and self.actions[-1] == Move.STOP
+
+
+class Grounds:
+    """The floors of houses, made when they are first walked on."""
+
+    def __init__(self) -> None:
+        self._floors: dict[str, FloorWays] = {}
+
+    def of(self, house: House) -> FloorWays:
+        if house.digest not in self._floors:
+            self._floors[house.digest] = FloorWays(house)
+        return self._floors[house.digest]
+
+
+class ContinuousEnv:
+    """Owns the pose of a body in one excursion after another."""
+
+    def __init__(self, body: Body = Body(), grounds: Grounds | None = None) -> None:
+        self.body, self._grounds = body, grounds or Grounds()
+
+    def reset(self, excursion: Excursion, place: Place) -> None:
+        """Put the body at the start; one that is not on the free floor is moved to the nearest point of it.
+
+        Raises:
+          ValueError: there is no way from the start to any aim.
+        """
+        self.excursion, self.place = excursion, place
+        self.ground = self._grounds.of(place.house)
+        self.ways = self.ground.ways(aimed_cells(excursion, self.ground))
+        self.position = self.ground.nearest_free(np.array(excursion.start[:2]))
+        self.yaw, self.tilt, self.collided, self.collisions, self.ended = excursion.yaw, 0, False, 0, False
+        self._actions: list[int] = []
+        self._poses = [(*self.position, self.yaw, self.tilt)]
+        self._distances = [self.ways.length_from(self.position)]
+        if not math.isfinite(self._distances[0]):
+            raise ValueError(f"no aim of episode {excursion.id!r} can be reached in {excursion.world!r}")
+
+    def step(self, action: int) -> None:
+        """One action of Move.
+
+        Raises:
+          ValueError: no such action.
+          RuntimeError: the episode is over.
+        """
+        if not 0 <= action < self.body.actions:
+            raise ValueError(f"an action should be a number from 0 to {self.body.actions - 1}, got {action!r}")
+        if self.ended:
+            raise RuntimeError("the episode is over; reset before another action")
+        self.collided = False
+        if action == Move.FORWARD:
+            there = self.after(self.yaw)
+            short = self.body.forward - float(np.linalg.norm(there - self.position))
+            self.collided = short > COLLIDED
+            self.collisions += self.collided
+            self.position = there
+        elif action in (Move.LEFT, Move.RIGHT):
+            self.yaw += math.radians(self.body.turn) * (1 if action == Move.LEFT else -1)
+        elif action in (Move.UP, Move.DOWN):
+            change = self.body.tilt * (1 if action == Move.UP else -1)
+            self.tilt = max(-STEEPEST, min(STEEPEST, self.tilt + change))
+        self._actions.append(int(action))
+        self._poses.append((*self.position, self.yaw, self.tilt))
+        moved = action == Move.FORWARD
+        self._distances.append(self.ways.length_from(self.position) if moved else self._distances[-1])
+        self.ended = action == Move.STOP or len(self._actions) >= self.body.steps
+
+    def after(self, yaw: float) -> np.ndarray:
+        """(2,) where a step along `yaw` would end."""
+        ahead = self.body.forward * np.array([math.cos(yaw), math.sin(yaw)])
+        return self.ground.moved(self.position, self.position + ahead, sliding=self.body.sliding)
+
+    @property
+    def distance(self) -> float:
+        """Metres along the floor to the nearest aim. Privileged."""
+        return self._distances[-1]
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor, metres."""
+        return float(self.place.house.storeys[0].elevation)
+
+    @property
+    def eye(self) -> Point:
+        """Where the camera is, metres, world."""
+        return float(self.position[0]), float(self.position[1]), self.floor + self.body.eye
+
+    @property
+    def pitch(self) -> float:
+        """Of the camera, radians above the horizon."""
+        return math.radians(max(-89.0, min(89.0, self.tilt + self.body.pitch)))
+
+    @property
+    def steps(self) -> int:
+        """Actions taken."""
+        return len(self._actions)
+
+    def walk(self) -> Walk:
+        """What was done since the last reset."""
+        poses = np.array(self._poses, float)
+        positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
+        return Walk(
+            self.excursion,
+            positions,
+            poses[:, 2],
+            poses[:, 3].astype(int),
+            tuple(self._actions),
+            np.array(self._distances),
+            self.collisions,
+        )
+
+
+def aimed_cells(excursion: Excursion, ground: FloorWays) -> np.ndarray:
+    """Indices of the floor's cells at the aims."""
+    points = [p for aim in excursion.aims for p in (aim.views or (aim.position,))]
+    if not points:
+        raise ValueError(f"episode {excursion.id!r} has no goal; every episode needs one")
+    return np.unique([ground.cell_at(np.array(p)) for p in points])
+
+
+def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) -> tuple[Aim, ...]:
+    """The objects of a class that can be come near to, with the cells in their rooms within `reach` metres of them."""
+    floor, found = float(house.storeys[0].elevation), []
+    for p in house.placements:
+        if p.object_class != object_class or object_class in NOT_OBJECTS:
+            continue
+        near = (footprint_distance(p, ground.xy) <= reach) & (ground.room_of_cell == p.room)
+        views = tuple((float(x), float(y), floor) for x, y in ground.xy[near])
+        if views:
+            found.append(Aim((float(p.position[0]), float(p.position[1]), float(p.position[2])), views, p.id))
+    return tuple(found)
+
+
+class Follower:
+    """An expert that knows the house: along the described path, or straight to the nearest aim, then STOP.
+
+    It has no memory but the part of the path that it has left behind, and answers at any pose that an agent comes to:
+    that is what DAgger asks for.
+    """
+
+    def __init__(self, env: ContinuousEnv, *, along: bool = False, near: float = 0.3) -> None:
+        """
+        Args:
+          along: keep to the reference path, point by point.
+          near: STOP within so many metres of an aim, or within the episode's radius where that is less.
+        """
+        self._env, self._near = env, min(near, 0.9 * env.excursion.radius)
+        points = env.excursion.reference[1:-1] if along else ()
+        cells = [np.array([env.ground.cell_at(np.array(p))]) for p in points]
+        aims = tuple(replace(a, views=_middle(a)) for a in env.excursion.aims)
+        self._plan: list[tuple[np.ndarray, int]] = []
+        last = aimed_cells(replace(env.excursion, aims=aims), env.ground)
+        self._legs: list[DrivingWays] = [env.ground.wide_ways(c) for c in (*cells, last)]
+
+    def action(self) -> int:
+        """What the expert does here."""
+        env = self._env
+        while len(self._legs) > 1 and self._left() <= PASSED:
+            self._legs.pop(0)
+            self._plan = []
+        if len(self._legs) == 1 and env.distance <= self._near:
+            return Move.STOP
+        turns = self._turns()
+        if turns:
+            return Move.LEFT if turns > 0 else Move.RIGHT
+        if self._plan:
+            self._plan.pop(0)
+        return Move.FORWARD
+
+    def _left(self) -> float:
+        return self._legs[0].length_from(self._env.position)
+
+    def _turns(self) -> int:
+        """Turns to the left (negative: right) before the next step."""
+        env, half = self._env, 180 // self._env.body.turn
+        if self._plan and np.allclose(env.position, self._plan[0][0], atol=1e-6):
+            wanted = self._plan[0][1]
+        elif (direct := self._direct()) is not None:
+            self._plan, wanted = [], direct
+        else:
+            self._plan = self._around()
+            wanted = self._plan[0][1] if self._plan else 0
+        return (wanted - self._heading + half) % (2 * half) - half
+
+    @property
+    def _heading(self) -> int:
+        """Turns to the left that the body has made since the start."""
+        return round((self._env.yaw - self._env.excursion.yaw) / math.radians(self._env.body.turn))
+
+    def _ends(self, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(headings, 2) where a step along each heading ends, from heading 0 on, and whether it touches nothing."""
+        body, start = self._env.body, self._env.excursion.yaw
+        angles = start + np.arange(360 // body.turn) * math.radians(body.turn)
+        ends = here + body.forward * np.stack([np.cos(angles), np.sin(angles)], 1)
+        return ends, self._env.ground.is_free(here, ends)
+
+    def _direct(self) -> int | None:
+        """The heading whose step comes nearest to the farthest point of the way that is in sight; None where no step
+        leads nearer to the aim."""
+        env, ways, here = self._env, self._legs[0], self._env.position
+        way = env.ground.xy[ways.cells(env.ground.cell_at(here))[: LOOK + 1]]
+        free = np.flatnonzero(env.ground.is_free(here, way))
+        target = way[int(free[-1])] if len(free) else way[0]
+        ends, open_ = self._ends(here)
+        turns = np.abs((np.arange(len(ends)) - self._heading + len(ends) // 2) % len(ends) - len(ends) // 2)
+        cost = np.linalg.norm(ends - target, axis=1) + turns * TURN_COST
+        cost[~open_] = np.inf
+        best = int(np.argmin(cost))
+        nearer = self._metres(ends[best][None])[0] < self._metres(here[None])[0] - LEAST
+        return best if open_[best] and nearer else None
+
+    def _metres(self, points: np.ndarray) -> np.ndarray:
+        """(n,) of the way from the cells nearest to (n, 2) points."""
+        return self._legs[0].metres[self._env.ground.cells_at(points)]
+
+    def _around(self) -> list[tuple[np.ndarray, int]]:
+        """Steps, (from where, heading), that lead nearer where no single step does: breadth first."""
+        here = self._env.position
+        wanted = self._metres(here[None])[0] - LEAST
+        steps: list[tuple[int, np.ndarray, int]] = [(-1, here, -1)]
+        seen, first = {_square(here)}, 0
+        for _ in range(DEEPEST):
+            last = len(steps)
+            for k in range(first, last):
+                ends, open_ = self._ends(steps[k][1])
+                for heading in np.flatnonzero(open_):
+                    if _square(ends[heading]) not in seen:
+                        seen.add(_square(ends[heading]))
+                        steps.append((k, ends[heading], int(heading)))
+            if last == len(steps):
+                return []
+            metres = self._metres(np.array([end for _, end, _ in steps[last:]]))
+            if metres.min() < wanted:
+                plan, k = [], last + int(np.argmin(metres))
+                while steps[k][0] >= 0:
+                    before = steps[k][0]
+                    plan.append((steps[before][1], steps[k][2]))
+                    k = before
+                return plan[::-1]
+            first = last
+        return []
+
+
+def _square(point: np.ndarray) -> tuple[int, int]:
+    """Which square of 5 cm a point lies in."""
+    return int(point[0] // 0.05), int(point[1] // 0.05)
+
+
+def _middle(aim: Aim) -> tuple[Point, ...]:
+    """The half of an object's viewpoints that is nearest to it: a step towards them ends among the others."""
+    near = sorted(aim.views, key=lambda v: math.dist(v[:2], aim.position[:2]))
+    return tuple(near[: (len(near) + 1) // 2])
+
+
+PASSED = 0.6
+"""A point of the path is passed within this many metres."""
+LEAST = 0.02
+"""Metres of the way that a step has to gain."""
+DEEPEST = 6
+"""Most steps that are planned ahead where no single step leads nearer."""
+LOOK = 15
+"""Cells of its way that the expert looks ahead: 1.5 m."""
+TURN_COST = 1e-3
+"""Metres that a turn counts when headings are compared."""

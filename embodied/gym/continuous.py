@@ -1,0 +1,329 @@
+"""embodied/VLNCE-v0 and embodied/ObjectNav-v0: continuous navigation with Habitat's actions and live pictures.
+
+    env = gymnasium.make("embodied/VLNCE-v0", data="DIR", split="val_unseen")
+    env = gymnasium.make("embodied/VLNCE-v0", data="DIR", episodes="val_unseen.json.gz", preset="streamvln")
+    env = gymnasium.make("embodied/ObjectNav-v0", data="DIR", split="train", sliding=False)
+
+Actions: 0 stop, 1 forward, 2 left, 3 right, and for ObjectNav 4 up, 5 down. Every picture is drawn at the pose of the
+camera. Episodes are the tasks of a `vln` data set, or objects of the houses of any, or a file in Habitat's format.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from assets.cache import default_cache
+from embodied.datasets.habitat import object_excursions, read_objectnav, read_vlnce, route_excursions
+from embodied.datasets.store import Dataset
+from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move
+from embodied.evaluation.continuous import judged
+from embodied.geometry import wrap
+from embodied.gym.drive import data_worlds, flat_worlds
+from embodied.gym.eyes import FAR
+from embodied.gym.playground import flat_playground
+from embodied.gym.spaces import LARGE, codes_of
+from embodied.render.camera import camera_at
+from embodied.render.pictures import PictureSettings
+from embodied.seeds import checked_seed
+from embodied.world import World
+
+KINDS = ("vlnce", "objectnav")
+TEXT = 1000
+"""Most characters of an instruction; longer ones are cut."""
+STEP_COST, PER_METRE = 0.01, 0.1
+"""Of every action, and what a metre nearer to the goal is worth."""
+KEPT = 4
+"""Houses whose renderers are held open, the last used."""
+OBJECTS = 100
+"""Episodes of ObjectNav in each house where no file says otherwise."""
+SEES = ("rgb", "depth")
+VIEW = (480, 640)
+"""Height and width of what `render` shows, pixels."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """How pictures are framed."""
+
+    height: int = 256
+    """Pixels."""
+    width: int = 256
+    hfov: float = 90.0
+    """Horizontal field of view, degrees."""
+
+    def __post_init__(self) -> None:
+        if not (8 <= self.height <= 2048 and 8 <= self.width <= 2048 and 0 < self.hfov < 180):
+            raise ValueError(
+                f"a view of {self.height} x {self.width} pixels and {self.hfov} degrees; sides need 8 to 2048 pixels, "
+                "the angle more than 0 and less than 180"
+            )
+
+    @property
+    def vfov(self) -> float:
+        """Vertical field of view, radians."""
+        return 2 * math.atan(math.tan(math.radians(self.hfov) / 2) * self.height / self.width)
+
+
+PRESETS: dict[str, tuple[Body, Lens]] = {
+    "vlnce": (Body(), Lens()),
+    "streamvln": (Body(), Lens(480, 640, 79.0)),
+    "uninavid": (Body(turn=30), Lens(480, 640, 120.0)),
+    "objectnav": (Body(turn=30, looks=True, eye=0.88), Lens(480, 640, 79.0)),
+}
+"""Bodies and cameras of published programs, by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What environments of one batch share: houses, episodes, floors."""
+
+    kind: str
+    worlds: Mapping[str, World]
+    excursions: tuple[Excursion, ...]
+    body: Body = Body()
+    lens: Lens = Lens()
+    sees: tuple[str, ...] = SEES
+    grounds: Grounds = dataclasses.field(default_factory=Grounds)
+    opened: OrderedDict[str, World] = dataclasses.field(default_factory=OrderedDict)
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"kind is {self.kind!r}; use one of {KINDS}")
+        if not self.excursions:
+            raise ValueError("there are no episodes to play; choose another split or file")
+        if any(name not in SEES for name in self.sees) or len(set(self.sees)) < len(self.sees):
+            raise ValueError(f"sees should be some of {SEES}, each once, got {self.sees!r}")
+        if lost := sorted({e.world for e in self.excursions} - set(self.worlds)):
+            raise ValueError(
+                f"episodes play in houses that are not here: {lost[:4]}; there are {sorted(self.worlds)[:4]}"
+            )
+
+    def world(self, name: str) -> World:
+        """A house to draw; of the others that are open, the one used longest ago is closed."""
+        self.opened[name] = self.worlds[name]
+        self.opened.move_to_end(name)
+        if len(self.opened) > KEPT:
+            self.opened.popitem(last=False)[1].close()
+        return self.worlds[name]
+
+
+class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
+    """Continuous navigation as a Gymnasium environment.
+
+    Reward: 1 on success, minus 0.01 an action, plus a tenth for every metre nearer to the goal along the floor. STOP
+    terminates, the last action truncates. Every info has is_success, distance_to_goal, collided and steps_taken; the
+    last one of an episode has every measure of embodied.evaluation.continuous.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(self, course: Course, *, render_mode: str | None = None) -> None:
+        """
+        Raises:
+          ValueError: an unknown render mode.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
+        self.course, self.render_mode = course, render_mode
+        self.play = ContinuousEnv(course.body, course.grounds)
+        """The pose of the body, and what is privileged: distance, ways, the walk so far."""
+        self.action_space: gym.Space[Any] = spaces.Discrete(course.body.actions)
+        self.observation_space = observation_space(course)
+        self._max_episode_steps = course.body.steps
+
+    @property
+    def excursions(self) -> tuple[Excursion, ...]:
+        """All episodes; reset(options={"episode": k}) plays number k."""
+        return self.course.excursions
+
+    @property
+    def task_description(self) -> str:
+        """What the agent is asked to do."""
+        return self.play.excursion.instruction
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """An episode drawn with this environment's generator, or the one of number options["episode"].
+
+        Raises:
+          ValueError: there is no such episode.
+        """
+        number, last = (options or {}).get("episode"), len(self.excursions) - 1
+        if number is not None and not (isinstance(number, (int, np.integer)) and 0 <= number <= last):
+            raise ValueError(f"options['episode'] should be a number from 0 to {last}, got {number!r:.80}")
+        super().reset(seed=None if seed is None else checked_seed(seed))
+        drawn = int(self.np_random.integers(len(self.excursions)))
+        excursion = self.excursions[drawn if number is None else int(number)]
+        self.play.reset(excursion, self.course.worlds[excursion.world])
+        return self.look(), self._told() | {"episode": excursion.id, "instruction": excursion.instruction}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        before = self.play.distance
+        self.play.step(int(action))
+        stopped, info = action == Move.STOP, self._told()
+        if self.play.ended:
+            info |= judged(self.play.walk())
+            info["is_success"] = info["success"] > 0
+        reward = float(info["is_success"]) - STEP_COST + PER_METRE * (before - self.play.distance)
+        return self.look(), reward, bool(stopped), self.play.ended and not stopped, info
+
+    def look(self) -> dict[str, Any]:
+        """What the agent knows."""
+        found: dict[str, Any] = self.pixels()
+        found["instruction"] = codes_of(self.task_description, TEXT).copy()
+        if self.course.kind == "objectnav":
+            found["gps"], found["compass"] = self.gps(), np.array([self.turned()], np.float32)
+        return found
+
+    def pixels(self) -> dict[str, np.ndarray]:
+        """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
+        lens, sees = self.course.lens, self.course.sees
+        found: dict[str, np.ndarray] = {}
+        if not sees:
+            return found
+        renderer, size = self.course.world(self.play.excursion.world).renderer, (lens.height, lens.width)
+        camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
+        if "rgb" in sees:
+            found["rgb"] = np.ascontiguousarray(renderer.rgb(camera, size))
+        if "depth" in sees:
+            found["depth"] = np.ascontiguousarray(np.minimum(renderer.depth_and_ids(camera, size)[0], np.float32(FAR)))
+        return found
+
+    def gps(self) -> np.ndarray:
+        """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
+        excursion = self.play.excursion
+        dx, dy = self.play.position - np.array(excursion.start[:2])
+        c, s = math.cos(excursion.yaw), math.sin(excursion.yaw)
+        return np.array([c * dx + s * dy, c * dy - s * dx], np.float32)
+
+    def turned(self) -> float:
+        """Radians turned to the left since the start, in [-pi, pi)."""
+        return float(wrap(self.play.yaw - self.play.excursion.yaw))
+
+    def expert(self, *, along: bool = False) -> Follower:
+        """Who knows the way from wherever the body is, for training."""
+        return Follower(self.play, along=along)
+
+    def render(self) -> np.ndarray | None:
+        """(h, w, 3) uint8: what the camera sees, larger."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
+            return None
+        lens = dataclasses.replace(self.course.lens, height=VIEW[0], width=VIEW[1])
+        camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
+        return self.course.world(self.play.excursion.world).renderer.rgb(camera, VIEW)
+
+    def close(self) -> None:
+        for world in self.course.opened.values():
+            world.close()
+        self.course.opened.clear()
+
+    def _told(self) -> dict[str, Any]:
+        play = self.play
+        return {
+            "is_success": False,
+            "distance_to_goal": play.distance,
+            "collided": play.collided,
+            "steps_taken": play.steps,
+        }
+
+
+def observation_space(course: Course) -> spaces.Dict:
+    shape = (course.lens.height, course.lens.width)
+    pixels: dict[str, spaces.Space[Any]] = {
+        "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
+        "depth": spaces.Box(0.0, FAR, shape, np.float32),
+    }
+    whole = {name: pixels[name] for name in course.sees}
+    whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
+    if course.kind == "objectnav":
+        whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
+        whole["compass"] = spaces.Box(-4.0, 4.0, (1,), np.float32)
+    return spaces.Dict(whole)
+
+
+def make(kind: str, *, render_mode: str | None = None, **options: Any) -> ContinuousGymEnv:
+    """The environment; options as of `make_course`."""
+    return ContinuousGymEnv(make_course(kind, **options), render_mode=render_mode)
+
+
+def make_vec(
+    kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any
+) -> gym.vector.SyncVectorEnv:
+    """So many environments in this process that share houses and floors."""
+    course = make_course(kind, **options)
+    return gym.vector.SyncVectorEnv([lambda: ContinuousGymEnv(course, render_mode=render_mode)] * num_envs)
+
+
+def make_course(
+    kind: str,
+    *,
+    data: str | Path | None = None,
+    split: str = "train",
+    episodes: str | Path | None = None,
+    seed: int = 0,
+    cache: str | Path | None = None,
+    pictures: PictureSettings | None = None,
+    worlds: Mapping[str, World] | None = None,
+    preset: str | None = None,
+    sees: str | Sequence[str] = SEES,
+    **changes: Any,
+) -> Course:
+    """Houses and episodes: of a data set, of given worlds, or of one flat that is generated from `seed` and lit.
+
+    Args:
+      data, split: of kind 'vln' for VLNCE-v0, of any kind for ObjectNav-v0.
+      episodes: a .json.gz file in Habitat's format that plays in these houses, instead of their own episodes.
+      pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere, matte unless they name a look.
+      preset: one of PRESETS: body and camera; that of the kind where not given.
+      sees: some of SEES.
+      changes: fields of Body and Lens that differ from the preset's.
+
+    Raises:
+      ValueError: an unknown preset or option, or episodes of houses that are not here.
+    """
+    body, lens = chosen(preset or kind, changes)
+    where, grounds = Path(cache) if cache else default_cache(), Grounds()
+    given = worlds is not None
+    if worlds is None:
+        worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
+    if episodes is not None:
+        found = (read_vlnce if kind == "vlnce" else read_objectnav)(Path(episodes))
+    elif kind == "objectnav":
+        found = [e for w in worlds.values() for e in object_excursions(w, OBJECTS, seed=seed, grounds=grounds)]
+    elif data is not None and not given:
+        whole = Dataset(Path(data))
+        if whole.kind != "vln":
+            raise ValueError(f"{data} is a data set of {whole.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes")
+        found = route_excursions(whole.tasks(split), worlds)
+    else:
+        found = route_excursions(flat_playground("vln", seed, cache=where, worlds=worlds).tasks, worlds)
+    seen = (sees,) if isinstance(sees, str) else tuple(sees)
+    return Course(kind, dict(worlds), tuple(found), body, lens, seen, grounds)
+
+
+def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, Lens]:
+    """A preset with some fields changed.
+
+    Raises:
+      ValueError: an unknown preset or field.
+    """
+    if preset not in PRESETS:
+        raise ValueError(f"preset is {preset!r}; use one of {sorted(PRESETS)}")
+    body, lens = PRESETS[preset]
+    names = [{f.name for f in dataclasses.fields(x)} for x in (body, lens)]
+    if unknown := sorted(set(changes) - names[0] - names[1]):
+        raise ValueError(f"unknown options {unknown}; expected some of {sorted(names[0] | names[1])}")
+    mine = [{k: v for k, v in changes.items() if k in n} for n in names]
+    return dataclasses.replace(body, **mine[0]), dataclasses.replace(lens, **mine[1])
