@@ -565,7 +565,7 @@ def test_skyboxes_give_back_the_views_of_our_panorama(folders, tmp_path):
 
 
 def test_skyboxes_want_panoramas(data_sets, tmp_path):
-    with pytest.raises(ValueError, match="--panoramas"):
+    with pytest.raises(ValueError, match="--pictures"):
         export_folder("matterport", data_sets["hanna"], tmp_path)
 
 

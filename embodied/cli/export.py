@@ -147,7 +147,7 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)
-    drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
+    drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
