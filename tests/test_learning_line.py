@@ -23,7 +23,7 @@ from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
 from agents.hanna.training_config import EVALUATIONS, SCALES
 from agents.studies.engine import run_study
-from agents.vision.config import PLAIN, WAYS
+from agents.vision.config import PLAIN, RENDER_PRESETS
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
@@ -228,17 +228,17 @@ def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data, tmp_path):
     through = dataclasses.replace(random_encoder(seed=2), like=load_encoder(learner.encoder).digest)
     save_encoder(through, tmp_path / "alike.safetensors")
     arms = {"all": files[:2], "alike": files[2:3]}
-    ways, encoders = ("unlit", "matte"), {"alike": [tmp_path / "alike.safetensors"]}
+    ways, encoders = ("unlit", "fast-matte"), {"alike": [tmp_path / "alike.safetensors"]}
     realism = RealismStudy(data.folder, (0,), 3, arms=arms, pictures=ways, encoders=encoders)
     with pytest.raises(FileNotFoundError, match="embodied features"):
         run_study(realism, ["realism"], tmp_path / "out", note=print)
     for encoder in (through, load_encoder(learner.encoder)):
-        for way in ("unlit", "matte"):
-            give_features(data, data.names("test_unseen"), encoder, WAYS[way], seed=1)
+        for way in ("unlit", "fast-matte"):
+            give_features(data, data.names("test_unseen"), encoder, RENDER_PRESETS[way], seed=1)
     run_study(realism, ["realism"], tmp_path / "out", note=print)
     body = read_json(tmp_path / "out" / "realism-realism.json")
-    assert [r["label"] for r in body["rows"]] == ["all", "alike"] and "success_matte" in body["rows"][0]["values"]
-    assert ranks(body, ("unlit", "matte")) == [], "two kinds of agents cannot be ranked"
+    assert [r["label"] for r in body["rows"]] == ["all", "alike"] and "success_fast-matte" in body["rows"][0]["values"]
+    assert ranks(body, ("unlit", "fast-matte")) == [], "two kinds of agents cannot be ranked"
     with pytest.raises(ValueError, match="encoders are given for"):
         dataclasses.replace(realism, encoders={"b": files})
     with pytest.raises(ValueError, match="'all' has 2 agents and 3 encoders"):

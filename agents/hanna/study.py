@@ -190,7 +190,7 @@ class HannaStudy(EpisodeStudy):
     """Where the rows start from."""
     evaluation: HannaEvaluation
     device: str = "cpu"
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
@@ -225,7 +225,7 @@ class HannaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         data = dataset_of(self.data, "hanna")
-        drawn = drawings(data, data.names("train"), self.quality)
+        drawn = drawings(data, data.names("train"), self.picture_kind)
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
         return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
 
@@ -233,7 +233,7 @@ class HannaStudy(EpisodeStudy):
         """Features that are missing are told before anything is trained."""
         judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            split_of(judged, split, encoder, quality=self.quality)
+            split_of(judged, split, encoder, picture_kind=self.picture_kind)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
@@ -247,7 +247,7 @@ class HannaStudy(EpisodeStudy):
         if agent is None:
             return agent_without_learning("hanna", played)
         data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
-        bank = split_of(data, split.removesuffix(SHIPPED), encoder, quality=self.quality).bank
+        bank = split_of(data, split.removesuffix(SHIPPED), encoder, picture_kind=self.picture_kind).bank
         by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
         return all_policies(agent, bank, by_the_text if by_text else as_shipped)[played]
 
@@ -259,7 +259,7 @@ class HannaStudy(EpisodeStudy):
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         data = self.judged_in(row.judge)
-        drawn = drawings(data, data.names(split.removesuffix(SHIPPED)), self.quality)
+        drawn = drawings(data, data.names(split.removesuffix(SHIPPED)), self.picture_kind)
         return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
@@ -279,4 +279,4 @@ class HannaStudy(EpisodeStudy):
         )
 
     def _lessons(self) -> Lessons:
-        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.quality, self.device)
+        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.picture_kind, self.device)

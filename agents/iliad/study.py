@@ -184,7 +184,7 @@ class NavStudyWorld:
 
     def source(self) -> Mapping[str, object]:
         data, where = Dataset(self.houses.folder), self.houses
-        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "quality": where.quality}
+        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "pictures": where.picture_kind}
 
     def changed(self, **teacher: Any) -> NavStudyWorld:
         if teacher:

@@ -105,7 +105,7 @@ class VnlaStudy(EpisodeStudy):
     """A data set whose requests name no room, for the table 'rooms'."""
     others: int = 3
     """Agents of every row but that of the learned asker."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from."""
     judging: tuple[int, ...] = EVALUATION_SEEDS
 
@@ -171,7 +171,7 @@ class VnlaStudy(EpisodeStudy):
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return Lessons(data, encoder_of(self.encoder, self.network), self.quality)
+        return Lessons(data, encoder_of(self.encoder, self.network), self.picture_kind)
 
     def about(self) -> str:
         c, pictures = self.config, self.lessons(True).pictures("train")
