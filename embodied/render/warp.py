@@ -272,7 +272,7 @@ def _aim(
     pitches: wp.array[float],
     xpos: wp.array2d[wp.vec3],
     xmat: wp.array2d[wp.mat33],
-):  # noqa: ANN202
+):
     """The camera of every world as in embodied.render.camera.camera_at; it looks along its -z, with y up."""
     i = wp.tid()
     cy, sy, cp, sp = wp.cos(yaws[i]), wp.sin(yaws[i]), wp.cos(pitches[i]), wp.sin(pitches[i])
@@ -300,13 +300,13 @@ def _finish(
     rgb_out: wp.array4d[wp.uint8],
     depth_out: wp.array3d[float],
     ids_out: wp.array3d[int],
-):  # noqa: ANN202
+):
     """Bytes of packed colours, with what stands behind glass; depth and owners of what was met."""
     i, row, column = wp.tid()
     pixel = row * width + column
     geom = seg[i, pixel][0]
     if colours:
-        share = float(1.0)
+        share = 1.0
         if through and geom >= 0:
             share = opacities[geom]
         for c in range(3):
@@ -315,7 +315,7 @@ def _finish(
                 value = share * value + (1.0 - share) * _channel(behind[i, pixel], 16 - 8 * c)
             rgb_out[i, row, column, c] = wp.uint8(int(value + 0.5))
     if rest:
-        owner = int(0)
+        owner = 0
         if geom >= 0:
             owner = owned[geom]
         ids_out[i, row, column] = owner
