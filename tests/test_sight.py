@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
-from test_imitation import TINY as HANNA
-from test_imitation import agent_for, setting
+from test_hanna_learner import TINY as HANNA
+from test_hanna_learner import agent_for, setting
 
 from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
