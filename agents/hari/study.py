@@ -136,7 +136,7 @@ class HariStudy(EpisodeStudy):
     """A trained execution policy that stands for all of its kind; None trains one in the study's folder."""
     encoder: str = ""
     """Digest of the encoder whose features a policy sees."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that they come from, as in agents.vision.drawn.pictures_of."""
 
     name = "hari"
@@ -156,7 +156,9 @@ class HariStudy(EpisodeStudy):
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         data = hari_data(self.data).digest
-        more: dict[str, object] = {"sight": [self.encoder, self.quality]} if train.get(EXECUTION) == "features" else {}
+        more: dict[str, object] = (
+            {"sight": [self.encoder, self.picture_kind]} if train.get(EXECUTION) == "features" else {}
+        )
         if EXECUTION not in train or self._given(train):
             walking = self._walking(folder)
             more["begin"] = weights_digest(walking) if walking.exists() else None
@@ -174,7 +176,7 @@ class HariStudy(EpisodeStudy):
         elif self.executor is not None and self._given(train):
             return self.executor
         else:
-            train_execution(data, config, home, encoder=self.encoder, quality=self.quality, note=note)
+            train_execution(data, config, home, encoder=self.encoder, picture_kind=self.picture_kind, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> Executor | HariAgent:
@@ -219,7 +221,7 @@ class HariStudy(EpisodeStudy):
         return folder / f"execution_{key_of(mine)}" / "best.safetensors"
 
     def _eyes(self, executor: Executor) -> Executor:
-        return with_eyes(executor, hari_data(self.data), self.quality)
+        return with_eyes(executor, hari_data(self.data), self.picture_kind)
 
 
 def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, Samples]:

@@ -1,6 +1,7 @@
 """Write a data set or a house as others read it: folders of published programs, Parquet, LeRobot, glTF, MJCF, USD.
 
   hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
+  duet                          the same for VLN-DUET and HAMT; EnvDrop and Recurrent-VLN-BERT read r2r
   matterport                    graphs and skyboxes for the Matterport3D simulator
   parquet                       tables and a card, for `datasets.load_dataset`
   lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from embodied.house.house import House
     from embodied.scene.lit_pages import LitPages
 
-PROGRAMS = ("hanna", "vnla", "r2r", "iliad-nav", "matterport")
+PROGRAMS = ("hanna", "vnla", "r2r", "duet", "iliad-nav", "matterport")
 """As in embodied.datasets.folders, which --help should not import."""
 FORMATS = ("glb", "mjcf", "usd")
 WIDTH = 2048
@@ -50,9 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     for name in PROGRAMS:
         sub = what.add_parser(name, help=f"the folder that {name} reads")
         _add_data(sub)
-        sub.add_argument(
-            "--features", action="store_true", help="also write the features of `embodied features`, as TSV"
-        )
+        sub.add_argument("--features", action="store_true", help="also write the features of `embodied features`")
         sub.add_argument(
             "--pad", type=whole(), default=WIDTH, metavar="N",
             help="fill features with zeros up to this length, which the programs count on (default: %(default)s)",
@@ -148,7 +147,7 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)
-    drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
+    drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
