@@ -15,6 +15,7 @@ from agents.vision.features import feature_path, save_features
 from agents.vnla.agent import load_agent
 from embodied.cli import main
 from embodied.cli.view import looked_at
+from embodied.identity import read_finished
 from embodied.interface import Episode
 from embodied.records import episodes_file, load_lines
 
@@ -96,6 +97,10 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and "Not run: none, first, random." in text and "(34.95)" in text
+    printed = ("study", "vnla", "algorithm-6", *words[4:], "--rows", "Algorithm 6, learned")
+    assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
+    (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
+    assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"
 
 
 def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
