@@ -59,4 +59,4 @@ def test_a_bake_that_is_killed_three_times_ends_as_one_that_was_not(tmp_path):
     lit(tmp_path / "killed")
     assert killed, "every bake ended before it was killed; shorten the waits"
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
-    assert not [p for p in (tmp_path / "killed").rglob(".embodied-unfinished-*")]
+    assert not list((tmp_path / "killed").rglob(".embodied-unfinished-*"))
