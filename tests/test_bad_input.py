@@ -58,7 +58,7 @@ def said(capsys, *words: str) -> str:
         (("house", "--area", "nan", "nan", "--out", "x"), "area should be"),
         (("house", "--style", "nope", "--out", "x"), "style should be one of"),
         (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
-        (("render", "/nowhere"), "make one with `embodied house"),
+        (("render", "/nowhere"), "name a folder that `embodied house` wrote"),
         (("light", "/nowhere"), "name a folder that `embodied house` wrote"),
         (("evaluate", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
         (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),

@@ -95,7 +95,20 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "continuing after update 2" in capsys.readouterr().err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
-    judge = ("evaluate", "hanna", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 4, "--threads", 1)
+    judge = (
+        "evaluate",
+        "hanna",
+        "--data",
+        data.folder,
+        "--agent",
+        best,
+        "--network",
+        "random",
+        "--tasks",
+        4,
+        "--threads",
+        1,
+    )
     assert run(*judge, "--out", out) == 0
     table = (out / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
@@ -179,11 +192,25 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
         note.startswith("+ language instruction less Target image only, success, test_unseen") for note in body["notes"]
     )
     assert "(45.43)" in (out / "hanna-4.4.md").read_text()
+    assert "success_test_unseen_as_shipped" in body["rows"][0]["values"]
+    assert "success_test_unseen_as_shipped" not in body["rows"][0]["printed"]
     weights, judged = times(out, "best.safetensors"), times(out, "judged/*")
     run_study(learner, ["4.4", "D.1"], out, rows=["Learned", "Target image only"], note=print)
     assert times(out, "best.safetensors") == weights, "rows that tables share are trained once"
     assert judged.items() <= times(out, "judged/*").items(), "what was played is not played again"
     assert "lost_accuracy_test_unseen" in read_json(out / "hanna-d.1.json")["rows"][0]["values"]
+
+
+def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study):
+    learner, out = study
+    row = learner.tables()["4.4"].rows[0]
+    agent = learner.load(next(iter(times(out, "best.safetensors"))))
+    plain, shipped = (learner.policies(agent, row.judge, s) for s in ("test_unseen", "test_unseen as shipped"))
+    draws = [np.random.default_rng(k) for k in range(50)]
+    assert {plain.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.by_image
+    assert {shipped.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.by_image
+    assert plain.again == 1 and shipped.again < 1
+    assert plain.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.ask_rule(0.4, None, -1, rng=draws[0])
 
 
 def test_what_was_judged_under_other_settings_is_not_shown_under_new_ones(study, tmp_path):

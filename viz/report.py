@@ -46,7 +46,7 @@ def load_run(folder: Path) -> list[Listed]:
     files = sorted(folder.glob("episodes*.jsonl"))
     if not files:
         raise FileNotFoundError(
-            f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate ... --out {folder}`, or name a .rrd "
+            f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate --out {folder}`, or name a .rrd "
             "file"
         )
     found = []

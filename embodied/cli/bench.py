@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import add_pictures, folder_to_write, whole
@@ -74,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
-    reports = {
+    reports: dict[str, Callable[[], Any]] = {
         "light": lambda: light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note),
         "serve": lambda: serve.measure(
             args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note

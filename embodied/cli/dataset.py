@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
             "same; leave it out, or use it with `embodied house`, `light`, `render` and `rollout`"
         )
     HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
-    programs = [name for name, program in PROGRAMS.items() if program.kind == args.kind]
+    programs = [name for name, p in PROGRAMS.items() if p.kind == args.kind and not p.needs]
     if args.export and not programs:
         raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
     config = DatasetConfig(

@@ -279,7 +279,7 @@ def add_train_vnla(parser: argparse.ArgumentParser) -> None:
 def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_common(parser, threads=1)
     add_encoder(parser)
-    add_study(parser, "askers, interventions, rooms or rules", threads=False)
+    add_study(parser, "askers, interventions, algorithm-6, rooms or rules", threads=False)
     parser.add_argument(
         "--without-rooms", type=any_path, metavar="DIR", help="a data set of --no-rooms, for the table 'rooms'"
     )
@@ -414,7 +414,7 @@ def _named_file(text: str) -> tuple[str, Path]:
 
 
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.2, 3.4, 3.5 or held-out", data="corpus that `embodied corpus` made")
+    add_study(parser, "3.2, 3.4, 3.5, rates or held-out", data="corpus that `embodied corpus` made")
     add_scale(parser, BANDIT_SCALES)
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
 
@@ -442,7 +442,7 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
+    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers")
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
     add_scale(parser, REGEX_SCALES)
     _add_regex_files(parser)

@@ -133,13 +133,13 @@ def flat_playground(
         if drawn.lit:
             _light(world)
         worlds = {name: world}
-    name, world = next(iter(worlds.items()))
+    name, place = next(iter(worlds.items()))
     routes: tuple[Route, ...] = ()
     if kind in ("hanna", "vln"):
-        paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
-        routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
+        paths = paths or route_paths(place.graph, place.house.name, seed=seed, house_split="test")
+        routes = worded(place, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
+    tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
     make_env = environment_maker(
         kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari, assistant=assistant
     )
