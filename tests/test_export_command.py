@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from test_datasets import build
+from hand_data import built
 
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import load_encoder
@@ -18,7 +18,7 @@ from embodied.datasets.matterport import read_features
 
 @pytest.fixture
 def data(tmp_path):
-    return build(tmp_path / "data", tmp_path / "cache", "vln")
+    return built(tmp_path / "data", "vln")
 
 
 @pytest.mark.slow
