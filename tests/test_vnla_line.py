@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 
 from agents.common.session import metrics_of
 from agents.vision.config import drawing
@@ -42,13 +42,13 @@ def with_features(data):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("vnla")
-    return with_features(build(folder / "data", folder / "cache", "vnla"))
+    return with_features(built(folder / "data", "vnla"))
 
 
 @pytest.fixture(scope="module")
 def without_rooms(tmp_path_factory):
     folder = tmp_path_factory.mktemp("no rooms")
-    return with_features(build(folder / "data", folder / "cache", "vnla", rooms=False))
+    return with_features(built(folder / "data", "vnla", rooms=False))
 
 
 def run(*words) -> int:
@@ -126,6 +126,6 @@ def test_a_rule_of_play_is_chosen_on_the_command_line(rules, data, capsys):
 
 
 def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
-    other = build(tmp_path / "data", tmp_path / "cache", "find")
+    other = built(tmp_path / "data", "find")
     assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2
     assert "embodied dataset vnla" in capsys.readouterr().err
