@@ -221,7 +221,7 @@ def main() -> None:
         "notes": ["'again': the agent's own panoramas through a robot's camera, compared without turning."],
     }
     for row in rows:
-        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[index, attr-defined]
+        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[attr-defined]
     if args.data:
         write_json(args.out / f"{args.table}.json", table, indent=1)
 
