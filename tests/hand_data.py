@@ -56,5 +56,5 @@ def paint(data, pictures, names=None):
         place = data.place(name)
         many = len(owners(place.house))
         nodes = [painted_panorama(k, many, pictures.size) for k in range(len(place.graph.ids))]
-        meta = {"house": place.house.digest, **dataclasses.asdict(pictures), "look": pictures.shown_with}
+        meta = {"house": place.house.digest, **pictures.stored()}
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)

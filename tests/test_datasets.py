@@ -228,10 +228,10 @@ def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
     made_of = {"size": 8, "quality": "normal", "backend": "classic", "light": "normal", "code": "x"}
     path = data.folder / "houses" / name / "panoramas.pano"
     write_panoramas(path, [empty], {**made_of, "house": data.place(name).house.digest})
-    matte = PictureSettings(8, "normal", "classic", "normal", "matte")
+    matte = PictureSettings(8, "normal-matte")
     assert data.drawn_pictures(name) == matte, "a file that names no look is older than gloss"
     write_panoramas(path, [empty], {**made_of, "look": "gloss", "house": data.place(name).house.digest})
-    assert data.drawn_pictures(name) == PictureSettings(8, "normal", "classic", "normal")
+    assert data.drawn_pictures(name) == PictureSettings(8, "normal")
     unlit = {**made_of, "quality": "unlit", "light": None, "house": data.place(name).house.digest}
     write_panoramas(path, [empty], unlit)
     assert data.drawn_pictures(name) == PictureSettings(8)

@@ -311,7 +311,7 @@ class Scripted(LearnedTeacher):
     """Says what it is told to say; its executor understands every description that is a rule."""
 
     def __init__(self, greedy: str, sampled: list[str], pragmatics: str) -> None:
-        self.greedy, self.sampled, self.candidates, self.pragmatics = greedy, sampled, len(sampled), pragmatics
+        self.greedy, self.sampled, self.candidates, self.pragmatics = greedy, sampled, 1 + len(sampled), pragmatics
 
     def candidates_of(self, tasks, executions, uniforms=None):
         return [[self.greedy] if uniforms is None else list(self.sampled) for _ in tasks]

@@ -111,7 +111,7 @@ def test_the_recording_shows_the_panoramas_that_the_agents_features_come_from(sh
 
 def test_the_picture_says_how_it_was_drawn_or_that_nobody_looks_at_it():
     assert sees_title(PLAIN) == "What the agent sees: without light"
-    assert sees_title(PictureSettings(quality="normal")) == "What the agent sees: lit"
+    assert sees_title(PictureSettings(kind="normal")) == "What the agent sees: lit"
     assert "looks at no pictures" in sees_title(None)
 
 

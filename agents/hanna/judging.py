@@ -47,7 +47,7 @@ def judge(
         bank = lessons.split(split).bank
         if cache is not None:
             encoder = lessons.encoder.digest
-            bank = showing(bank, lessons.data, list(whole.worlds), shown, encoder, cache, lessons.quality)
+            bank = showing(bank, lessons.data, list(whole.worlds), shown, encoder, cache, lessons.picture_kind)
         judged = players(agent, bank, only)
         kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         rows += evaluate(whole, judged, seed=seed, limit=limit, batch=batch, keep=kept, watch=watch)

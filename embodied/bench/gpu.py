@@ -41,12 +41,12 @@ Works = Callable[[str], Mapping[str, tuple[Callable[[], object], int]]]
 
 
 def gpu(
-    catalogue: Catalogue, cache: Path, seed: int, quality: str, works: Works, *, progress: Callable[[str], None]
+    catalogue: Catalogue, cache: Path, seed: int, light: str, works: Works, *, progress: Callable[[str], None]
 ) -> Iterator[Measure]:
     """Pictures per second of one lit flat, and what learners do per second, by the clock.
 
     Args:
-      quality: how the flat is lit, 'fast' or 'normal'.
+      light: by name, 'fast' or 'normal'.
     """
     warp: Any
     try:
@@ -59,12 +59,12 @@ def gpu(
         progress("There is no CUDA device here: a small check on the CPU, whose numbers say nothing about a GPU.")
     contexts, sizes, worlds = (CONTEXTS, SIZES, WORLDS) if card else (CONTEXTS[:1], SIZES[:1], (8,))
     house = generate_house(seed, FLAT, catalogue)
-    with open_world(house, catalogue, cache, quality=quality, look="matte") as world:
+    with open_world(house, catalogue, cache, pictures=f"{light}-matte") as world:
         assert world.lit is not None
         for count, size in itertools.product(contexts, sizes):
             yield from_values(
                 f"classic, {gl.info().device}, {count} contexts, {size} x {size}, rgb",
-                _by_processes(count, house, catalogue, cache, quality, size, seed),
+                _by_processes(count, house, catalogue, cache, light, size, seed),
                 "1/s",
             )
         for size, count in itertools.product(sizes if warp else (), worlds):
@@ -92,13 +92,13 @@ def _look(renderer: Any, poses: tuple[np.ndarray, np.ndarray], sees: tuple[str, 
 
 
 def _by_processes(
-    count: int, house: House, catalogue: Catalogue, cache: Path, quality: str, size: int, seed: int
+    count: int, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
 ) -> list[float]:
     """Frames per second of `count` processes together, which draw at the same time."""
     spawn = multiprocessing.get_context("spawn")
     begin, told = spawn.Barrier(count), spawn.SimpleQueue()
     jobs = [
-        spawn.Process(target=_film, args=(begin, told, house, catalogue, cache, quality, size, seed))
+        spawn.Process(target=_film, args=(begin, told, house, catalogue, cache, light, size, seed))
         for _ in range(count)
     ]
     for job in jobs:
@@ -111,12 +111,12 @@ def _by_processes(
 
 
 def _film(
-    begin: Any, told: Any, house: House, catalogue: Catalogue, cache: Path, quality: str, size: int, seed: int
+    begin: Any, told: Any, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
 ) -> None:
     """Draw for SECONDS, together with the other processes; tells the frames per second."""
     try:
         with (
-            open_world(house, catalogue, cache, quality=quality, look="matte") as world,
+            open_world(house, catalogue, cache, pictures=f"{light}-matte") as world,
             Renderer(house, catalogue, lit=world.lit, size=size) as renderer,
         ):
             cameras = [camera_at(at, yaw) for at, yaw in zip(*_poses(world, 64, seed), strict=True)]

@@ -187,7 +187,7 @@ def vulkan(_: argparse.Namespace) -> Finding:
         "Vulkan",
         found is not None,
         found or "no Vulkan loader",
-        "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers",
+        "only --pictures fast-filament and normal-filament need it: apt-get install libvulkan1 mesa-vulkan-drivers",
         False,
     )
 

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         how["watch"] = lambda agents: bar(agents, "agents", "agent")
         rows, columns, looking, splits = judged(args, file, how)
         names = [n for split in splits for n in data.names(split)] if looking else []
-        drawn = {n: dataclasses.asdict(pictures_of(data, n, args.quality)) for n in names}
+        drawn = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
         if args.out:
             save(rows, args.out, "table")
             about = {"data": data.digest, "agent": weights_digest(file), "seed": args.seed, "tasks": args.tasks}
@@ -99,7 +99,7 @@ def hanna(args: argparse.Namespace, file: Path, how: Mapping[str, Any]) -> Judge
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
-    lessons = Lessons(dataset_of(args.data, "hanna"), encoder_of(args.encoder, args.network), args.quality)
+    lessons = Lessons(dataset_of(args.data, "hanna"), encoder_of(args.encoder, args.network), args.pictures)
     splits = args.split or ("test_unseen",)
     rows = judge(lessons, load_agent(file), splits, shown=OCCASIONS[args.shown], cache=args.cache, **how)
     return rows, COLUMNS, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING)), splits
@@ -114,7 +114,7 @@ def vnla(args: argparse.Namespace, file: Path, how: Mapping[str, Any]) -> Judged
     from agents.vnla.run import vnla_data
 
     agent, splits = load_agent(file), args.split or ("test_unseen",)
-    lessons = Lessons(vnla_data(args.data), encoder_of(args.encoder, args.network), args.quality)
+    lessons = Lessons(vnla_data(args.data), encoder_of(args.encoder, args.network), args.pictures)
     note(f"rules of play: {agent.config.rules}; learned from pictures {agent.pictures}")
     rows = judge(lessons, agent, splits, **how)
     return rows, COLUMNS, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING)), splits
@@ -127,7 +127,7 @@ def hari(args: argparse.Namespace, file: Path, how: Mapping[str, Any]) -> Judged
     from agents.hari.run import hari_data, with_eyes
 
     data, agent, splits = hari_data(args.data), load_agent(file), args.split or TEST
-    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, data, args.quality))
+    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, data, args.pictures))
     rows = judge(data, agent, splits, **how)
     return rows, COLUMNS, sorted({r.agent for r in rows}) if agent.executor.seeing else [], splits
 
@@ -141,7 +141,7 @@ def record_learned(args: argparse.Namespace) -> None:
     from viz.sinks import Sinks
 
     data, catalogue, counts = Dataset(args.data), load_catalogue(args.cache), Counter[str]()
-    args.quality = args.quality or "unlit"
+    args.pictures = args.pictures or "unlit"
     for number, listed in enumerate(load_run(args.out)):
         if listed.agent.endswith(" learned") and counts[listed.agent] < args.rrd:
             counts[listed.agent] += 1

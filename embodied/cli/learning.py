@@ -21,11 +21,11 @@ from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES,
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
+from agents.vision.config import RENDER_PRESETS, TORCHVISIONS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import add_cache, add_json
-from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
+from embodied.cli.options import REPEATS, add_fields, add_pictures, any_path, folder_to_write, positive, whole
 
 
 def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
@@ -52,15 +52,15 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
         choices=(*TORCHVISIONS, "random"),
         help="torchvision network of --encoder; 'random' for an untrained compact one",
     )
-    add_quality(parser)
+    add_drawn(parser)
 
 
-def add_quality(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--quality",
-        choices=tuple(WAYS),
-        help="how the houses are drawn that features come from; matte is fast without reflections, glossy and "
-        "reference are traced at 96 pixels by few rays (default: as the panoramas that the data set holds, else unlit)",
+def add_drawn(parser: argparse.ArgumentParser) -> None:
+    add_pictures(
+        parser,
+        tuple(RENDER_PRESETS),
+        what="how the houses are drawn that features come from, traced and reference at 96 pixels with few rays",
+        otherwise="as the panoramas that the data set holds, else unlit",
     )
 
 
@@ -166,7 +166,7 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
     )
     _add_lights(parser)
     _add_strips_folder(parser)
-    add_quality(parser)
+    add_drawn(parser)
 
 
 def _add_strips_folder(parser: argparse.ArgumentParser) -> None:
@@ -192,18 +192,18 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     _add_lights(parser)
     _add_strips_folder(parser)
-    add_quality(parser)
+    add_drawn(parser)
     _add_named_encoders(
         parser,
         "encoders that are there already, to be judged instead of those that --rows names; those of one name are "
         "training seeds of one kind",
     )
     parser.add_argument(
-        "--pictures",
+        "--test-pictures",
         nargs="+",
-        choices=tuple(WAYS),
-        default=tuple(WAYS),
-        metavar="QUALITY",
+        choices=tuple(RENDER_PRESETS),
+        default=tuple(RENDER_PRESETS),
+        metavar="KIND",
         help="what the table of pictures judges on (default: all)",
     )
     parser.add_argument(
@@ -275,7 +275,7 @@ def add_train_vnla(parser: argparse.ArgumentParser) -> None:
 def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_common(parser, threads=1)
     add_encoder(parser)
-    add_study(parser, "askers, interventions, rooms or rules", threads=False)
+    add_study(parser, "askers, interventions, algorithm-6, rooms or rules", threads=False)
     parser.add_argument(
         "--without-rooms", type=any_path, metavar="DIR", help="a data set of --no-rooms, for the table 'rooms'"
     )
@@ -313,7 +313,7 @@ def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         metavar="FILE",
         help="a trained execution policy (best.safetensors)",
     )
-    add_quality(intention)
+    add_drawn(intention)
     add_fields(intention, IntentionConfig, scales=INTENTION_SCALES, words={"states": STATES})
     return intention
 
@@ -358,7 +358,7 @@ def add_study_hanna(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
     )
-    add_quality(parser)
+    add_drawn(parser)
     add_device(parser)
     add_begin(parser)
     add_fields(parser, TrainingConfig, skip=("training_houses", "lights"), scales=SCALES)
@@ -382,12 +382,12 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         "learned with)",
     )
     parser.add_argument(
-        "--pictures",
+        "--test-pictures",
         nargs="+",
-        choices=tuple(WAYS),
-        default=("unlit", "matte", "fast", "reference"),
-        metavar="QUALITY",
-        help="how the houses are drawn that they are judged in, of which `embodied features --quality` made "
+        choices=tuple(RENDER_PRESETS),
+        default=("unlit", "fast-matte", "fast", "reference"),
+        metavar="KIND",
+        help="how the houses are drawn that they are judged in, of which `embodied features --pictures` made "
         "features; the last is what the others are ranked against (default: %(default)s)",
     )
     parser.add_argument("--split", default="test_unseen", help="whose tasks (default: %(default)s)")
@@ -440,7 +440,7 @@ def add_eval(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.2, 3.4, 3.5 or held-out", data="corpus that `embodied corpus` made")
+    add_study(parser, "3.2, 3.4, 3.5, rates or held-out", data="corpus that `embodied corpus` made")
     add_scale(parser, BANDIT_SCALES)
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
 
@@ -468,7 +468,7 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
+    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers")
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
     add_scale(parser, REGEX_SCALES)
     _add_regex_files(parser)
