@@ -104,7 +104,7 @@ class IntentionConfig(ValidatedRunSettings):
     states: str = "sparse"
     """How the agent's own place is described without asking: 'none', 'sparse' (as in the dissertation) or 'dense'."""
     kept: float = 0.1
-    """Share of the object classes that sparse descriptions keep (docs/sources.md, S164)."""
+    """Share of the object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
     """True: sub-goals are reached perfectly, whatever the execution policy would do (the skyline of Table 4.7)."""
     validate_every: int = 250

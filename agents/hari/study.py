@@ -27,7 +27,8 @@ from embodied.interface import Agent, Ask, Episode, Move, Sight
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
-RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", RANDOM)
+SUB_RULE = "SUB whenever possible"
+RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
 EXECUTION, TIMES = "execution", "times"
 """In a row: what an execution policy alone is trained to know its place by; whether intentions are counted by time."""
 
@@ -67,7 +68,7 @@ TABLES: Mapping[str, StudyTable] = {
         ),
         ("success",),
         TEST,
-        ((_learned("learned"), _learned(RANDOM, RANDOM)),),
+        tuple((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
         pooled=ACTIONS,
     ),
     "4.8": StudyTable(

@@ -104,7 +104,7 @@ def mixture(
     """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
 
     With `mixing` 1 this is Algorithm 4, with 0 Algorithm 8 whose epochs are one batch long. What was said is learned
-    from once, as it comes, not gathered in a buffer (docs/sources.md, S165).
+    from once, as it comes, not gathered in a buffer (docs/sources.md, S176).
     """
     own, unlabeled = student.sample(tasks, requests, rng=rng), marginal.draw(tasks, rng=rng)
     done = [u if rng.random() < mixing else o for u, o in zip(unlabeled, own, strict=True)]

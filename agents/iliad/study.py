@@ -61,7 +61,7 @@ TABLES: Mapping[str, StudyTable] = {
         pooled=(NEEDED,),
     ),
     "algorithms": StudyTable(
-        "The algorithms of the text (docs/sources.md, S165)",
+        "The algorithms of the text (docs/sources.md, S176)",
         (
             StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
             StudyRow(

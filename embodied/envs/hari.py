@@ -72,7 +72,7 @@ class HariRules:
     horizon: int | None = None
     """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
     kept: float = KEPT
-    """Share of the object classes, the commonest ones, that sparse descriptions keep (docs/sources.md, S164)."""
+    """Share of the object classes, the commonest ones, that sparse descriptions keep (docs/sources.md, S170)."""
 
     def __post_init__(self) -> None:
         if min(self.stack, self.longest, self.horizon or 1) < 1:
