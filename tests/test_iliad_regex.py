@@ -335,6 +335,11 @@ def test_a_teacher_says_what_people_said_of_what_they_wanted(pragmatics):
     assert set(said(Scripted("x", [], pragmatics), "()(na)()@a", 60)) != {"cut n", "no n"}
 
 
+def test_what_the_marginal_writes_is_carried_out_so_that_it_can_be_described():
+    (drawn,) = RegexMarginal(["()(e)()@x"]).draw([ITEM], rng=stream(0, "m"))
+    assert drawn == carried_out("()(e)()@x", ITEM) and drawn.outputs is not None
+
+
 def test_a_teacher_is_silent_where_nothing_happened_or_could():
     teacher = Scripted("()(z)()@", [], "program")
     assert said(teacher, "()(z)()@y") == [None], "no word was changed"

@@ -66,7 +66,8 @@ class RegexMarginal:
         self.rules = tuple(rules)
 
     def draw(self, tasks: Sequence[WordTask], *, rng: np.random.Generator) -> list[Written]:
-        return [Written(self.rules[int(i)], None) for i in rng.integers(len(self.rules), size=len(tasks))]
+        chosen = rng.integers(len(self.rules), size=len(tasks))
+        return [carried_out(self.rules[int(i)], task) for i, task in zip(chosen, tasks, strict=True)]
 
 
 class RegexStudent:
