@@ -218,7 +218,8 @@ def main() -> None:
         "command": f"python -m agents.hanna.places --validation VAL --data TEST --quality {args.quality} "
         f"--split {' '.join(args.split)} --out docs/results/data",
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} houses that nothing learned from (data seed {Dataset(judged).config.seed}), pictures {args.quality or 'of the data set'}; "
+        "settings": f"{houses} houses that nothing learned from (data seed {Dataset(judged).config.seed}), "
+        f"pictures {args.quality or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,
