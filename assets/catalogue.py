@@ -178,18 +178,18 @@ def load_catalogue(
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
+    packs_given, own_given = ((Path(p),) if isinstance(p, (str, Path)) else p for p in (packs, own))
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
     assets |= {key: maker.asset for key, maker in MAKERS.items()}
     models: dict[str, OwnModel] = {}
-    for folder in own:
+    for folder in own_given:
         more, more_recipes, more_models = read_own(Path(folder), classes)
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs_given, models)
     for name in catalogue.own_classes:
         if why := _placed_nowhere(catalogue.of_class(name)):
             log.warning("class %r is placed in no house: %s", name, why)

@@ -3,7 +3,7 @@
     import embodied
 
     house = embodied.generate_house(7)                        # the same on every machine
-    with embodied.open_world(house, quality="fast") as world: # lit once, then drawn in milliseconds
+    with embodied.open_world(house, pictures="fast") as world: # lit once, then drawn in milliseconds
         view = world.camera((2.0, 3.0, 1.5), yaw=0.5)         # rgb, depth and ids from anywhere
         panorama = world.panorama(0)                          # or from a viewpoint of its navigation graph
         print({world.classes[i] for i in set(view.ids.flat)})

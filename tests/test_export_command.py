@@ -6,7 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from test_datasets import build
+from hand_data import build, built, small_house
+from handmade import HandCatalogue
 
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import load_encoder
@@ -14,11 +15,12 @@ from agents.vision.features import feature_path, save_features
 from embodied import cli
 from embodied.datasets.folders import names_of
 from embodied.datasets.matterport import read_features
+from embodied.render.pictures import PictureSettings
 
 
 @pytest.fixture
 def data(tmp_path):
-    return build(tmp_path / "data", tmp_path / "cache", "vln")
+    return built(tmp_path / "data", "vln")
 
 
 @pytest.mark.slow
@@ -61,3 +63,20 @@ def test_a_data_set_of_another_kind_is_refused(data, tmp_path, capsys):
 def test_parquet_is_written(data, tmp_path):
     assert cli.main(["export", "parquet", "--data", str(data.folder), "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out/tasks/train.parquet").exists() and (tmp_path / "out/README.md").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
+    from embodied.gym import drive
+
+    data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=small_house)
+    unlit = PictureSettings(quality="unlit", size=64)
+    found = drive.data_worlds
+    monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
+    monkeypatch.setattr(drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, unlit))
+    order = ["export", "streamvln", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
+    assert cli.main([*order, str(tmp_path / "cache"), "--tasks", "1", "--width", "64", "--wander", "0.1"]) == 0
+    (row,) = json.loads((tmp_path / "out/annotations.json").read_text())
+    assert row["instructions"] == [data.tasks("train")[0].request]
+    assert len(list((tmp_path / "out" / row["video"] / "rgb").iterdir())) == len(row["actions"])

@@ -122,8 +122,8 @@ def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, pla
 @pytest.mark.parametrize(
     "order",
     [
-        ["dataset", "vln", "--houses", "1", "--tasks", "4", "--panoramas", "none", "--workers", "1"],
-        ["eval", "vln", "--agent", "shortest", "--split", "val_seen"],
+        ["dataset", "vln", "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"],
+        ["evaluate", "vln", "--agent", "shortest", "--split", "val_seen"],
         ["export", "parquet"],
         ["export", "r2r"],
         ["export", "lerobot", "--split", "val_seen", "--size", "16"],

@@ -14,11 +14,12 @@ import cv2
 import networkx as nx
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 
 from embodied import mattersim
 from embodied.datasets.folders import (
     PROGRAMS,
+    WordPieces,
     action_space,
     export_folder,
     largest_batch,
@@ -26,7 +27,7 @@ from embodied.datasets.folders import (
     split_sentence,
     subgoal_words,
 )
-from embodied.datasets.matterport import scan_name
+from embodied.datasets.matterport import in_matterport_order, read_features, scan_name
 from embodied.datasets.skyboxes import write_skybox
 from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import agent
@@ -35,13 +36,13 @@ from embodied.render.panorama import Panorama
 
 pytestmark = pytest.mark.slow
 
-KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "iliad-nav": "vln"}
+KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "duet": "vln", "iliad-nav": "vln"}
 
 
 @pytest.fixture(scope="module")
 def data_sets(tmp_path_factory):
     home = tmp_path_factory.mktemp("data sets")
-    return {kind: build(home / kind, home / "cache", kind) for kind in ("hanna", "vnla", "vln")}
+    return {kind: built(home / kind, kind) for kind in ("hanna", "vnla", "vln")}
 
 
 def rows(data, size=2048):
@@ -95,13 +96,18 @@ def program_features(path: Path) -> dict[str, np.ndarray]:
     return table
 
 
-@pytest.mark.parametrize("program", KINDS)
+TSV = [name for name in KINDS if name != "duet"]
+"""Programs of which a feature file, and how they fill batches, is read here; VLN-DUET's file has a test below."""
+
+
+@pytest.mark.parametrize("program", TSV)
 def test_every_viewpoint_of_the_graphs_has_features_and_view_k_is_matterports(program, folders):
     home = folders / program / PROGRAMS[program].data
     table, graphs = (
         program_features(home / "img_features/ResNet-152-imagenet.tsv"),
         program_graphs(home / "connectivity"),
     )
+    graphs.pop("ZMojNkEp431", None)
     assert set(table) == {f"{scan}_{v}" for scan, g in graphs.items() for v in g.nodes}
     features = next(iter(table.values()))
     turns = features[12:24, 1] % 12
@@ -117,7 +123,7 @@ def test_the_readme_says_what_to_run_and_which_lines_to_change(program, folders)
         and "PyTorch" in text
         and "$" not in text.replace("$ ", "")
     )
-    assert "not a ResNet-152's" in text
+    assert ("not a ViT's" if program == "duet" else "not a ResNet-152's") in text
 
 
 def minibatches(items: list, batch: int, count: int) -> list[list]:
@@ -130,7 +136,7 @@ def minibatches(items: list, batch: int, count: int) -> list[list]:
     return found
 
 
-@pytest.mark.parametrize("program", KINDS)
+@pytest.mark.parametrize("program", TSV)
 def test_the_readme_says_how_large_a_batch_may_be_and_one_more_breaks_it(program, data_sets, folders):
     data, text = data_sets[KINDS[program]], (folders / program / "README-embodied.md").read_text()
     most = largest_batch(data)
@@ -371,7 +377,7 @@ def test_vnlas_words_of_sub_goals_cover_what_the_advisor_says(data_sets, folders
 
 
 def test_a_data_set_without_rooms_is_exported_as_it_is(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", "vnla", rooms=False)
+    data = built(tmp_path / "data", "vnla", rooms=False)
     files = {p.name for p in export_folder("vnla", data, tmp_path / "out")}
     assert "noroom_train.json" in files and "asknav_train.json" not in files
     items = read(tmp_path / "out/data/noroom/noroom_train.json")
@@ -435,7 +441,8 @@ def test_room_to_rooms_teacher_reaches_every_goal_in_the_simulator(folders):
     graphs = program_graphs(root / "connectivity")
     for scan, graph in graphs.items():
         for node in read(root / "connectivity" / f"{scan}_connectivity.json"):
-            graph.nodes[node["image_id"]]["position"] = np.array([node["pose"][k] for k in (3, 7, 11)])
+            if node["image_id"] in graph:
+                graph.nodes[node["image_id"]]["position"] = np.array([node["pose"][k] for k in (3, 7, 11)])
     items = read(root / "tasks/R2R/data/R2R_train.json") + read(root / "tasks/R2R/data/R2R_val_unseen.json")
     sim = mattersim.module("upstream").Simulator()
     sim.setRenderingEnabled(False)
@@ -453,6 +460,53 @@ def test_room_to_rooms_teacher_reaches_every_goal_in_the_simulator(folders):
         actions = [shortest_action(s, graphs[i["scan"]], i["path"][-1]) for s, i in zip(states, items, strict=True)]
         sim.makeAction(*zip(*actions, strict=True))
     assert [s.location.viewpointId for s in sim.getState()] == [i["path"][-1] for i in items]
+
+
+@pytest.mark.parametrize(("dialect", "root"), [("upstream", "duet/datasets/R2R"), ("v0.1", "r2r")])
+def test_later_agents_turn_around_at_their_one_viewpoint_of_matterport3d(dialect, root, folders):
+    home = folders / root / "connectivity"
+    assert (home / "scans.txt").read_text().split()[-1] == "ZMojNkEp431"
+    sim, one = mattersim.module(dialect).Simulator(), (lambda x: x) if dialect == "v0.1" else (lambda x: [x])
+    sim.setNavGraphPath(str(home))
+    sim.setRenderingEnabled(False)
+    sim.setDiscretizedViewingAngles(True)
+    sim.init() if dialect == "v0.1" else sim.initialize()
+    for k in range(36):
+        if k == 0:
+            sim.newEpisode(*map(one, ("ZMojNkEp431", "2f4d90acd4024c269fb0efe49a8ac540", 0, math.radians(-30))))
+        else:
+            sim.makeAction(*map(one, (0, 1.0, 1.0 if k % 12 == 0 else 0)))
+        state = sim.getState()
+        assert (state if dialect == "v0.1" else state[0]).viewIndex == k
+
+
+def test_duets_items_and_features_are_those_of_room_to_room(folders):
+    h5py = pytest.importorskip("h5py")
+    root = folders / "duet/datasets/R2R"
+    for split in ("train", "val_seen", "val_unseen", "test"):
+        items = read(root / f"annotations/R2R_{split}_enc.json")
+        there = "test_unseen" if split == "test" else split
+        assert [i["path"] for i in items] == [i["path"] for i in read(folders / f"r2r/tasks/R2R/data/R2R_{there}.json")]
+        for i in items:
+            assert [(e[0], e[-1]) for e in i["instr_encodings"]] == [(101, 102)] * 3
+            assert len(i["instr_encodings"][0]) >= len(split_sentence(i["instructions"][0]))
+    seen = read_features(folders / "r2r/img_features/ResNet-152-imagenet.tsv")
+    with h5py.File(root / "features/pth_vit_base_patch16_224_imagenet.hdf5") as f:
+        assert len(f) == len(seen)
+        for (scan, viewpoint), features in seen.items():
+            assert np.array_equal(in_matterport_order(f[f"{scan}_{viewpoint}"][...]), features)
+
+
+def test_word_pieces_are_the_longest_that_fit():
+    pieces = WordPieces(["[PAD]", "[UNK]", "[CLS]", "[SEP]", "walk", "##ing", "##s", "w", ".", "un", "##walk"])
+    assert pieces("Walking. walks, unwalks") == [2, 4, 5, 8, 4, 6, 1, 9, 10, 6, 3]
+
+
+def test_vocabularies_hold_the_words_that_occur_five_times(folders):
+    home = folders / "r2r/tasks/R2R/data"
+    train, whole = ((home / f"{n}_vocab.txt").read_text().split("\n")[:-1] for n in ("train", "trainval"))
+    assert train[:3] == whole[:3] == ["<PAD>", "<UNK>", "<EOS>"] and set(train) <= set(whole)
+    assert "the" in train and len(train) == len(set(train))
 
 
 def test_iliads_paths_can_be_won_in_ten_actions(folders):
@@ -511,7 +565,7 @@ def test_skyboxes_give_back_the_views_of_our_panorama(folders, tmp_path):
 
 
 def test_skyboxes_want_panoramas(data_sets, tmp_path):
-    with pytest.raises(ValueError, match="--panoramas"):
+    with pytest.raises(ValueError, match="--pictures"):
         export_folder("matterport", data_sets["hanna"], tmp_path)
 
 

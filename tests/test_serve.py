@@ -17,7 +17,7 @@ from embodied.interface import Ask, Episode
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords
 from embodied.records import load_lines, parse, to_json
-from embodied.serve.game import set_table
+from embodied.serve.game import Game, set_table
 from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
 from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
 from embodied.serve.screens import screen_of
@@ -292,6 +292,26 @@ def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
     assert play.screen("ann")["said"][-1]["text"] == "you asked 'Where is it?'"
     with pytest.raises(ValueError, match="module:Class"):
         set_table(Part("p", assistant="nowhere:Nobody"), data)
+
+
+def test_an_assistant_by_name_is_given_the_simulated_one_to_reword(data):
+    """So a language model comes in: it words what the data set's own assistant knows."""
+
+    class Loud:
+        def __init__(self, base):
+            self.base, self.intentions = base, base.intentions
+
+        def answer(self, situation, question, *, rng):
+            reply = self.base.answer(situation, question, rng=rng)
+            return dataclasses.replace(reply, text=f"{reply.text} ({situation.question})".upper())
+
+    table = set_table(Part("p", assistant="loud", tasks=9), data, assistants={"loud": Loud})
+    games = [Game("g", table, {"agent": "ann"}, False, 0.0, task, 0) for task in table.tasks.values()]
+    game = next(g for g in games if g.observation.can_ask)
+    game.apply(Event("asked", 1.0, body={"question": "where?"}))
+    kind, body = game.think()
+    game.apply(Event(kind, 2.0, body=body))
+    assert game.said[-1]["text"].endswith("(WHERE?)") and game.situation.subtask.start == game.situation.pose
 
 
 def test_a_machine_goes_on_after_a_restart_where_it_was(data):

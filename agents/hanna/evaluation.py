@@ -19,7 +19,7 @@ from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_w
 from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
 from agents.hanna.percept import Percept, slot_distribution
-from agents.hanna.policy import PerfectInterpretation
+from agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.tables import Samples, interval, measured
@@ -48,13 +48,22 @@ PLAINER: Mapping[str, Mapping[str, Any]] = {
 asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
-def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+Judged = Callable[[HannaAgent, FeatureBank], HannaPolicy]
+"""How an agent acts when it is judged."""
+
+
+def as_shipped(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
+    """By its HannaEvaluation."""
+    return agent.policy(bank)
+
+
+def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5.
 
     'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
     authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
     """
-    learned = agent.policy(bank)
+    learned = of(agent, bank)
     return {
         "learned": learned,
         "learned, no ask": dataclasses.replace(learned, ask_rule=RULES["never"][1]),
@@ -65,14 +74,21 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     }
 
 
-def all_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
+    """The agent as the text judges it: the likeliest move and decision to ask, without rules of ours (docs/sources.md,
+    S36, S161, S162)."""
+    plain = PLAINER["learned, likeliest move, without a trail"]
+    return dataclasses.replace(agent.policy(bank), **plain, ask_rule=RULES[agent.config.ask_rule][1])
+
+
+def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
     """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
     PLAINER."""
-    learned = agent.policy(bank)
+    learned = of(agent, bank)
     rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
     asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
     plainer = {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
-    return {**hanna_policies(agent, bank), **asking, **plainer, **sight_policies(agent, bank)}
+    return {**hanna_policies(agent, bank, of), **asking, **plainer, **sight_policies(agent, bank)}
 
 
 UNWILLING = 20.0

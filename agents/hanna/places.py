@@ -1,6 +1,6 @@
 """How well pictures are recognised that were taken at another time: precision, recall and AUC in houses never seen.
 
-    python -m agents.hanna.places --validation VAL --data TEST --quality matte --out docs/results/data
+    python -m agents.hanna.places --validation VAL --data TEST --pictures fast-matte --out docs/results/data
 
 An agent has walked through a house; a helper shows a picture of one of its places. Which of the places that it saw is
 it, if any? Thresholds are those of the validation houses at which F1 is best.
@@ -195,7 +195,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--validation", type=Path, required=True, help="data set whose unseen houses choose thresholds")
     parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
-    parser.add_argument("--quality", help="how the pictures are drawn, as `embodied features --quality`")
+    parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
     parser.add_argument("--validation-splits", nargs="+", default=["val_unseen", "test_unseen"])
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="of whose houses (default: test_unseen)")
     parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
@@ -203,10 +203,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/results/data"))
     args = parser.parse_args()
 
-    chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.quality))
+    chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.pictures))
     print(f"thresholds {chosen}")
     judged = args.data or args.validation
-    asked = ask(Dataset(judged), args.split if args.data else args.validation_splits, args.quality, args.houses)
+    asked = ask(Dataset(judged), args.split if args.data else args.validation_splits, args.pictures, args.houses)
     rows = [
         {"label": word, "values": facts(some, chosen[kind_of(word)]), "printed": {}} for word, some in asked.items()
     ]
@@ -215,11 +215,11 @@ def main() -> None:
         "table": args.table,
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
-        "command": f"python -m agents.hanna.places --validation VAL --data TEST --quality {args.quality} "
+        "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
         f"--split {' '.join(args.split)} --out docs/results/data",
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
         "settings": f"{houses} houses that nothing learned from (data seed {Dataset(judged).config.seed}), "
-        f"pictures {args.quality or 'of the data set'}; "
+        f"pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,

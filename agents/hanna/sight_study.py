@@ -1,6 +1,6 @@
 """What sight is worth to HANNA: agents that see beside blind ones and beside their rules alone, by what helpers show.
 
-    python -m agents.hanna.sight_study --data TEST --quality matte --episodes STUDY --out docs/results/data
+    python -m agents.hanna.sight_study --data TEST --pictures fast-matte --episodes STUDY --out docs/results/data
 
 Every row's episodes are kept in STUDY and not played again; the table is written from them.
 """
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="data set with features of what is shown")
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which tasks (default: test_unseen)")
     parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, help="a trained agent (default: shipped)")
-    parser.add_argument("--quality", help="how the pictures are drawn, as `embodied features --quality`")
+    parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
     parser.add_argument("--shown", nargs="+", choices=OCCASIONS, default=SHOWN, help="of which pictures")
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS, help="of the first kind of pictures")
     parser.add_argument("--tasks", type=int, help="at most so many, from all houses alike")
@@ -93,7 +93,7 @@ def main() -> None:
                 "table": args.table,
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
-                "command": f"python -m agents.hanna.sight_study --data TEST --quality {args.quality} --split "
+                "command": f"python -m agents.hanna.sight_study --data TEST --pictures {args.pictures} --split "
                 f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --out docs/results/data",
                 "identity": {
                     "data": data.digest,
@@ -103,7 +103,7 @@ def main() -> None:
                 },
                 "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from (data seed "
                 f"{data.config.seed}, {data.config.area[0]:g} to {data.config.area[1]:g} m²), pictures "
-                f"{args.quality or 'of the data set'}; in brackets when the pictures were taken that helpers show",
+                f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
@@ -121,8 +121,8 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
     path = args.episodes / shown / episodes_file(name, agent_name)
     if not path.exists():
         encoder, agent, split = load_encoder().digest, load_agent(args.agent), data.split(name, houses=args.houses)
-        bank = split_of(data, name, encoder, houses=args.houses, quality=args.quality).bank
-        bank = showing(bank, data, list(split.worlds), OCCASIONS[shown], encoder, args.cache, args.quality)
+        bank = split_of(data, name, encoder, houses=args.houses, picture_kind=args.pictures).bank
+        bank = showing(bank, data, list(split.worlds), OCCASIONS[shown], encoder, args.cache, args.pictures)
         judged: Mapping[str, Agent] = {
             **hanna_policies(agent, bank),
             **sight_policies(agent, bank),

@@ -13,7 +13,7 @@ from agents.common.lessons import Lessons, drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, counted
+from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, as_shipped, by_the_text, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
@@ -164,6 +164,23 @@ TABLES: Mapping[str, StudyTable] = {
 thing: half curiosity is learned asking with the alpha of heuristic askers (Table D.1, note)."""
 
 
+PRINTED = ("4.3", "4.4", "4.5", "4.6", "D.2")
+"""Tables whose numbers the dissertation prints: judged as the text has it, and in columns of their own as we do."""
+TEXT, SHIPPED = "by the text", " as shipped"
+"""In a row's `judge`, and at the end of a split's name."""
+
+
+def in_both_ways(table: StudyTable) -> StudyTable:
+    """The table with columns of the text's way of judging, then of ours; comparisons are of both."""
+    text = lambda row: dataclasses.replace(row, judge={**row.judge, TEXT: True})
+    return dataclasses.replace(
+        table,
+        rows=tuple(text(row) for row in table.rows),
+        splits=(*table.splits, *(s + SHIPPED for s in table.splits)),
+        compared=tuple((text(a), text(b)) for a, b in table.compared),
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(EpisodeStudy):
     """Tables 4.3 to 4.6 and D.2, and success against houses, lightings and requests."""
@@ -173,7 +190,7 @@ class HannaStudy(EpisodeStudy):
     """Where the rows start from."""
     evaluation: HannaEvaluation
     device: str = "cpu"
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
@@ -191,7 +208,10 @@ class HannaStudy(EpisodeStudy):
         found = {}
         for name, table in {**TABLES, "houses": _houses_table(every)}.items():
             splits = [s for s in table.splits if self.elsewhere is None or not s.endswith("_seen")]
-            found[name] = dataclasses.replace(table, splits=(*splits, *(ood if table.splits == TEST else ())))
+            splits += ood if table.splits == TEST else ()
+            found[name] = dataclasses.replace(table, splits=tuple(splits))
+            if name in PRINTED:
+                found[name] = in_both_ways(found[name])
         return found
 
     def settings(self, train: Mapping[str, Any], seed: int) -> TrainingConfig:
@@ -205,15 +225,15 @@ class HannaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         data = dataset_of(self.data, "hanna")
-        drawn = drawings(data, data.names("train"), self.quality)
+        drawn = drawings(data, data.names("train"), self.picture_kind)
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
         return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
-        for split in splits:
-            split_of(judged, split, encoder, quality=self.quality)
+        for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
+            split_of(judged, split, encoder, picture_kind=self.picture_kind)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
@@ -227,14 +247,19 @@ class HannaStudy(EpisodeStudy):
         if agent is None:
             return agent_without_learning("hanna", played)
         data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
-        return all_policies(agent, split_of(data, split, encoder, quality=self.quality).bank)[played]
+        bank = split_of(data, split.removesuffix(SHIPPED), encoder, picture_kind=self.picture_kind).bank
+        by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
+        return all_policies(agent, bank, by_the_text if by_text else as_shipped)[played]
+
+    def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
+        return super().where(agent, judge, split.removesuffix(SHIPPED))
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.elsewhere or self.data, "hanna")
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         data = self.judged_in(row.judge)
-        drawn = drawings(data, data.names(split), self.quality)
+        drawn = drawings(data, data.names(split.removesuffix(SHIPPED)), self.picture_kind)
         return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
@@ -248,8 +273,10 @@ class HannaStudy(EpisodeStudy):
         )
         return (
             f"{told}{judged} Pictures: {self.depends({})['pictures']}. {c.iterations} updates of {c.batch} "
-            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g}."
+            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g} and by the rules of "
+            f"docs/sources.md, S36, S161, S162; in {', '.join(PRINTED)} so in the columns 'as shipped' alone, in the "
+            "others, beside the printed numbers, the likeliest action is taken."
         )
 
     def _lessons(self) -> Lessons:
-        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.quality, self.device)
+        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.picture_kind, self.device)

@@ -27,7 +27,8 @@ from embodied.interface import Agent, Ask, Episode, Move, Sight
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
-RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", RANDOM)
+SUB_RULE = "SUB whenever possible"
+RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
 EXECUTION, TIMES = "execution", "times"
 """In a row: what an execution policy alone is trained to know its place by; whether intentions are counted by time."""
 
@@ -67,7 +68,7 @@ TABLES: Mapping[str, StudyTable] = {
         ),
         ("success",),
         TEST,
-        ((_learned("learned"), _learned(RANDOM, RANDOM)),),
+        tuple((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
         pooled=ACTIONS,
     ),
     "4.8": StudyTable(
@@ -136,7 +137,7 @@ class HariStudy(EpisodeStudy):
     """A trained execution policy that stands for all of its kind; None trains one in the study's folder."""
     encoder: str = ""
     """Digest of the encoder whose features a policy sees."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that they come from, as in agents.vision.drawn.pictures_of."""
 
     name = "hari"
@@ -156,7 +157,9 @@ class HariStudy(EpisodeStudy):
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         data = hari_data(self.data).digest
-        more: dict[str, object] = {"sight": [self.encoder, self.quality]} if train.get(EXECUTION) == "features" else {}
+        more: dict[str, object] = (
+            {"sight": [self.encoder, self.picture_kind]} if train.get(EXECUTION) == "features" else {}
+        )
         if EXECUTION not in train or self._given(train):
             walking = self._walking(folder)
             more["begin"] = weights_digest(walking) if walking.exists() else None
@@ -174,7 +177,7 @@ class HariStudy(EpisodeStudy):
         elif self.executor is not None and self._given(train):
             return self.executor
         else:
-            train_execution(data, config, home, encoder=self.encoder, quality=self.quality, note=note)
+            train_execution(data, config, home, encoder=self.encoder, picture_kind=self.picture_kind, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> Executor | HariAgent:
@@ -219,7 +222,7 @@ class HariStudy(EpisodeStudy):
         return folder / f"execution_{key_of(mine)}" / "best.safetensors"
 
     def _eyes(self, executor: Executor) -> Executor:
-        return with_eyes(executor, hari_data(self.data), self.quality)
+        return with_eyes(executor, hari_data(self.data), self.picture_kind)
 
 
 def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, Samples]:

@@ -60,6 +60,21 @@ TABLES: Mapping[str, StudyTable] = {
         ("test",),
         pooled=(NEEDED,),
     ),
+    "algorithms": StudyTable(
+        "The algorithms of the text (docs/sources.md, S176)",
+        (
+            StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
+            StudyRow(
+                "Algorithm 5, mixture annealed to 0",
+                {"learner": "mixture", "mixing": 1.0, "annealed": 5000, "least_mixing": 0.0},
+            ),
+            StudyRow("Algorithm 8, own executions", {"learner": "mixture", "mixing": 0.0}),
+            StudyRow("Algorithm 9, ADEL"),
+        ),
+        ("success",),
+        ("test",),
+        pooled=(NEEDED,),
+    ),
     "figure 3.7": StudyTable(
         "Success over the course of training",
         tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNERS),
@@ -169,7 +184,7 @@ class NavStudyWorld:
 
     def source(self) -> Mapping[str, object]:
         data, where = Dataset(self.houses.folder), self.houses
-        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "quality": where.quality}
+        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "pictures": where.picture_kind}
 
     def changed(self, **teacher: Any) -> NavStudyWorld:
         if teacher:

@@ -369,7 +369,7 @@ def result(
         "command": command,
         "identity": identity,
         "settings": learner.about(),
-        "columns": list(columns.values()),
+        "columns": sorted(columns.values(), key=lambda c: c["key"] in table.pooled),
         "rows": shown,
         "notes": notes,
     }

@@ -153,7 +153,7 @@ def showing(
     occasion: Occasion,
     encoder: str,
     cache: Path,
-    quality: str | None = None,
+    picture_kind: str | None = None,
 ) -> FeatureBank:
     """The bank whose pictures were taken on an occasion.
 
@@ -164,7 +164,7 @@ def showing(
         return bank
     shown = {}
     for name in names:
-        pictures = pictures_of(data, name, quality)
+        pictures = pictures_of(data, name, picture_kind)
         path, source = shown_path(data, name, occasion, encoder, pictures), house_at(data, name, occasion, cache).digest
         shown[name], _ = load_features(path, encoder=encoder, source=source, pictures=pictures)
     return bank.showing(shown)

@@ -22,7 +22,7 @@ from typing import Any
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.studies.engine import Measured, StudyRow, StudyTable
-from agents.vision.config import WAYS, VisionConfig
+from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
 from agents.vision.labels import HouseStrips
@@ -59,7 +59,7 @@ class EncoderStudy:
     repeats: tuple[int, ...]
     split: str = "val_unseen"
     """Whose houses they are judged on; choose on validation houses."""
-    pictures: tuple[str, ...] = tuple(WAYS)
+    pictures: tuple[str, ...] = tuple(RENDER_PRESETS)
     """What the table of pictures judges on."""
     threads: int = 1
     device: str = "cpu"
@@ -133,12 +133,12 @@ class EncoderStudy:
 
     def _drawn(self) -> dict[str, object]:
         return {
-            "data": Dataset(self.source.data).digest, "quality": self.source.quality, "lights": self.source.lights
+            "data": Dataset(self.source.data).digest, "pictures": self.source.picture_kind, "lights": self.source.lights
         }  # fmt: skip
 
     def _source(self, way: str) -> StripSource:
         """Pictures as they learned from, or drawn otherwise."""
-        return dataclasses.replace(self.source, quality=way, lights=1) if way else self.source
+        return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
 
     def _seen(self) -> list[HouseStrips]:
         return self.source.strips(training_houses(Dataset(self.source.data), self.config), note=lambda line: None)

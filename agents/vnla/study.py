@@ -41,6 +41,7 @@ def _table(title: str, *rows: StudyRow) -> StudyTable:
     return StudyTable(title, rows, COLUMNS, SPLITS)
 
 
+PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
 TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
@@ -68,6 +69,18 @@ TABLES: Mapping[str, StudyTable] = {
         COLUMNS,
         SPLITS,
     ),
+    "algorithm-6": StudyTable(
+        "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
+        (
+            _row("program's rules, asks at random", asker="random"),
+            PROGRAM,
+            _row("Algorithm 6, asks at random", asker="random", rules="algorithm-6"),
+            ALGORITHM_6,
+        ),
+        (*COLUMNS, "steps"),
+        SPLITS,
+        ((ALGORITHM_6, PROGRAM),),
+    ),
     "rules": _table(
         "Rules of the asking teacher",
         _row("a and e", ask_rules="a and e"),
@@ -75,7 +88,7 @@ TABLES: Mapping[str, StudyTable] = {
         _row("all"),
     ),
 }
-"""The paper's Tables 2, 3, 4 and 7, in this order."""
+"""The paper's Tables 2, 3, 4 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +105,7 @@ class VnlaStudy(EpisodeStudy):
     """A data set whose requests name no room, for the table 'rooms'."""
     others: int = 3
     """Agents of every row but that of the learned asker."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from."""
     judging: tuple[int, ...] = EVALUATION_SEEDS
 
@@ -158,7 +171,7 @@ class VnlaStudy(EpisodeStudy):
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return Lessons(data, encoder_of(self.encoder, self.network), self.quality)
+        return Lessons(data, encoder_of(self.encoder, self.network), self.picture_kind)
 
     def about(self) -> str:
         c, pictures = self.config, self.lessons(True).pictures("train")

@@ -30,7 +30,7 @@ SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and 
 
 def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     """Views per second of processor time of one viewpoint of a flat, on one core."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, quality="unlit") as world:
+    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, pictures="unlit") as world:
         panorama = world.renderer.panorama(world.graph.positions[0])
     with one_core(), tempfile.TemporaryDirectory() as folder:
         for (height, width), colours, everything in AIMS:

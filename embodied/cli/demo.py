@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import face, folder_to_write, whole
+from embodied.cli.options import add_pictures, face, folder_to_write, whole
 from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
@@ -37,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument("--quality", choices=DRAWN, default="normal", help="unlit is drawn at once (default: normal)")
+    add_pictures(parser, DRAWN, "normal")
     parser.add_argument(
         "--out",
         type=folder_to_write,
@@ -79,7 +79,7 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, {len(graph.ids)} viewpoints")
     from embodied.world import open_world
 
-    with open_world(house, catalogue, args.cache, graph=graph, size=args.size, quality=args.quality) as world:
+    with open_world(house, catalogue, args.cache, graph=graph, size=args.size, pictures=args.pictures) as world:
         with timed("light and panoramas", seconds):
             world.render_all(progress=True)
         with timed("the first task: find something", seconds):
@@ -129,7 +129,7 @@ def show_a_room(args: argparse.Namespace) -> int:
         house.save(args.out / "house.json")
         fetch(catalogue, house)
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects")
-    with open_world(house, catalogue, args.cache, size=args.size, quality="fast") as world:
+    with open_world(house, catalogue, args.cache, size=args.size, pictures="fast") as world:
         with timed("light, followed through the flat once (about 40 s)", seconds):
             seen = {n: world.panorama(n) for n in range(len(world.graph.ids))}
         best = max(

@@ -1,7 +1,9 @@
 """Write a data set or a house as others read it: folders of published programs, Parquet, LeRobot, glTF, MJCF, USD.
 
   hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
+  duet                          the same for VLN-DUET and HAMT; EnvDrop and Recurrent-VLN-BERT read r2r
   matterport                    graphs and skyboxes for the Matterport3D simulator
+  vlnce, streamvln, uninavid, internnav   continuous walks of an expert in `vln` data: images, actions, instructions
   parquet                       tables and a card, for `datasets.load_dataset`
   lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
   glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
@@ -24,6 +26,7 @@ from embodied.cli.options import (
     file_to_write,
     folder_to_write,
     house_folder,
+    not_negative,
     video_side,
     whole,
 )
@@ -36,8 +39,10 @@ if TYPE_CHECKING:
     from embodied.house.house import House
     from embodied.scene.lit_pages import LitPages
 
-PROGRAMS = ("hanna", "vnla", "r2r", "iliad-nav", "matterport")
+PROGRAMS = ("hanna", "vnla", "r2r", "duet", "iliad-nav", "matterport")
 """As in embodied.datasets.folders, which --help should not import."""
+WALKS = {"vlnce": "vlnce", "streamvln": "streamvln", "uninavid": "uninavid", "internnav": "streamvln"}
+"""As embodied.datasets.vlnce.FORMATS, with the preset of body and camera (embodied.gym.continuous) of each."""
 FORMATS = ("glb", "mjcf", "usd")
 WIDTH = 2048
 """The length of a feature that the published programs are written for."""
@@ -50,9 +55,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     for name in PROGRAMS:
         sub = what.add_parser(name, help=f"the folder that {name} reads")
         _add_data(sub)
-        sub.add_argument(
-            "--features", action="store_true", help="also write the features of `embodied features`, as TSV"
-        )
+        sub.add_argument("--features", action="store_true", help="also write the features of `embodied features`")
         sub.add_argument(
             "--pad", type=whole(), default=WIDTH, metavar="N",
             help="fill features with zeros up to this length, which the programs count on (default: %(default)s)",
@@ -69,6 +72,20 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="episodes (.jsonl) to write as tables, too",
     )
     _add_lerobot(what.add_parser("lerobot", help="episodes as a LeRobot data set (v3.0)"))
+    for name in WALKS:
+        sub = what.add_parser(name, help=f"continuous walks as {name} trains on them")
+        _add_data(sub)
+        sub.add_argument("--split", default="train", help="whose tasks are walked (default: %(default)s)")
+        sub.add_argument("--tasks", type=whole(), metavar="N", help="walk the first so many tasks (default: all)")
+        sub.add_argument(
+            "--wander", type=not_negative, default=0.0, metavar="SHARE",
+            help="draw this share of the steps and turns instead, and write what the expert does there "
+            "(default: %(default)s)",
+        )  # fmt: skip
+        sub.add_argument(
+            "--width", type=video_side, metavar="PIXELS", help="width of pictures (default: that of the program)"
+        )
+        add_cache(sub)
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
         sub.add_argument(
@@ -94,7 +111,7 @@ def _add_lerobot(parser: argparse.ArgumentParser) -> None:
     _add_data(parser)
     parser.add_argument(
         "--episodes", type=any_path, nargs="+", metavar="FILE",
-        help="episodes (.jsonl) of `embodied eval` or `judge` (default: an expert plays --split)",
+        help="episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)",
     )  # fmt: skip
     parser.add_argument("--split", default="train", help="what the expert plays (default: %(default)s)")
     parser.add_argument("--tasks", type=whole(), metavar="N", help="the expert plays the first so many tasks")
@@ -114,7 +131,12 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied.locks import locked
 
-    runs = {"parquet": run_parquet, "lerobot": run_lerobot, **dict.fromkeys(PROGRAMS, run_program)}
+    runs = {
+        "parquet": run_parquet,
+        "lerobot": run_lerobot,
+        **dict.fromkeys(PROGRAMS, run_program),
+        **dict.fromkeys(WALKS, run_walks),
+    }
     with locked(args.out) if args.what in (*PROGRAMS, "parquet", "mjcf") else contextlib.nullcontext():
         return runs.get(args.what, run_house)(args)
 
@@ -148,7 +170,7 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)
-    drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
+    drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
@@ -209,6 +231,38 @@ def run_lerobot(args: argparse.Namespace) -> int:
         {"episodes": len(episodes), "steps": steps, "out": str(args.out)},
         f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')",
     )
+    return 0
+
+
+def run_walks(args: argparse.Namespace) -> int:
+    from embodied.datasets.habitat import route_excursions
+    from embodied.datasets.store import dataset_of
+    from embodied.datasets.vlnce import Shot, export_walks
+    from embodied.gym.continuous import PRESETS
+    from embodied.gym.drive import data_worlds
+
+    data = dataset_of(args.data, "vln")
+    body, lens = PRESETS[WALKS[args.what]]
+    width = args.width or lens.width
+    shot = Shot(2 * round(lens.height * width / lens.width / 2), width, lens.hfov)
+    worlds = data_worlds(args.data, args.split, args.cache, None)
+    walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
+    steps = export_walks(
+        args.what,
+        args.out,
+        walks,
+        worlds,
+        seed=data.config.seed,
+        body=body,
+        shot=shot,
+        wander=args.wander,
+        split=args.split,
+        watch=lambda episodes: bar(episodes, "walks", "walk"),
+    )
+    for world in worlds.values():
+        world.close()
+    facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}
+    show(args, facts, f"{len(walks)} walks, {steps} steps in {args.out}")
     return 0
 
 

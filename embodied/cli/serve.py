@@ -118,9 +118,9 @@ def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> P
 
     place, catalogue = data.place(name), catalogue_of(args)
     with open_world(
-        place.house, catalogue, args.cache, graph=place.graph, quality=study.quality, size=study.size
+        place.house, catalogue, args.cache, graph=place.graph, pictures=study.pictures, size=study.size
     ) as world:
-        note(f"panoramas of {name}: {study.quality}, faces of {study.size} pixels")
+        note(f"panoramas of {name}: {study.pictures}, faces of {study.size} pixels")
         return world.render_all(progress=True)
 
 

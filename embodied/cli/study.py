@@ -123,7 +123,7 @@ def hanna(args: argparse.Namespace) -> StudyLearner:
         config=config,
         evaluation=chosen(args, EVALUATIONS[args.scale]),
         device=args.device,
-        quality=args.quality,
+        picture_kind=args.pictures,
         begin=args.begin,
         elsewhere=args.judged_in,
     )
@@ -156,7 +156,7 @@ def vision(args: argparse.Namespace) -> StudyLearner:
     config = chosen(args, VisionConfig())
     args.rows = args.rows or (list(by_name(args.encoders)) or None)
     return EncoderStudy(
-        StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights),
+        StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights),
         config,
         seeds_of(args, config.seed),
         args.split,
@@ -184,7 +184,7 @@ def hari(args: argparse.Namespace) -> StudyLearner:
         intention=config,
         executor=args.execution,
         encoder=encoder_of(args.encoder, args.network).digest if "sight" in args.tables else "",
-        quality=args.quality,
+        picture_kind=args.pictures,
     )
 
 
@@ -205,7 +205,7 @@ def vnla(args: argparse.Namespace) -> StudyLearner:
         evaluation=chosen(args, EvaluationSettings()),
         without_rooms=args.without_rooms,
         others=args.others or args.seeds,
-        quality=args.quality,
+        picture_kind=args.pictures,
     )
 
 
@@ -249,7 +249,7 @@ def iliad(args: argparse.Namespace) -> StudyLearner:
     if args.world == "nav":
         refuse_regex_settings(args)
         learner = chosen(args, NAV_LEARNER_SCALES[args.scale])
-        source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
+        source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
         world = NavStudyWorld(chosen(args, NAV_SCALES[args.scale]), source)
     else:
         learner = chosen(args, LEARNER_SCALES[args.scale])

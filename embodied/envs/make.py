@@ -72,7 +72,7 @@ def environment_maker(
         advisor = assistant or Advisor(teacher, language or PlainLanguage())
         return lambda: rule(worlds, advisor, teacher.moves)
     if kind == "hari":
-        say = describer or Describer(frequent_classes(worlds.values()))
+        say = describer or Describer(frequent_classes(worlds.values(), hari.kept))
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
         asked = assistant or (willing if hari.cooperative else Uncooperative(willing))
         moves = PanoramicMoves()

@@ -96,7 +96,7 @@ def variant_of(has_backend: Callable[[str], bool]) -> str:
     warn(
         f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
         f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses "
-        "with quality='unlit'"
+        "with pictures='unlit'"
     )
     return SCALAR
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
+from embodied.mattersim import arguments as take
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
 from embodied.mattersim.motion import Angles, DiscreteViews, Motion, counted_steps, sign_steps
@@ -100,58 +102,58 @@ class Simulator:
 
     # Settings -----------------------------------------------------------------------------------
 
-    def setDatasetPath(self, path: str) -> None:
+    def setDatasetPath(self, path: str, /) -> None:
         """Folder of `<scan>/matterport_skybox_images`."""
-        self._set("_dataset_path", str(path))
+        self._set("_dataset_path", take.text(path, "setDatasetPath"))
 
-    def setNavGraphPath(self, path: str) -> None:
+    def setNavGraphPath(self, path: str, /) -> None:
         """Folder of scans.txt and of `<scan>_connectivity.json`."""
-        self._set("_graph_path", str(path))
+        self._set("_graph_path", take.text(path, "setNavGraphPath"))
 
-    def setRenderingEnabled(self, value: bool) -> None:
-        self._set("_rendering", bool(value))
+    def setRenderingEnabled(self, value: bool, /) -> None:
+        self._set("_rendering", take.flag(value, "setRenderingEnabled"))
 
-    def setDiscretizedViewingAngles(self, value: bool) -> None:
-        self._set("_discrete", bool(value))
+    def setDiscretizedViewingAngles(self, value: bool, /) -> None:
+        self._set("_discrete", take.flag(value, "setDiscretizedViewingAngles"))
 
-    def setRestrictedNavigation(self, value: bool) -> None:
-        self._set("_restricted", bool(value))
+    def setRestrictedNavigation(self, value: bool, /) -> None:
+        self._set("_restricted", take.flag(value, "setRestrictedNavigation"))
 
-    def setPreloadingEnabled(self, value: bool) -> None:
+    def setPreloadingEnabled(self, value: bool, /) -> None:
         """Whether `initialize` reads all skyboxes; no more than setCacheSize are kept."""
-        self._set("_preload", bool(value))
+        self._set("_preload", take.flag(value, "setPreloadingEnabled"))
 
-    def setDepthEnabled(self, value: bool) -> None:
-        self._set("_depth", bool(value))
+    def setDepthEnabled(self, value: bool, /) -> None:
+        self._set("_depth", take.flag(value, "setDepthEnabled"))
 
-    def setBatchSize(self, size: int) -> None:
-        if size < 0:
-            raise TypeError(f"setBatchSize wants a whole number of agents, got {size}")
-        self._set("_batch", int(size))
+    def setBatchSize(self, size: int, /) -> None:
+        self._set("_batch", take.index(size, "setBatchSize"))
 
-    def setCacheSize(self, size: int) -> None:
+    def setCacheSize(self, size: int, /) -> None:
         """How many decoded skyboxes are kept; one of 512 pixels takes 6 MB, and 6 more with depth."""
-        self._set("_cache", int(size))
+        self._set("_cache", take.index(size, "setCacheSize"))
 
-    def setSeed(self, seed: int) -> None:
+    def setSeed(self, seed: int, /) -> None:
         """Of the viewpoints of newRandomEpisode; its headings are the same at every call, as there."""
-        self._set("_seed", int(seed))
+        self._set("_seed", take.integer(seed, "setSeed"))
 
-    def setCameraResolution(self, width: int, height: int) -> None:
+    def setCameraResolution(self, width: int, height: int, /) -> None:
         """Pixels; enters the navigable field of view even without rendering."""
-        self._width, self._height = int(width), int(height)
+        self._width = take.integer(width, "setCameraResolution: width")
+        self._height = take.integer(height, "setCameraResolution: height")
         self._watch()
 
-    def setCameraVFOV(self, vfov: float) -> None:
+    def setCameraVFOV(self, vfov: float, /) -> None:
         """Vertical field of view, radians."""
-        self._vfov = float(vfov)
+        self._vfov = take.number(vfov, "setCameraVFOV")
         self._watch()
 
-    def setElevationLimits(self, low: float, high: float) -> bool:
+    def setElevationLimits(self, low: float, high: float, /) -> bool:
         """Whether the limits were taken: they should lie within a right angle on either side of the horizon."""
+        low, high = (take.number(v, "setElevationLimits") for v in (low, high))
         if not -math.pi / 2 < low < 0.0 < high < math.pi / 2:
             return False
-        self._limits = (float(low), float(high))
+        self._limits = (low, high)
         if isinstance(self._motion, Angles):
             self._motion.limits = self._limits
         return True
@@ -187,26 +189,35 @@ class Simulator:
         viewpointIds: Sequence[str],
         headings: Sequence[float],
         elevations: Sequence[float],
+        /,
     ) -> None:
         """Put every agent of the batch somewhere.
 
         Raises:
           IndexError: an unknown scan, or fewer values than agents.
+          TypeError: no lists, or of other things.
           ValueError: an unknown or an excluded viewpoint.
         """
+        scans, viewpoints = (
+            take.texts(scanIds, "newEpisode: scanIds"),
+            take.texts(viewpointIds, "newEpisode: viewpointIds"),
+        )
+        turns = take.numbers(headings, "newEpisode: headings")
+        tilts = take.numbers(elevations, "newEpisode: elevations")
         if not self._ready:
             self.initialize()
-        scans = self._each(scanIds)
-        rows = [self._graphs.row(s, v) for s, v in zip(scans, self._each(viewpointIds), strict=True)]
-        self._moving.start(rows, self._each(headings), self._each(elevations))
+        scans = self._each(scans)
+        rows = [self._graphs.row(s, v) for s, v in zip(scans, self._each(viewpoints), strict=True)]
+        self._moving.start(rows, self._each(turns), self._each(tilts))
         self._scans, self._step = scans, 0
         self._drawn = {}
 
-    def newRandomEpisode(self, scanIds: Sequence[str]) -> None:
+    def newRandomEpisode(self, scanIds: Sequence[str], /) -> None:
         """Put every agent at a random viewpoint of its scan, level, along a random heading."""
+        listed = take.texts(scanIds, "newRandomEpisode: scanIds")
         if not self._ready:
             self.initialize()
-        scans, turn = self._each(scanIds), Engine()
+        scans, turn = self._each(listed), Engine()
         viewpoints = [self._random_viewpoint(scan) for scan in scans]
         self.newEpisode(scans, viewpoints, [turn.uniform() * 2 * math.pi for _ in scans], [0.0] * len(scans))
 
@@ -214,7 +225,7 @@ class Simulator:
         """One state per agent: the same objects every time, which show what is now."""
         return list(self._states)
 
-    def makeAction(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
+    def makeAction(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float], /) -> None:
         """Let every agent move to a location of its list, then turn and tilt.
 
         Args:
@@ -226,12 +237,15 @@ class Simulator:
           RuntimeError: before `initialize`.
           ValueError: an index that is not in an agent's list; nobody has moved.
           IndexError: fewer values than agents.
+          TypeError: no lists, or of other things: floats and negative numbers are no indices.
         """
+        moves = take.indices(index, "makeAction: index")
+        turns, tilts = take.numbers(heading, "makeAction: heading"), take.numbers(elevation, "makeAction: elevation")
         if not self._ready:
             raise RuntimeError("MatterSim: newEpisode must be called before makeAction")
         if not self._moving.started:
             raise ValueError("MatterSim: Invalid action index: there are no locations before newEpisode")
-        self._moving.act(self._each(index), self._each(heading), self._each(elevation))
+        self._moving.act(self._each(moves), self._each(turns), self._each(tilts))
         self._step += 1
         self._drawn = {}
 
@@ -256,9 +270,8 @@ class Simulator:
         assert self._motion is not None, "initialize makes it"
         return self._motion
 
-    def _each(self, values: Sequence) -> list:
+    def _each(self, values: list[Any]) -> list[Any]:
         """A value per agent; more are ignored, as there."""
-        values = list(values)
         if len(values) < self._batch:
             raise IndexError(f"MatterSim: {len(values)} values for {self._batch} agents")
         return values[: self._batch] if len(values) > self._batch else values

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from embodied.mattersim import arguments as take
 from embodied.mattersim import simulator
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import load_graphs
@@ -84,58 +85,62 @@ class Simulator:
         self._one._engine = Engine()
         self.setDatasetPath("./data")
 
-    def setDatasetPath(self, path: str) -> None:
+    def setDatasetPath(self, path: str, /) -> None:
         """Folder above `v1/scans/<scan>/matterport_skybox_images`."""
-        self._one._skyboxes = Skyboxes(f"{path}/v1/scans", KEPT, apart=True)
+        self._one._skyboxes = Skyboxes(f"{take.text(path, 'setDatasetPath')}/v1/scans", KEPT, apart=True)
 
-    def setNavGraphPath(self, path: str) -> None:
+    def setNavGraphPath(self, path: str, /) -> None:
         """Folder of `<scan>_connectivity.json`; there need not be a scans.txt."""
-        self._one._graph_path = str(path)
+        self._one._graph_path = take.text(path, "setNavGraphPath")
 
-    def setCameraResolution(self, width: int, height: int) -> None:
+    def setCameraResolution(self, width: int, height: int, /) -> None:
         self._one.setCameraResolution(width, height)
 
-    def setCameraVFOV(self, vfov: float) -> None:
+    def setCameraVFOV(self, vfov: float, /) -> None:
         self._one.setCameraVFOV(vfov)
 
-    def setRenderingEnabled(self, value: bool) -> None:
+    def setRenderingEnabled(self, value: bool, /) -> None:
         self._one.setRenderingEnabled(value)
 
-    def setDiscretizedViewingAngles(self, value: bool) -> None:
+    def setDiscretizedViewingAngles(self, value: bool, /) -> None:
         self._one.setDiscretizedViewingAngles(value)
 
-    def setElevationLimits(self, low: float, high: float) -> bool:
+    def setElevationLimits(self, low: float, high: float, /) -> bool:
         return self._one.setElevationLimits(low, high)
 
-    def setSeed(self, seed: int) -> None:
-        self._one._engine = Engine(int(seed))
+    def setSeed(self, seed: int, /) -> None:
+        self._one._engine = Engine(take.integer(seed, "setSeed"))
 
     def init(self) -> None:
         self._one.initialize()
 
-    def newEpisode(self, scanId: str, viewpointId: str, heading: float, elevation: float) -> None:
+    def newEpisode(self, scanId: str, viewpointId: str, heading: float, elevation: float, /) -> None:
         """Put the agent somewhere; an empty viewpoint id is a random one.
 
         Raises:
           ValueError: no graph of this scan, an unknown or an excluded viewpoint.
         """
+        scan, viewpoint = take.text(scanId, "newEpisode: scanId"), take.text(viewpointId, "newEpisode: viewpointId")
+        turn, tilt = take.number(heading, "newEpisode: heading"), take.number(elevation, "newEpisode: elevation")
         if not self._one._ready:
             self.init()
-        self._one.enter(scanId)
-        self._one.newEpisode([scanId], [viewpointId or self._one._random_viewpoint(scanId)], [heading], [elevation])
+        self._one.enter(scan)
+        self._one.newEpisode([scan], [viewpoint or self._one._random_viewpoint(scan)], [turn], [tilt])
 
     def getState(self) -> SimState:
         return self._one.snapshot()
 
-    def makeAction(self, index: int, heading: float, elevation: float) -> None:
+    def makeAction(self, index: int, heading: float, elevation: float, /) -> None:
         """Move to a location of the list (0 stays), then turn and tilt.
 
         Raises:
           ValueError: an index that is not in the list, or no episode yet.
         """
+        move = take.index(index, "makeAction: index")
+        turn, tilt = take.number(heading, "makeAction: heading"), take.number(elevation, "makeAction: elevation")
         if self._one._motion is None:
             raise ValueError(f"MatterSim: Invalid action index: {index}; call newEpisode first")
-        self._one.makeAction([index], [heading], [elevation])
+        self._one.makeAction([move], [turn], [tilt])
 
     def close(self) -> None:
         self._one.close()

@@ -1,0 +1,359 @@
+"""Continuous walks as training data: image, action and instruction at every step, in the forms that models train on.
+
+  vlnce        samples.jsonl with a line per step, images/, and the episodes in Habitat's files
+  streamvln    annotations.json with the actions of each walk, images/<walk>/rgb/000.jpg
+  uninavid     conversations that ask for the next four actions, with a video of what was seen until then
+  internnav    InternData-N1's vln_ce: a LeRobot v2.1 folder per house, cameras level and 30 degrees down, pixel goals
+
+A walk may leave the expert's way: what is written as the action is always what the expert does there (DAgger).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from PIL import Image
+
+from assets.cache import write_bytes, write_json
+from embodied.datasets.habitat import with_experts, write_vlnce
+from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move, Walk
+from embodied.render.camera import camera_at
+from embodied.seeds import stream
+from embodied.world import World
+
+FORMATS = ("vlnce", "streamvln", "uninavid", "internnav")
+WORDS = {Move.STOP: "stop", Move.FORWARD: "forward", Move.LEFT: "left", Move.RIGHT: "right"}
+"""Actions in Uni-NaVid's answers."""
+PROMPT = (
+    "Imagine you are a robot programmed for navigation tasks. You have been given a video of historical observations "
+    "and an image of the current observation <image>. Your assigned task is: '{}'. Analyze this series of images to "
+    "determine your next four actions. The predicted action should be one of the following: forward, left, right, or "
+    "stop."
+)
+"""Uni-NaVid's question: its model is trained on these very words."""
+AHEAD = 4
+"""Actions of an answer, and steps between two questions of a walk."""
+PITCHES = (0, 30)
+"""Degrees that InternData-N1's cameras look down."""
+SETTINGS = {pitch: "{}cm_" + f"{pitch}deg" for pitch in PITCHES}
+HIDDEN = 0.15
+"""A pixel goal is seen where nothing is nearer than it by more than this, metres."""
+NO_GOAL = (-1, -1)
+VLNCE = Body()
+FPS = 10
+"""Frames a second of videos."""
+
+Chosen = Callable[[ContinuousEnv, int], int]
+"""(the body, what the expert does here) -> what is done."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """How walks are photographed."""
+
+    height: int = 480
+    width: int = 640
+    hfov: float = 79.0
+    """Horizontal field of view, degrees."""
+
+    @property
+    def vfov(self) -> float:
+        """Radians."""
+        return 2 * math.atan(math.tan(math.radians(self.hfov) / 2) * self.height / self.width)
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """A walk and what the expert would have done before each of its actions."""
+
+    walk: Walk
+    labels: tuple[int, ...]
+    world: World
+    body: Body
+
+    @property
+    def key(self) -> str:
+        """A name for files."""
+        return f"{self.walk.excursion.world}_{self.walk.excursion.id}"
+
+
+def expert_alone(env: ContinuousEnv, label: int) -> int:
+    """The expert plays."""
+    return label
+
+
+def wandering(share: float, rng: np.random.Generator) -> Chosen:
+    """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
+
+    def chosen(env: ContinuousEnv, label: int) -> int:
+        return int(rng.integers(1, 4)) if label != Move.STOP and rng.random() < share else label
+
+    return chosen
+
+
+def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = expert_alone) -> Taught:
+    """Play an episode with a policy and write down what the expert does at each of its states (Ross et al. 2011)."""
+    env.reset(excursion, world)
+    expert, labels = Follower(env, along=bool(excursion.reference)), []
+    while not env.ended:
+        labels.append(expert.action())
+        env.step(chosen(env, labels[-1]))
+    return Taught(env.walk(), tuple(labels), world, env.body)
+
+
+def frames(taught: Taught, shot: Shot, down: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """(h, w, 3) uint8 and (h, w) float32 metres along the optical axis, before each action, `down` degrees down."""
+    walk, size = taught.walk, (shot.height, shot.width)
+    for (x, y, z), yaw in zip(walk.positions[:-1], walk.yaws[:-1], strict=True):
+        eye = (x, y, z + taught.body.eye)
+        view = taught.world.renderer.through(camera_at(eye, yaw, -math.radians(down), shot.vfov), size)
+        yield view.rgb, view.depth
+
+
+def export_walks(
+    form: str,
+    folder: Path,
+    excursions: Iterable[Excursion],
+    worlds: dict[str, World],
+    *,
+    seed: int,
+    body: Body = VLNCE,
+    shot: Shot = Shot(),
+    wander: float = 0.0,
+    split: str = "train",
+    watch: Callable[[Iterable[Excursion]], Iterable[Excursion]] = iter,
+) -> int:
+    """Play episodes and write them in one of FORMATS; returns how many steps there are.
+
+    Args:
+      folder: new or empty.
+      wander: the share of actions, below 1, that are drawn instead of the expert's; what is written stays the expert's.
+      watch: goes through the episodes, as a progress bar does.
+
+    Raises:
+      ValueError: an unknown form, a folder with files, no episodes, or wandering where poses are what is learned from.
+    """
+    if form not in FORMATS:
+        raise ValueError(f"unknown form {form!r}; use one of {FORMATS}")
+    if not 0 <= wander < 1:
+        raise ValueError(f"wander is a share from 0 to below 1, got {wander}")
+    if form == "internnav" and wander:
+        raise ValueError("InternData-N1 learns from the poses of a walk, which should be the expert's; leave wander 0")
+    folder, episodes = Path(folder), list(excursions)
+    if folder.exists() and any(folder.iterdir()):
+        raise ValueError(f"{folder} is not empty; choose another folder")
+    if not episodes:
+        raise ValueError("there are no episodes to play; choose another split")
+    env = ContinuousEnv(body, Grounds())
+    chosen = wandering(wander, stream(seed, "wander")) if wander else expert_alone
+    taught = (teach(env, e, worlds[e.world], chosen) for e in watch(episodes))
+    if form == "vlnce":
+        write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))
+    return {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}[form](
+        folder, taught, shot
+    )
+
+
+def _samples(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+    lines: list[str] = []
+    for t in walks:
+        for k, (rgb, _) in enumerate(frames(t, shot)):
+            image = f"images/{t.key}/{k:03d}.jpg"
+            _jpeg(folder / image, rgb)
+            facts = {"episode": t.walk.excursion.id, "world": t.walk.excursion.world, "step": k, "image": image}
+            facts |= {"instruction": t.walk.excursion.instruction, "taken": t.walk.actions[k], "action": t.labels[k]}
+            lines.append(json.dumps(facts))
+    _lines(folder / "samples.jsonl", lines)
+    return len(lines)
+
+
+def _streamvln(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+    """The action at a frame is the one that led there, -1 at first: the program shifts them by one and adds STOP."""
+    rows, steps = [], 0
+    for number, t in enumerate(walks):
+        video = f"images/{t.key}"
+        for k, (rgb, _) in enumerate(frames(t, shot)):
+            _jpeg(folder / video / "rgb" / f"{k:03d}.jpg", rgb)
+        rows.append(
+            {
+                "id": number,
+                "video": video,
+                "instructions": [t.walk.excursion.instruction],
+                "actions": [-1, *t.labels[:-1]],
+            }
+        )
+        steps += len(t.labels)
+    write_json(folder / "annotations.json", rows)
+    return steps
+
+
+def _uninavid(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+    rows, steps = [], 0
+    for number, t in enumerate(walks):
+        seen = [rgb for rgb, _ in frames(t, shot)]
+        for k in range(0, len(t.labels), AHEAD):
+            video = f"nav_videos/{number}_{k:03d}.mp4"
+            write_film(folder / video, seen[: k + 1], FPS)
+            answer = " ".join(WORDS[Move(a)] for a in t.labels[k : k + AHEAD])
+            talk = [
+                {"from": "human", "value": PROMPT.format(t.walk.excursion.instruction)},
+                {"from": "gpt", "value": answer},
+            ]
+            rows.append({"id": f"NAV_ID_VLN_{number}_{k:03d}", "video": video, "conversations": talk})
+        steps += len(t.labels)
+    write_json(folder / "conversations.json", rows)
+    return steps
+
+
+# InternData-N1 -----------------------------------------------------------------------------------
+
+
+def _internnav(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+    houses: dict[str, list[dict[str, Any]]] = {}
+    steps = 0
+    for t in walks:
+        known = houses.setdefault(t.walk.excursion.world, [])
+        known.append(_intern_episode(folder / t.walk.excursion.world, len(known), steps, t, shot))
+        steps += len(t.labels)
+    for name, episodes in houses.items():
+        _intern_meta(folder / name / "meta", episodes, shot)
+    return steps
+
+
+def _intern_episode(home: Path, number: int, first: int, t: Taught, shot: Shot) -> dict[str, Any]:
+    n, columns = len(t.labels), {}
+    for pitch, form in SETTINGS.items():
+        setting = form.format(round(100 * t.body.eye))
+        depths, where = [], home / "videos" / "chunk-000"
+        for k, (rgb, depth) in enumerate(frames(t, shot, pitch)):
+            _jpeg(where / f"observation.images.rgb.{setting}" / f"episode_{number:06d}_{k}.jpg", rgb)
+            _png(where / f"observation.images.depth.{setting}" / f"episode_{number:06d}_{k}.png", depth)
+            depths.append(depth)
+        poses = [pose_of(t, k, pitch) for k in range(n)]
+        goals = [pixel_goal(t, k, poses[k], depths[k], shot) for k in range(n)]
+        columns[f"pose.{setting}"] = pa.array([p.tolist() for p in poses], pa.list_(pa.list_(pa.float32())))
+        columns[f"goal.{setting}"] = pa.array([list(g[0]) for g in goals], pa.list_(pa.int32()))
+        columns[f"relative_goal_frame_id.{setting}"] = pa.array([g[1] for g in goals], pa.int32())
+    table = pa.table(
+        {
+            "action": pa.array([-1, *t.labels[:-1]], pa.int32()),
+            **columns,
+            "timestamp": pa.array((np.arange(n) / FPS).astype(np.float32)),
+            "frame_index": pa.array(np.arange(n)),
+            "episode_index": pa.array(np.full(n, number)),
+            "index": pa.array(first + np.arange(n)),
+            "task_index": pa.array(np.full(n, number)),
+        }
+    )
+    path = home / "data" / "chunk-000" / f"episode_{number:06d}.parquet"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(table, path)
+    return {"episode_index": number, "tasks": [t.walk.excursion.instruction], "length": n, "columns": table.schema}
+
+
+def _intern_meta(meta: Path, episodes: list[dict[str, Any]], shot: Shot) -> None:
+    schema = episodes[0].pop("columns")
+    for e in episodes[1:]:
+        e.pop("columns")
+    _lines(meta / "episodes.jsonl", [json.dumps(e) for e in episodes])
+    tasks = [{"task_index": e["episode_index"], "task": e["tasks"][0]} for e in episodes]
+    _lines(meta / "tasks.jsonl", [json.dumps(x) for x in tasks])
+    counts = [{"episode_index": e["episode_index"], "stats": {"action": {"count": [e["length"]]}}} for e in episodes]
+    _lines(meta / "episodes_stats.jsonl", [json.dumps(c) for c in counts])
+    shapes = {"pose": [4, 4], "goal": [2]}
+    features: dict[str, Any] = {}
+    for field in schema:
+        kind = (
+            "float32" if field.name.startswith(("pose", "timestamp")) else "int64" if field.type == "int64" else "int32"
+        )
+        features[field.name] = {"dtype": kind, "shape": shapes.get(field.name.split(".")[0], [1]), "names": None}
+        if field.name.startswith("pose."):
+            setting = field.name.removeprefix("pose.")
+            for what, channels in (("rgb", 3), ("depth", 1)):
+                shape = [shot.height, shot.width, channels]
+                names = ["height", "width", "channel"]
+                features[f"observation.images.{what}.{setting}"] = {"dtype": "image", "shape": shape, "names": names}
+    total = sum(e["length"] for e in episodes)
+    facts = {
+        "codebase_version": "v2.1",
+        "robot_type": "unknown",
+        "total_episodes": len(episodes),
+        "total_frames": total,
+        "total_tasks": len(episodes),
+        "total_videos": 0,
+        "total_chunks": 1,
+        "chunks_size": 1000,
+        "fps": FPS,
+        "splits": {"train": f"0:{len(episodes)}"},
+        "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+        "video_path": "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
+        "features": features,
+    }
+    write_json(meta / "info.json", facts, indent=1)
+
+
+def pose_of(taught: Taught, k: int, down: int) -> np.ndarray:
+    """(4, 4) camera to world, z up: columns right, down, ahead (OpenCV's axes) and where the camera is, metres."""
+    yaw, tilt = float(taught.walk.yaws[k]), -math.radians(down)
+    ahead = np.array([math.cos(yaw) * math.cos(tilt), math.sin(yaw) * math.cos(tilt), math.sin(tilt)])
+    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2] = right, np.cross(ahead, right), ahead
+    pose[:3, 3] = taught.walk.positions[k] + (0.0, 0.0, taught.body.eye)
+    return pose
+
+
+def pixel_goal(taught: Taught, k: int, pose: np.ndarray, depth: np.ndarray, shot: Shot) -> tuple[tuple[int, int], int]:
+    """The farthest later position of the walk whose floor is seen: its (column, row), and how many frames ahead it is;
+    (-1, -1) and -1 where none is seen."""
+    focal = shot.width / 2 / math.tan(math.radians(shot.hfov) / 2)
+    later = taught.walk.positions[k + 1 : len(taught.labels)]
+    for ahead in range(len(later), 0, -1):
+        x, y, z = pose[:3, :3].T @ (later[ahead - 1] - pose[:3, 3])
+        if z <= 0.1:
+            continue
+        u, v = int(shot.width / 2 + focal * x / z), int(shot.height / 2 + focal * y / z)
+        if 0 <= u < shot.width and 0 <= v < shot.height and depth[v, u] > z - HIDDEN:
+            return (u, v), ahead
+    return NO_GOAL, -1
+
+
+# -------------------------------------------------------------------------------------------------
+
+
+def _jpeg(path: Path, rgb: np.ndarray) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(rgb).save(path, quality=92)
+
+
+def _png(path: Path, depth: np.ndarray) -> None:
+    """16 bits, millimetres; 0 where nothing is or it is farther than 65 m."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    millimetres = np.where(depth < 65.5, 1000 * np.minimum(depth, 65.5), 0).astype(np.uint16)
+    Image.fromarray(millimetres).save(path)
+
+
+def write_film(path: Path, pictures: Iterable[np.ndarray], fps: int) -> None:
+    """(h, w, 3) uint8 frames as an H.264 video."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with av.open(str(path), "w") as container:
+        film: Any = None
+        for rgb in pictures:
+            if film is None:
+                film = container.add_stream("libx264", rate=fps, options={"crf": "20"})
+                film.height, film.width, film.pix_fmt = *rgb.shape[:2], "yuv420p"
+            container.mux(film.encode(av.VideoFrame.from_ndarray(rgb, "rgb24")))
+        container.mux(film.encode())
+
+
+def _lines(path: Path, lines: Iterable[str]) -> None:
+    write_bytes(path, "".join(line + "\n" for line in lines).encode())
