@@ -196,7 +196,7 @@ def main() -> None:
     parser.add_argument("--validation", type=Path, required=True, help="data set whose unseen houses choose thresholds")
     parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
     parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
-    parser.add_argument("--validation-splits", nargs="+", default=["val_unseen", "test_unseen"])
+    parser.add_argument("--validation-splits", nargs="+", default=SPLITS, help="of whose houses (default: both unseen)")
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="of whose houses (default: test_unseen)")
     parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
     parser.add_argument("--table", default="sight-places", help="name of the table (default: %(default)s)")
